@@ -1,0 +1,53 @@
+"""Planar rigid motions as arrays (x, y, heading): metres and radians, shape (3,) or (N, 3)."""
+
+from __future__ import annotations
+
+import math
+
+import numba as nb
+import numpy as np
+
+from lhdmap.messages import FloatArray
+
+
+@nb.njit(cache=True)
+def wrap(angle_rad: float) -> float:
+    """Return the angle in [-pi, pi)."""
+    return (angle_rad + math.pi) % (2.0 * math.pi) - math.pi
+
+
+@nb.njit(cache=True)
+def compose(T_a_b: FloatArray, T_b_c: FloatArray) -> FloatArray:
+    """Return T_a_c = T_a_b * T_b_c; all shape (3,)."""
+    c, s = math.cos(T_a_b[2]), math.sin(T_a_b[2])
+    return np.array(
+        [
+            T_a_b[0] + c * T_b_c[0] - s * T_b_c[1],
+            T_a_b[1] + s * T_b_c[0] + c * T_b_c[1],
+            wrap(T_a_b[2] + T_b_c[2]),
+        ]
+    )
+
+
+@nb.njit(cache=True)
+def inverse(T_a_b: FloatArray) -> FloatArray:
+    """Return T_b_a; shape (3,)."""
+    c, s = math.cos(T_a_b[2]), math.sin(T_a_b[2])
+    return np.array([-c * T_a_b[0] - s * T_a_b[1], s * T_a_b[0] - c * T_a_b[1], -T_a_b[2]])
+
+
+@nb.njit(cache=True)
+def between(T_w_a: FloatArray, T_w_b: FloatArray) -> FloatArray:
+    """Return T_a_b from two poses in one frame; shape (3,)."""
+    return compose(inverse(T_w_a), T_w_b)
+
+
+@nb.njit(cache=True)
+def transform(T_a_b: FloatArray, points_b: FloatArray) -> FloatArray:
+    """Return points given in b, shape (N, 2), in frame a."""
+    c, s = math.cos(T_a_b[2]), math.sin(T_a_b[2])
+    out = np.empty((points_b.shape[0], 2))
+    for i in range(points_b.shape[0]):
+        out[i, 0] = T_a_b[0] + c * points_b[i, 0] - s * points_b[i, 1]
+        out[i, 1] = T_a_b[1] + s * points_b[i, 0] + c * points_b[i, 1]
+    return out
