@@ -1,0 +1,96 @@
+"""What a command says: results on standard output, notes, warnings and progress on standard error."""
+
+from __future__ import annotations
+
+import json
+import math
+import sys
+import time
+from collections.abc import Iterable, Iterator, Mapping
+from typing import Any, TypeVar
+
+T = TypeVar("T")
+
+
+class Console:
+    """Prints for one command run; with `json` the standard output holds one JSON object and nothing else."""
+
+    def __init__(self, *, json: bool = False, quiet: bool = False) -> None:
+        self.json = json
+        self.quiet = quiet
+        self._warned: set[str] = set()
+
+    def note(self, text: str) -> None:
+        """Print a line of information on standard error."""
+        if not self.quiet:
+            print(text, file=sys.stderr)
+
+    def warn(self, text: str) -> None:
+        """Print a warning once."""
+        if text not in self._warned:
+            self._warned.add(text)
+            print(f"warning: {text}", file=sys.stderr)
+
+    def error(self, text: str) -> None:
+        """Print an error."""
+        print(f"lhdmap: {text}", file=sys.stderr)
+
+    def result(self, values: Mapping[str, Any], text: str) -> None:
+        """Print the result: the JSON object with `--json`, the text otherwise."""
+        print(json.dumps(_plain(values), allow_nan=False) if self.json else text)
+
+    def progress(self, items: Iterable[T], *, total: float, label: str, position: Any) -> Iterator[T]:
+        """Yield `items`, showing rate and time left: a bar on a terminal, a plain line every 10 s otherwise.
+
+        `position(item)` tells how much of `total` (any unit) is behind when the item arrives.
+        """
+        if self.quiet:
+            yield from items
+            return
+        meter = _Meter(label, total, terminal=sys.stderr.isatty())
+        for item in items:
+            meter.at(position(item))
+            yield item
+        meter.close()
+
+
+class _Meter:
+    """A progress line that costs nothing between its updates."""
+
+    def __init__(self, label: str, total: float, *, terminal: bool) -> None:
+        self._label, self._total, self._terminal = label, max(total, 1e-9), terminal
+        self._start = self._shown = time.monotonic()
+        self._interval = 0.2 if terminal else 10.0
+        self._calls = 0
+
+    def at(self, done: float) -> None:
+        self._calls += 1
+        if self._calls & 63:
+            return
+        now = time.monotonic()
+        if now - self._shown >= self._interval:
+            self._shown = now
+            self._show(min(max(done / self._total, 0.0), 1.0), now - self._start)
+
+    def _show(self, share: float, elapsed_s: float) -> None:
+        left = elapsed_s * (1.0 - share) / share if share > 0 else math.inf
+        rate = share * self._total / elapsed_s if elapsed_s > 0 else 0.0
+        text = f"{self._label}: {100 * share:3.0f} %, {rate:.1f} x real time, {left:.0f} s left"
+        print(f"\r{text}   " if self._terminal else text, end="" if self._terminal else "\n", file=sys.stderr, flush=True)
+
+    def close(self) -> None:
+        if self._terminal and self._shown > self._start:
+            print(file=sys.stderr)
+
+
+def _plain(value: Any) -> Any:
+    """Return the value with numpy scalars and arrays as plain ones and what is not finite as null."""
+    if isinstance(value, Mapping):
+        return {str(key): _plain(item) for key, item in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [_plain(item) for item in value]
+    if hasattr(value, "tolist"):
+        return _plain(value.tolist())
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    return value
