@@ -1,0 +1,1 @@
+"""Comparison of results with ground truth: numbers first, files and plots elsewhere."""

@@ -1,0 +1,40 @@
+"""`lhdmap eval SUBJECT …`: compares results with ground truth, one module `lhdmap.cli.eval_SUBJECT` for each subject.
+
+A subject has `add_arguments(parser)` and `run(arguments, console) -> int`, like a command, and imports what
+is heavy only when it runs.
+"""
+
+from __future__ import annotations
+
+import argparse
+import importlib
+
+from lhdmap.cli.console import Console
+
+SUBJECTS = {
+    "trajectory": "absolute, relative and segment errors of a trajectory, and relations",
+}
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the subjects with their options (their modules import nothing heavy until they run)."""
+    subjects = parser.add_subparsers(dest="subject", metavar="SUBJECT", title="subjects", required=True)
+    for name, summary in SUBJECTS.items():
+        sub = subjects.add_parser(name, help=summary, description=summary[0].upper() + summary[1:] + ".")
+        _module(name).add_arguments(sub)
+        _add_common(sub)
+
+
+def run(arguments: argparse.Namespace, console: Console) -> int:
+    """Run the chosen subject and return its exit code."""
+    return int(_module(arguments.subject).run(arguments, console))
+
+
+def _module(name: str):  # type: ignore[no-untyped-def]  # a module has no type of its own
+    return importlib.import_module("lhdmap.cli.eval_" + name)
+
+
+def _add_common(parser: argparse.ArgumentParser) -> None:
+    """Take the common options behind the subject, too; without a default, so that those before it are kept."""
+    for flag in ("--json", "--quiet", "--debug"):
+        parser.add_argument(flag, action="store_true", default=argparse.SUPPRESS, help=argparse.SUPPRESS)

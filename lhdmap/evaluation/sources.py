@@ -1,0 +1,120 @@
+"""Where estimates and truths come from: TUM files, map folders, logs with ground truth, corrected CARMEN logs."""
+
+from __future__ import annotations
+
+import gzip
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TextIO
+
+import numpy as np
+
+from lhdmap.errors import InputError
+from lhdmap.geometry.se3 import quaternions_from_rpy
+from lhdmap.messages import GroundTruth
+from lhdmap.trajectory import Trajectory, read_tum, seconds_to_ns
+
+LOG_SUFFIXES = (".mcap", ".bag", ".db3")
+TEXT_LOG_SUFFIXES = (".log", ".clf", ".log.gz", ".clf.gz")
+ROBOT_POSE_FIELDS = 11
+"""ROBOTLASER1 ends with laser pose (3), robot pose (3), speeds and safety margins (5), stamp, host, logger stamp."""
+
+
+def load_estimate(path: Path, *, odometry: bool = False) -> Trajectory:
+    """Return the trajectory of a TUM file or of a map folder (its odometry where asked for).
+
+    Raises:
+        InputError: there is none at `path`.
+    """
+    if path.is_dir():
+        name = "odometry.tum" if odometry else "trajectory.tum"
+        if not (path / name).is_file():
+            raise InputError(f"{path}: a map folder with {name} was wanted, the folder has none")
+        return read_tum(path / name)
+    return read_tum(path)
+
+
+def load_truth(path: Path) -> Trajectory:
+    """Return the true trajectory of a TUM file, a log with ground truth, a map folder or a corrected CARMEN log.
+
+    Raises:
+        InputError: there is no truth at `path`.
+    """
+    name = path.name.lower()
+    if name.endswith(TEXT_LOG_SUFFIXES):
+        return read_corrected_carmen(path)
+    if name.endswith(LOG_SUFFIXES) or (path.is_dir() and not (path / "trajectory.tum").exists()):
+        return ground_truth_of_log(path)
+    return load_estimate(path)
+
+
+def ground_truth_of_log(path: Path) -> Trajectory:
+    """Return the ground truth that a log carries.
+
+    Raises:
+        InputError: the log cannot be read or has no ground truth.
+    """
+    from lhdmap.logs.formats import open_log
+
+    with open_log(path) as log:
+        names = [topic.name for topic in log.topics().values() if topic.type_name.endswith("/Odometry")]
+        found = [record.message for record in log.records(names) if isinstance(record.message, GroundTruth)]
+    if not found:
+        raise InputError(f"{path}: no ground truth in it; a nav_msgs/Odometry on /ground_truth/odometry was wanted")
+    return Trajectory(
+        np.array([message.stamp_ns for message in found], dtype=np.int64),
+        np.array([message.position_m for message in found]),
+        np.array([message.quaternion_xyzw for message in found]),
+    )
+
+
+def read_corrected_carmen(path: Path) -> Trajectory:
+    """Return the key-scan poses of a corrected CARMEN log: the robot pose of each ROBOTLASER1 line, in file order.
+
+    Raises:
+        InputError: the file is missing, has no such line, or one is broken.
+    """
+    stamps, poses = [], []
+    with _text(path) as file:
+        for number, line in enumerate(file, 1):
+            if not line.startswith("ROBOTLASER1 "):
+                continue
+            stamp, *pose = _corrected_pose(path, number, line.split())
+            stamps.append(int(stamp))
+            poses.append(pose)
+    if not poses:
+        raise InputError(f"{path}: no ROBOTLASER1 line in it; a corrected CARMEN log (poses of key scans) was wanted")
+    x, y, heading = np.array(poses).T
+    zero = np.zeros(len(x))
+    return Trajectory(
+        np.array(stamps, dtype=np.int64), np.column_stack([x, y, zero]), quaternions_from_rpy(zero, zero, heading)
+    )
+
+
+def _corrected_pose(path: Path, number: int, fields: list[str]) -> tuple[int, float, float, float]:
+    """Return stamp (ns) and robot pose (x, y, heading) of a ROBOTLASER1 line; its beams and remissions are counted."""
+    try:
+        after_beams = 9 + int(fields[8])
+        tail = fields[after_beams + 1 + int(fields[after_beams]) :]
+        x, y, heading = (float(field) for field in tail[3:6])
+        return seconds_to_ns(tail[ROBOT_POSE_FIELDS]), x, y, heading
+    except (ValueError, IndexError):
+        raise InputError(
+            f"{path}, line {number}: the ROBOTLASER1 line is broken; beams, two poses, stamp were wanted"
+        ) from None
+
+
+@contextmanager
+def _text(path: Path) -> Iterator[TextIO]:
+    """Open a plain or gzipped text file.
+
+    Raises:
+        InputError: it is missing or not readable.
+    """
+    try:
+        opener = gzip.open if path.suffix == ".gz" else open
+        with opener(path, "rt", encoding="ascii", errors="replace") as file:
+            yield file
+    except (OSError, EOFError) as error:
+        raise InputError(f"{path}: {getattr(error, 'strerror', None) or error}") from error
