@@ -1,8 +1,8 @@
 """Ways to bring an estimate into the frame of the truth before absolute errors are taken; none of them scales.
 
 `origin` is the default: the first pair's position and heading. Roll and pitch are left alone, because both sides
-measure them against gravity, and a tenth of a degree at the start would tilt a whole drive. Least-squares alignments are
-not determined everywhere: `se3` needs a path with a bend (on a straight one the roll about it is free), `se2` one with an
+measure them against gravity, and a tenth of a degree at the start would tilt a whole drive. Least squares are not
+determined everywhere: `se3` needs a path with a bend (on a straight one the roll about it is free), `se2` one with an
 extent. Elsewhere they fall back to `origin` and say so.
 """
 
