@@ -1,0 +1,92 @@
+"""The one face of all log formats: `LogReader`; readers are chosen by `lhdmap.logs.formats.open_log`."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterator
+from pathlib import Path
+from types import TracebackType
+from typing import NamedTuple, Protocol, Self
+
+from lhdmap.logs.stamps import TopicStamps
+from lhdmap.messages import Record
+
+
+class TopicInfo(NamedTuple):
+    """One topic of a log: `type_name` in ROS 2 form (`sensor_msgs/msg/LaserScan`), `count` None where not known yet."""
+
+    name: str
+    type_name: str
+    count: int | None
+    frame_id: str | None = None
+
+
+class Channel(NamedTuple):
+    """How the messages of one topic are stored: `encoding` is `cdr` (ROS 2), `ros1`, or another name that is not decoded."""
+
+    topic: str
+    type_name: str
+    encoding: str
+
+
+class RawMessage(NamedTuple):
+    """One message as stored: its channel, log time and bytes."""
+
+    channel: Channel
+    log_time_ns: int
+    data: bytes | memoryview
+
+
+class LogReader(Protocol):
+    """A log, read lazily in log-time order with bounded memory; a context manager.
+
+    What is damaged is skipped and noted in `damage`; what is odd but usable in `remarks`. Both fill while reading.
+    Log times are integer nanoseconds, None where the log has no message. `truth_topics` names ground-truth topics beyond
+    those whose name says so.
+    """
+
+    path: Path
+    format: str
+    truth_topics: frozenset[str]
+
+    def __enter__(self) -> Self:
+        """Open the log; raises InputError where it is not usable."""
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        """Close the log."""
+
+    @property
+    def damage(self) -> list[str]:
+        """What was cut off, broken or skipped, one line each."""
+
+    @property
+    def remarks(self) -> list[str]:
+        """What was noticed and worked round, one line each."""
+
+    @property
+    def stamps(self) -> dict[str, TopicStamps]:
+        """Statistics of the stamps of each topic read so far."""
+
+    @property
+    def start_ns(self) -> int | None:
+        """Log time of the first message."""
+
+    @property
+    def end_ns(self) -> int | None:
+        """Log time of the last message."""
+
+    @property
+    def duration_s(self) -> float | None:
+        """Log time from the first to the last message, seconds."""
+
+    def topics(self) -> dict[str, TopicInfo]:
+        """Return the topics by name."""
+
+    def records(self, topics: Collection[str] | None = None) -> Iterator[Record]:
+        """Yield the decoded messages of `topics` (all that can be decoded by default)."""
+
+
+def span_s(start_ns: int | None, end_ns: int | None) -> float | None:
+    """Return the time from start to end in seconds, None where either is unknown."""
+    return None if start_ns is None or end_ns is None else (end_ns - start_ns) / 1e9

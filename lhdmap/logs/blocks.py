@@ -1,0 +1,129 @@
+"""Messages of a log file in log-time order, with bounded memory.
+
+MCAP files and bags are sequences of blocks: chunks (compressed or not), or stretches of records outside of any chunk. A
+block is loaded as a whole. Blocks that overlap in time are merged with a heap; what the blocks that are open at once hold
+is bounded by a budget: beyond it, content that was used longest ago is dropped and loaded again when it is needed.
+"""
+
+from __future__ import annotations
+
+import heapq
+from collections import OrderedDict
+from collections.abc import Callable, Iterator, Sequence
+from operator import itemgetter
+from typing import NamedTuple
+
+BUDGET_BYTES = 96 << 20
+MAX_TIME_NS = (1 << 63) - 1
+
+# Log time, channel id, first byte and end of the message in its block.
+Entry = tuple[int, int, int, int]
+
+
+class Block(NamedTuple):
+    """A stretch of whole records: where its (compressed) bytes are, the log times it claims, its size when decompressed."""
+
+    offset: int
+    length: int
+    size: int
+    compression: str
+    crc: int
+    start_ns: int
+    end_ns: int
+
+
+class Loaded(NamedTuple):
+    """The content of a block: its bytes and its messages in the order of the file."""
+
+    data: bytes
+    entries: list[Entry]
+
+
+Load = Callable[[Block], Loaded]
+
+
+def in_time_order(blocks: Sequence[Block], load: Load) -> Iterator[tuple[int, int, bytes]]:
+    """Yield (log time, channel id, message bytes) in log-time order; equal times in the order of the file."""
+    waiting = sorted(blocks, key=lambda block: block.start_ns)
+    cache = _Cache(load)
+    at = 0
+    while at < len(waiting):
+        count = _group(waiting, at)
+        yield from _one(waiting[at], load) if count == 1 else _merged(waiting[at : at + count], cache)
+        at += count
+
+
+def _group(blocks: Sequence[Block], at: int) -> int:
+    """Return how many blocks from `at` on overlap in time, each with those before it."""
+    end, count = blocks[at].end_ns, 1
+    while at + count < len(blocks) and blocks[at + count].start_ns < end:
+        end = max(end, blocks[at + count].end_ns)
+        count += 1
+    return count
+
+
+def _one(block: Block, load: Load) -> Iterator[tuple[int, int, bytes]]:
+    data, entries = load(block)
+    view = memoryview(data)
+    for time_ns, channel, start, end in _sorted(entries):
+        yield time_ns, channel, view[start:end]  # type: ignore[misc]
+
+
+def _merged(blocks: Sequence[Block], cache: _Cache) -> Iterator[tuple[int, int, bytes]]:
+    """Merge blocks that overlap: each is opened when the time that it claims as its start is reached."""
+    heap: list[tuple[int, int, int, Iterator[Entry], Entry]] = []
+    opened = 0
+    while heap or opened < len(blocks):
+        while opened < len(blocks) and (not heap or blocks[opened].start_ns <= heap[0][0]):
+            _push(heap, blocks[opened].offset, opened, iter(_sorted(cache.get(blocks[opened]).entries)))
+            opened += 1
+        if not heap:
+            continue
+        time_ns, offset, number, rest, entry = heapq.heappop(heap)
+        view = memoryview(cache.get(blocks[number]).data)
+        yield time_ns, entry[1], view[entry[2] : entry[3]]  # type: ignore[misc]
+        _push(heap, offset, number, rest)
+    cache.clear()
+
+
+def _push(
+    heap: list[tuple[int, int, int, Iterator[Entry], Entry]], offset: int, number: int, rest: Iterator[Entry]
+) -> None:
+    entry = next(rest, None)
+    if entry is not None:
+        heapq.heappush(heap, (entry[0], offset, number, rest, entry))
+
+
+def _sorted(entries: list[Entry]) -> list[Entry]:
+    """Return the entries by time; the sort is stable and quick where they are in order already."""
+    return sorted(entries, key=itemgetter(0))
+
+
+class _Cache:
+    """The content of the blocks used last, up to `BUDGET_BYTES`."""
+
+    def __init__(self, load: Load) -> None:
+        self._load = load
+        self._held: OrderedDict[Block, Loaded] = OrderedDict()
+        self._bytes = 0
+
+    def get(self, block: Block) -> Loaded:
+        """Return the content of `block`, loading it where it is not held."""
+        loaded = self._held.get(block)
+        if loaded is None:
+            loaded = self._held[block] = self._load(block)
+            self._bytes += len(loaded.data)
+            self._shrink()
+        else:
+            self._held.move_to_end(block)
+        return loaded
+
+    def clear(self) -> None:
+        """Drop all content."""
+        self._held.clear()
+        self._bytes = 0
+
+    def _shrink(self) -> None:
+        while self._bytes > BUDGET_BYTES and len(self._held) > 1:
+            _, dropped = self._held.popitem(last=False)
+            self._bytes -= len(dropped.data)

@@ -1,0 +1,163 @@
+"""Bytes of a message to `lhdmap.messages`: one small function for each type of the contract, for CDR and ROS 1 alike.
+
+Every function reads through `Cursor`, which checks lengths, and raises InputError for what is no such message.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+
+from lhdmap.errors import InputError
+from lhdmap.geometry import se3
+from lhdmap.logs.cursor import FLOAT64, UINT8, Cursor, Layout
+from lhdmap.logs.pointcloud import point_cloud
+from lhdmap.messages import (
+    Command,
+    GroundTruth,
+    Inclination,
+    Joints,
+    LaserScan,
+    Message,
+    Mount,
+    Pressure,
+    Tachometer,
+    Text,
+    WheelPose,
+)
+
+Decoder = Callable[[Cursor], tuple[Message, ...]]
+
+_SCAN_NUMBERS = Layout("7f", 4)
+_VECTOR = Layout("3d", 8)
+_QUATERNION = Layout("4d", 8)
+_POSE = Layout("7d", 8)
+_COMMAND = Layout("4d2B", 8)
+_COVARIANCE_3X3 = Layout("9d", 8)
+
+
+def scan_numbers(cursor: Cursor) -> tuple[int, str, tuple[float, ...]]:
+    """Return stamp, frame and the seven numbers of a LaserScan: angle min, max, increment, time increment, scan time, range."""
+    stamp, frame = cursor.header()
+    return stamp, frame, cursor.numbers(_SCAN_NUMBERS)
+
+
+def _laser_scan(cursor: Cursor) -> tuple[Message, ...]:
+    stamp, frame, numbers = scan_numbers(cursor)
+    angle_min, _, increment, time_increment, _, range_min, range_max = numbers
+    ranges = cursor.array("f4")
+    cursor.array("f4")  # intensities: their length must fit, their values are not used
+    if not (math.isfinite(angle_min) and math.isfinite(increment)):
+        raise InputError("angles that are not finite")
+    if not math.isfinite(time_increment):
+        time_increment = 0.0
+    return (LaserScan(stamp, frame, angle_min, increment, time_increment, range_min, range_max, ranges),)
+
+
+def _imu(cursor: Cursor) -> tuple[Message, ...]:
+    stamp, frame = cursor.header()
+    quaternion = cursor.numbers(_QUATERNION)
+    covariance = cursor.numbers(_COVARIANCE_3X3)
+    rate = _measured(cursor)
+    acceleration = _measured(cursor)
+    if covariance[0] == -1.0 or not 0.5 < sum(value * value for value in quaternion) < 2.0:
+        raise InputError("no orientation in an Imu message")
+    roll, pitch, _ = se3.rpy_from_quaternions(np.array(quaternion)).tolist()
+    return (Inclination(stamp, frame, roll, pitch, rate, acceleration),)
+
+
+def _measured(cursor: Cursor) -> np.ndarray[tuple[int], np.dtype[np.float64]] | None:
+    """Return a vector with its covariance behind it; None where the first covariance says that it is not measured."""
+    vector = cursor.numbers(_VECTOR)
+    covariance = cursor.numbers(_COVARIANCE_3X3)
+    return None if covariance[0] == -1.0 or not all(map(math.isfinite, vector)) else np.array(vector)
+
+
+def _odometry(cursor: Cursor) -> tuple[Message, ...]:
+    stamp, x, y, z, qx, qy, qz, qw = _pose(cursor)
+    heading = math.atan2(2.0 * (qw * qz + qx * qy), 1.0 - 2.0 * (qy * qy + qz * qz))
+    return (WheelPose(int(stamp), x, y, heading),)
+
+
+def ground_truth(cursor: Cursor) -> tuple[Message, ...]:
+    """Decode a nav_msgs/Odometry of a ground-truth topic."""
+    stamp, *pose = _pose(cursor)
+    return (GroundTruth(int(stamp), np.array(pose[:3]), np.array(pose[3:])),)
+
+
+def _pose(cursor: Cursor) -> tuple[float, ...]:
+    stamp, _ = cursor.header()
+    cursor.text()
+    pose = cursor.numbers(_POSE)
+    if not all(map(math.isfinite, pose)):
+        raise InputError("a pose that is not finite")
+    return (stamp, *pose)
+
+
+def _joints(cursor: Cursor) -> tuple[Message, ...]:
+    stamp, _ = cursor.header()
+    names = cursor.texts()
+    positions, velocities = cursor.array("f8").tolist(), cursor.array("f8").tolist()
+    if positions and len(positions) != len(names):
+        raise InputError(f"{len(names)} joint names and {len(positions)} positions")
+    return (Joints(stamp, dict(zip(names, positions, strict=False)), dict(zip(names, velocities, strict=False))),)
+
+
+def _tachometer(cursor: Cursor) -> tuple[Message, ...]:
+    stamp, _ = cursor.header()
+    speed = float(cursor.numbers(_VECTOR)[0])
+    if not math.isfinite(speed):
+        raise InputError("a speed that is not finite")
+    return (Tachometer(stamp, speed),)
+
+
+def _pressure(cursor: Cursor) -> tuple[Message, ...]:
+    stamp, _ = cursor.header()
+    return (Pressure(stamp, float(cursor.numbers(FLOAT64)[0])),)
+
+
+def _command(cursor: Cursor) -> tuple[Message, ...]:
+    stamp, _ = cursor.header()
+    propel, steering_rate, tilt, lift, full_rpm, brake = cursor.numbers(_COMMAND)
+    return (Command(stamp, propel, steering_rate, tilt, lift, bool(full_rpm), bool(brake)),)
+
+
+def _text(cursor: Cursor) -> tuple[Message, ...]:
+    return (Text(0, cursor.text()),)
+
+
+def _transforms(cursor: Cursor) -> tuple[Message, ...]:
+    return tuple(_transform(cursor) for _ in range(cursor.count(least_bytes=64)))
+
+
+def _transform(cursor: Cursor) -> Mount:
+    stamp, parent = cursor.header()
+    child = cursor.text()
+    pose = np.array(cursor.numbers(_POSE))
+    if not np.isfinite(pose).all() or not 0.5 < float(pose[3:] @ pose[3:]) < 2.0:
+        raise InputError(f"a transform to '{child}' that is no pose")
+    return Mount(stamp, parent.lstrip("/"), child.lstrip("/"), se3.from_quaternion(pose[3:], pose[:3]))
+
+
+DECODERS: dict[str, Decoder] = {
+    "sensor_msgs/msg/LaserScan": _laser_scan,
+    "sensor_msgs/msg/PointCloud2": point_cloud,
+    "sensor_msgs/msg/Imu": _imu,
+    "sensor_msgs/msg/JointState": _joints,
+    "sensor_msgs/msg/FluidPressure": _pressure,
+    "geometry_msgs/msg/TwistStamped": _tachometer,
+    "nav_msgs/msg/Odometry": _odometry,
+    "lhd_msgs/msg/MachineCommand": _command,
+    "std_msgs/msg/String": _text,
+    "tf2_msgs/msg/TFMessage": _transforms,
+    "tf/msg/tfMessage": _transforms,
+}
+# Types whose messages carry no stamp of their own, or one that says nothing about a measurement.
+UNSTAMPED_TYPES = frozenset({"std_msgs/msg/String", "tf2_msgs/msg/TFMessage", "tf/msg/tfMessage"})
+
+
+def booleans(cursor: Cursor) -> bool:
+    """Return one boolean."""
+    return bool(cursor.numbers(UINT8)[0])

@@ -1,0 +1,21 @@
+"""What a reader notes while it reads: damage and remarks, each kind once with its count."""
+
+from __future__ import annotations
+
+
+class Findings:
+    """Texts in order of appearance; a text that comes again is counted, so that a bad log gives few lines."""
+
+    def __init__(self) -> None:
+        self._counts: dict[str, int] = {}
+
+    def __len__(self) -> int:
+        return len(self._counts)
+
+    def add(self, text: str) -> None:
+        """Note `text` once more."""
+        self._counts[text] = self._counts.get(text, 0) + 1
+
+    def lines(self) -> list[str]:
+        """Return the texts, each with how often it was noted where that is more than once."""
+        return [text if count == 1 else f"{text} ({count} times)" for text, count in self._counts.items()]

@@ -1,0 +1,104 @@
+"""`sensor_msgs/PointCloud2` to a `PointCloud`: any order and padding of the fields, time fields of the usual drivers."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from lhdmap.errors import InputError
+from lhdmap.logs.cursor import Cursor, Layout
+from lhdmap.messages import Message, PointCloud
+
+_FIELD = Layout("IB", 4)
+_KINDS = {1: "i1", 2: "u1", 3: "i2", 4: "u2", 5: "i4", 6: "u4", 7: "f4", 8: "f8"}
+_TIME_FIELDS = ("t", "time", "time_offset", "offset_time", "timestamp", "time_stamp", "timeStamp", "ts")
+_MAX_SWEEP_S = 10.0
+
+
+class _Shape(NamedTuple):
+    height: int
+    width: int
+    point_step: int
+    row_step: int
+
+
+def point_cloud(cursor: Cursor) -> tuple[Message, ...]:
+    """Decode a cloud; points that are not finite are dropped together with their times.
+
+    Raises:
+        InputError: no x, y, z, or sizes that do not fit the data.
+    """
+    stamp, frame = cursor.header()
+    height, width = cursor.uint32(), cursor.uint32()
+    fields = _fields(cursor)
+    big = bool(cursor.numbers(Layout("B", 1))[0])
+    shape = _Shape(height, width, cursor.uint32(), cursor.uint32())
+    table = _table(cursor.view(), shape, fields, ">" if big else "<")
+    points = np.stack([table[name].astype(np.float32) for name in "xyz"], axis=1)
+    finite = np.isfinite(points).all(axis=1)
+    return (PointCloud(stamp, frame, points[finite], _times(table, stamp)[finite[: _times_length(table)]]),)
+
+
+def _fields(cursor: Cursor) -> dict[str, tuple[int, int]]:
+    fields = {}
+    for _ in range(cursor.count(least_bytes=13)):
+        name = cursor.text()
+        offset, kind = cursor.numbers(_FIELD)
+        cursor.uint32()
+        fields[name] = (int(offset), int(kind))
+    if not {"x", "y", "z"} <= fields.keys():
+        raise InputError(f"a cloud without x, y, z (it has {', '.join(fields) or 'no fields'})")
+    return fields
+
+
+def _table(data: memoryview, shape: _Shape, fields: dict[str, tuple[int, int]], order: str) -> npt.NDArray[Any]:
+    """Return a structured array of all points, shape (height * width,)."""
+    wanted = {n: f for n, f in fields.items() if n in ("x", "y", "z", *_TIME_FIELDS) and f[1] in _KINDS}
+    sizes = [offset + np.dtype(_KINDS[kind]).itemsize for offset, kind in wanted.values()]
+    row_bytes = shape.width * shape.point_step
+    row_step = shape.row_step if shape.height > 1 else row_bytes
+    if max(sizes) > shape.point_step or row_bytes > row_step or shape.height * row_step > len(data):
+        raise InputError(f"a cloud of {shape.height} x {shape.width} points in {len(data)} bytes")
+    kind = np.dtype(
+        {
+            "names": list(wanted),
+            "formats": [order + _KINDS[k] for _, k in wanted.values()],
+            "offsets": [offset for offset, _ in wanted.values()],
+            "itemsize": shape.point_step,
+        }
+    )
+    if row_step == row_bytes:
+        return np.frombuffer(data, kind, shape.height * shape.width)
+    rows = [np.frombuffer(data, kind, shape.width, row * row_step) for row in range(shape.height)]
+    return np.concatenate(rows)
+
+
+def _times_length(table: npt.NDArray[Any]) -> int:
+    return len(table) if _time_field(table) else 0
+
+
+def _time_field(table: npt.NDArray[Any]) -> str | None:
+    return next((name for name in _TIME_FIELDS if name in (table.dtype.names or ())), None)
+
+
+def _times(table: npt.NDArray[Any], stamp_ns: int) -> npt.NDArray[np.float32]:
+    """Return seconds after the stamp, shape (N,) or (0,): integers are nanoseconds, floats seconds, both may be absolute."""
+    name = _time_field(table)
+    if name is None or not len(table):
+        return np.empty(0, np.float32)
+    raw = table[name]
+    times = raw.astype(np.float64) / 1e9 if raw.dtype.kind in "iu" else raw.astype(np.float64)
+    if np.nanmax(np.abs(times), initial=0.0) > _MAX_SWEEP_S:  # absolute times, or a unit that is not known
+        times = _relative(raw, stamp_ns)
+    good = np.isfinite(times) & (np.abs(times) <= _MAX_SWEEP_S)
+    return np.where(good, times, 0.0).astype(np.float32)
+
+
+def _relative(raw: npt.NDArray[Any], stamp_ns: int) -> npt.NDArray[np.float64]:
+    if raw.dtype.kind in "iu":
+        return (raw.astype(np.int64) - stamp_ns) / 1e9
+    seconds = raw.astype(np.float64)
+    in_nanoseconds = float(np.nanmedian(seconds)) > 1e12
+    return (seconds - stamp_ns) / 1e9 if in_nanoseconds else seconds - stamp_ns / 1e9

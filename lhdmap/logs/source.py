@@ -1,0 +1,105 @@
+"""`LogSource`: one or several log files as one stream of messages by role, in log-time order."""
+
+from __future__ import annotations
+
+import heapq
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from contextlib import ExitStack
+from operator import itemgetter
+from pathlib import Path
+from types import TracebackType
+from typing import Self
+
+from lhdmap.errors import InputError
+from lhdmap.logs.base import LogReader, TopicInfo
+from lhdmap.logs.formats import open_log
+from lhdmap.logs.topics import assign_topics, missing_scanner
+from lhdmap.messages import Message
+
+
+class LogSource:
+    """A log of one or more files; a context manager. `overrides` names topics by role (`{"front": "/scan"}`).
+
+    After entering, `roles` says which topic plays which role (of all files together), `start_ns` and `end_ns` which log
+    times are covered. `warnings` and `damage` fill while reading.
+    """
+
+    def __init__(self, paths: Sequence[Path | str] | Path | str, overrides: Mapping[str, str] | None = None) -> None:
+        listed = [paths] if isinstance(paths, (str, Path)) else list(paths)
+        if not listed:
+            raise InputError("no log was given")
+        self.paths = [Path(path) for path in listed]
+        self.roles: dict[str, str] = {}
+        self._overrides = dict(overrides or {})
+        self._readers: list[LogReader] = []
+        self._stack = ExitStack()
+
+    def __enter__(self) -> Self:
+        """Open all files and find out the roles of their topics; raises InputError where that fails."""
+        with ExitStack() as stack:
+            self._readers = [stack.enter_context(open_log(path)) for path in self.paths]
+            self.roles = assign_topics(self.topics(), self._overrides)
+            if "front" not in self.roles and "points" not in self.roles:
+                raise InputError(f"{self._names()}: {missing_scanner(self.topics())}")
+            for reader in self._readers:
+                reader.truth_topics = frozenset({self.roles.get("ground_truth", "")})
+            self._stack = stack.pop_all()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        """Close all files."""
+        self._stack.close()
+
+    @property
+    def damage(self) -> list[str]:
+        """What was cut off, broken or skipped so far, with the file it concerns."""
+        return [f"{reader.path}: {line}" for reader in self._readers for line in reader.damage]
+
+    @property
+    def warnings(self) -> list[str]:
+        """What was odd so far, with the file it concerns."""
+        return [f"{reader.path}: {line}" for reader in self._readers for line in reader.remarks]
+
+    @property
+    def start_ns(self) -> int | None:
+        """Log time of the first message."""
+        return min((reader.start_ns for reader in self._readers if reader.start_ns is not None), default=None)
+
+    @property
+    def end_ns(self) -> int | None:
+        """Log time of the last message."""
+        return max((reader.end_ns for reader in self._readers if reader.end_ns is not None), default=None)
+
+    @property
+    def duration_s(self) -> float:
+        """Log time from the first to the last message of all files, seconds (0 for an empty log)."""
+        start, end = self.start_ns, self.end_ns
+        return 0.0 if start is None or end is None else (end - start) / 1e9
+
+    def topics(self) -> dict[str, TopicInfo]:
+        """Return the topics of all files together, counts added up."""
+        found: dict[str, TopicInfo] = {}
+        for reader in self._readers:
+            for name, info in reader.topics().items():
+                before = found.get(name)
+                if before is not None and before.type_name != info.type_name:
+                    raise InputError(f"{reader.path}: {name} is {info.type_name}, in another file {before.type_name}")
+                found[name] = info if before is None else info._replace(count=_sum(before.count, info.count))
+        return found
+
+    def messages(self, roles: Collection[str] | None = None) -> Iterator[tuple[str, Message]]:
+        """Yield (role, message) of the wanted roles (all that the log fills by default) in log-time order."""
+        wanted = {topic: role for role, topic in self.roles.items() if roles is None or role in roles}
+        streams = [reader.records(set(wanted)) for reader in self._readers]
+        merged = streams[0] if len(streams) == 1 else heapq.merge(*streams, key=itemgetter(1))
+        for topic, _, message in merged:
+            yield wanted[topic], message
+
+    def _names(self) -> str:
+        return ", ".join(str(path) for path in self.paths)
+
+
+def _sum(first: int | None, second: int | None) -> int | None:
+    return None if first is None or second is None else first + second
