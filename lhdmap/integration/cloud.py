@@ -1,0 +1,38 @@
+"""The integrated cloud: points in `map` with what is known of each."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+import numpy.typing as npt
+
+from lhdmap.messages import Float32Array
+
+
+@dataclass(frozen=True, slots=True)
+class Cloud:
+    """N points; what is not known of them is None.
+
+    Attributes:
+        points_m: shape (N, 3), float32, metres in `map`.
+        normals: shape (N, 3), float32, unit length, towards the place that the point was seen from; zero where unknown.
+        curvature: shape (N,), float32, surface variation l0 / (l0 + l1 + l2), 0 ... 1/3; zero where unknown.
+        stamps_ns: shape (N,), int64, when the point was first measured.
+        hits: shape (N,), uint32, measurements that were averaged into the point.
+        viewpoints_m: shape (N, 3), float32, where the sensor was at the first measurement.
+    """
+
+    points_m: Float32Array
+    normals: Float32Array | None = None
+    curvature: Float32Array | None = None
+    stamps_ns: npt.NDArray[np.int64] | None = None
+    hits: npt.NDArray[np.uint32] | None = None
+    viewpoints_m: Float32Array | None = None
+
+    def __len__(self) -> int:
+        return len(self.points_m)
+
+    def with_normals(self, normals: Float32Array, curvature: Float32Array) -> Cloud:
+        """Return the same cloud with these normals, shape (N, 3), and curvatures, shape (N,)."""
+        return replace(self, normals=normals, curvature=curvature)

@@ -1,0 +1,111 @@
+"""Clouds as tables of named fields, which is what PLY and PCD files hold."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from lhdmap.errors import InputError
+from lhdmap.integration.cloud import Cloud
+
+Table = npt.NDArray[np.void]
+
+
+class FieldNames(NamedTuple):
+    """How a file format calls the three components of the normal."""
+
+    normal: tuple[str, str, str]
+
+
+PLY_NAMES = FieldNames(("nx", "ny", "nz"))
+PCD_NAMES = FieldNames(("normal_x", "normal_y", "normal_z"))
+
+
+def table_of(cloud: Cloud, names: FieldNames, stamp_types: list[tuple[str, str]]) -> Table:
+    """Return the cloud as a structured array with the fields that it has; stamps are left for the caller to fill in."""
+    fields = [(axis, "<f4") for axis in "xyz"]
+    fields += [(name, "<f4") for name in names.normal] if cloud.normals is not None else []
+    fields += [("curvature", "<f4")] if cloud.curvature is not None else []
+    fields += stamp_types if cloud.stamps_ns is not None else []
+    fields += [("hits", "<u4")] if cloud.hits is not None else []
+    table = np.zeros(len(cloud), dtype=fields)
+    for axis, name in enumerate("xyz"):
+        table[name] = cloud.points_m[:, axis]
+    if cloud.normals is not None:
+        for axis, name in enumerate(names.normal):
+            table[name] = cloud.normals[:, axis]
+    if cloud.curvature is not None:
+        table["curvature"] = cloud.curvature
+    if cloud.hits is not None:
+        table["hits"] = cloud.hits
+    return table
+
+
+def cloud_of(path: Path, table: Table, stamps_ns: npt.NDArray[np.int64] | None) -> Cloud:
+    """Return the cloud of a file's table; points that are not finite are left out, unknown fields are passed over.
+
+    Raises:
+        InputError: the table has no x, y and z.
+    """
+    names = table.dtype.names or ()
+    if not {"x", "y", "z"} <= set(names):
+        raise InputError(f"{path}: its fields are {', '.join(names) or 'none'}; x, y and z were wanted")
+    points = _columns(table, ("x", "y", "z"))
+    keep = np.isfinite(points).all(axis=1)
+    normal = next((n.normal for n in (PLY_NAMES, PCD_NAMES) if set(n.normal) <= set(names)), None)
+    return Cloud(
+        points_m=points[keep],
+        normals=None if normal is None else _columns(table, normal)[keep],
+        curvature=table["curvature"][keep].astype(np.float32) if "curvature" in names else None,
+        stamps_ns=None if stamps_ns is None else stamps_ns[keep],
+        hits=table["hits"][keep].astype(np.uint32) if "hits" in names else None,
+    )
+
+
+def _columns(table: Table, names: tuple[str, ...]) -> npt.NDArray[np.float32]:
+    with np.errstate(over="ignore"):
+        return np.stack([table[name].astype(np.float32) for name in names], axis=-1)
+
+
+def text_table(path: Path, body: bytes, dtype: np.dtype[np.void], count: int) -> Table:
+    """Return the first `count` rows of a text body as a table.
+
+    Raises:
+        InputError: there are fewer rows, or something in them is no number.
+    """
+    names = dtype.names or ()
+    columns = sum(_width(dtype, name) for name in names)
+    words = body.split(None, count * columns)[: count * columns]
+    if len(words) < count * columns:
+        raise InputError(f"{path}: cut off: {len(words) // columns} of {count} points are there")
+    table = np.zeros(count, dtype=dtype)
+    at = 0
+    for name in names:
+        width, base = _width(dtype, name), dtype[name].base
+        try:
+            values = [np.array(words[at + k :: columns]).astype(base) for k in range(width)]
+        except (ValueError, OverflowError):
+            raise InputError(f"{path}: field '{name}' holds something that is no number of type {base}") from None
+        table[name] = np.stack(values, axis=-1).reshape(table[name].shape)
+        at += width
+    return table
+
+
+def _width(dtype: np.dtype[np.void], name: str) -> int:
+    """Return how many numbers a field holds."""
+    return math.prod(dtype[name].shape)
+
+
+def binary_table(path: Path, body: memoryview, dtype: np.dtype[np.void], count: int) -> Table:
+    """Return the first `count` rows of a binary body as a table.
+
+    Raises:
+        InputError: there are fewer rows.
+    """
+    if len(body) < count * dtype.itemsize:
+        raise InputError(f"{path}: cut off: {len(body) // max(dtype.itemsize, 1)} of {count} points are there")
+    return np.frombuffer(body, dtype=dtype, count=count)

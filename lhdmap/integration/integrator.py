@@ -1,0 +1,163 @@
+"""The integration stage: sweeps with known poses in, one voxelised cloud out (paper, Section 3.2 and Fig. 9)."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from lhdmap.errors import InputError
+from lhdmap.integration.beams import sweep_stamps_ns, table_of
+from lhdmap.integration.cloud import Cloud
+from lhdmap.integration.normals import estimate_normals
+from lhdmap.integration.project import Counts, SweepPoses, project_cloud, project_scan, sensor_pose
+from lhdmap.integration.self_filter import Rig, rig_of
+from lhdmap.integration.voxel_grid import VoxelGrid
+from lhdmap.machine import Machine
+from lhdmap.messages import FloatArray, LaserScan, Mount, PointCloud
+from lhdmap.settings import setting
+
+
+@dataclass(frozen=True, slots=True)
+class IntegrationSettings:
+    """Integration of scans into the cloud: which returns are taken, the voxel grid, and normals."""
+
+    voxel_size_m: tuple[float, float, float] = setting(
+        (0.2, 0.2, 0.1), unit="m", source="paper, Fig. 9", minimum=0.01, maximum=10.0, doc="Size of a voxel in x, y, z."
+    )
+    range_min_m: float = setting(0.3, unit="m", minimum=0.0, doc="Returns nearer than this are left out.")
+    range_max_m: float = setting(
+        50.0, unit="m", minimum=0.5, doc="Returns farther than this are left out: 0.05 deg of tilt is 4 cm there."
+    )
+    body_margin_m: float = setting(
+        0.1, unit="m", minimum=0.0, maximum=2.0, doc="The boxes of both bodies are grown by this for the self-filter."
+    )
+    min_hits: int = setting(
+        2,
+        unit="hits",
+        minimum=1,
+        doc="Voxels with fewer hits stay only if their neighbours have hits: dust, mixed pixels.",
+    )
+    min_neighbour_hits: int = setting(
+        2, unit="hits", minimum=0, doc="Hits that the 26 neighbours of such a voxel must hold together; 0: keep all."
+    )
+    normal_radius_m: float = setting(
+        0.75, unit="m", source="paper, Fig. 9", minimum=0.02, maximum=20.0, doc="Radius for normals and curvature."
+    )
+    normal_min_neighbours: int = setting(
+        5, unit="points", minimum=3, doc="Points with fewer neighbours in that radius get no normal (zero)."
+    )
+
+
+class Integrated(NamedTuple):
+    """One sweep in `map`: points, shape (N, 3), metres (a view that the next update overwrites), and its counts."""
+
+    points_map: FloatArray
+    counts: Counts
+
+
+@dataclass(slots=True)
+class IntegrationTotals:
+    """What became of all beams so far."""
+
+    sweeps: int = 0
+    kept: int = 0
+    no_return: int = 0
+    self_hits: int = 0
+    refused_sweeps: int = 0
+
+
+@dataclass(slots=True)
+class _Buffers:
+    """Room for the points of one sweep, reused."""
+
+    points: FloatArray = field(default_factory=lambda: np.empty((0, 3)))
+    shares: FloatArray = field(default_factory=lambda: np.empty(0))
+
+    def make_room(self, points: int) -> None:
+        if len(self.points) < points:
+            self.points, self.shares = np.empty((points, 3)), np.empty(points)
+
+
+class Integrator:
+    """Puts sweeps into the map. The work is done without the interpreter's lock: it may run beside the odometry."""
+
+    def __init__(self, settings: IntegrationSettings, mounts: Iterable[Mount], machine: Machine) -> None:
+        self.settings = settings
+        self.grid = VoxelGrid(settings.voxel_size_m)
+        self.totals = IntegrationTotals()
+        self._rigs: dict[str, Rig] = {
+            mount.child_frame: rig_of(mount, machine, settings.body_margin_m) for mount in mounts
+        }
+        self._buffers = _Buffers()
+
+    def update(self, message: LaserScan | PointCloud, poses: SweepPoses) -> Integrated:
+        """Add one sweep; `poses` are those of the machine at `sweep_stamps_ns(message)`.
+
+        A sweep whose poses are not finite is refused and counted in `totals.refused_sweeps`.
+
+        Raises:
+            InputError: the sensor's frame has no mount.
+        """
+        rig = self._rig(message.frame_id)
+        if not all(np.isfinite(part).all() for part in poses):
+            self.totals.refused_sweeps += 1
+            return Integrated(self._buffers.points[:0], Counts(0, 0, 0))
+        counts = self._project(message, poses, rig)
+        points = self._buffers.points[: counts.kept]
+        viewpoint = sensor_pose(poses.T_map_base_start, poses.articulation_start_rad, rig)[:3, 3]
+        self.grid.add(points, self._stamps(message, counts.kept), viewpoint)
+        self._count(counts)
+        return Integrated(points, counts)
+
+    def cloud(self) -> Cloud:
+        """Return the map so far with normals and curvature, stray voxels left out."""
+        chosen = self.settings
+        cloud = self.grid.cloud(chosen.min_hits, chosen.min_neighbour_hits)
+        found = estimate_normals(
+            cloud.points_m, chosen.normal_radius_m, cloud.viewpoints_m, min_neighbours=chosen.normal_min_neighbours
+        )
+        return cloud.with_normals(found.normals, found.curvature)
+
+    def _rig(self, frame_id: str) -> Rig:
+        try:
+            return self._rigs[frame_id]
+        except KeyError:
+            known = ", ".join(sorted(self._rigs)) or "none"
+            raise InputError(
+                f"frame '{frame_id}': the sensor has no mount (known: {known}); "
+                "a transform on /tf_static or a mount in the dataset or machine file was wanted"
+            ) from None
+
+    def _project(self, message: LaserScan | PointCloud, poses: SweepPoses, rig: Rig) -> Counts:
+        low_m, high_m = self.settings.range_min_m, self.settings.range_max_m
+        buffers = self._buffers
+        if isinstance(message, LaserScan):
+            buffers.make_room(len(message.ranges_m))
+            limits = (max(low_m, float(message.range_min_m)), min(high_m, float(message.range_max_m)))
+            ranges = _readonly(message.ranges_m)
+            return Counts(*project_scan(ranges, table_of(message), limits, poses, rig, buffers.points, buffers.shares))
+        buffers.make_room(len(message.points_m))
+        cloud, offsets = _readonly(message.points_m), _readonly(message.time_offsets_s)
+        return Counts(*project_cloud(cloud, offsets, (low_m, high_m), poses, rig, buffers.points, buffers.shares))
+
+    def _stamps(self, message: LaserScan | PointCloud, kept: int) -> npt.NDArray[np.int64]:
+        first_ns, last_ns = sweep_stamps_ns(message)
+        return first_ns + np.rint(self._buffers.shares[:kept] * (last_ns - first_ns)).astype(np.int64)
+
+    def _count(self, counts: Counts) -> None:
+        totals = self.totals
+        totals.sweeps += 1
+        totals.kept += counts.kept
+        totals.no_return += counts.no_return
+        totals.self_hits += counts.self_hits
+
+
+def _readonly(array: npt.NDArray[np.float32]) -> npt.NDArray[np.float32]:
+    """Return a read-only float32 view (or copy), so that each kernel is compiled for one kind of array only."""
+    view = np.ascontiguousarray(array, dtype=np.float32).view()
+    view.flags.writeable = False
+    return view

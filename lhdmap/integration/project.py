@@ -1,0 +1,159 @@
+"""Projection of a sweep into the map: validity, self-filter and motion compensation in one pass over the beams.
+
+The pose of the sensor at beam i is interpolated between its poses at the ends of the sweep: position linearly, rotation
+along the shortest arc. Each end is T_map_base * (T_base_rear(articulation)) * T_parent_sensor, so turning, driving,
+pitching and steering within the sweep are all undone. The poses carry the attitude: nothing is assumed level here.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numba as nb
+import numpy as np
+
+from lhdmap.integration.beams import BeamTable
+from lhdmap.integration.self_filter import Rig, base_to_rear, body_poses, in_boxes
+from lhdmap.messages import Float32Array, FloatArray
+
+
+class SweepPoses(NamedTuple):
+    """The machine at the ends of a sweep (`beams.sweep_stamps_ns`): poses (4, 4) of `base_link`, articulation (rad)."""
+
+    T_map_base_start: FloatArray
+    T_map_base_end: FloatArray
+    articulation_start_rad: float
+    articulation_end_rad: float
+
+
+class Counts(NamedTuple):
+    """What became of a sweep's beams: kept points, beams without a return, returns from the machine itself."""
+
+    kept: int
+    no_return: int
+    self_hits: int
+
+
+class _Arc(NamedTuple):
+    """Motion of the sensor over a sweep: start pose, rotation axis (start frame) and angle, shift."""
+
+    R: FloatArray
+    t: FloatArray
+    axis: FloatArray
+    angle: float
+    shift: FloatArray
+
+
+@nb.njit(cache=True, nogil=True)
+def sensor_pose(T_map_base: FloatArray, articulation_rad: float, rig: Rig) -> FloatArray:
+    """Return T_map_sensor, shape (4, 4)."""
+    if rig.on_rear:
+        return T_map_base @ base_to_rear(articulation_rad, rig.L_f_m, rig.L_r_m) @ rig.T_parent_sensor
+    return T_map_base @ rig.T_parent_sensor
+
+
+@nb.njit(cache=True, nogil=True)
+def _arc(poses: SweepPoses, rig: Rig) -> _Arc:
+    A = sensor_pose(poses.T_map_base_start, poses.articulation_start_rad, rig)
+    B = sensor_pose(poses.T_map_base_end, poses.articulation_end_rad, rig)
+    R, t = A[:3, :3].copy(), A[:3, 3].copy()
+    D = R.T @ B[:3, :3].copy()
+    axis = np.array([D[2, 1] - D[1, 2], D[0, 2] - D[2, 0], D[1, 0] - D[0, 1]])
+    length = math.sqrt(axis[0] ** 2 + axis[1] ** 2 + axis[2] ** 2)
+    angle = math.atan2(length, D[0, 0] + D[1, 1] + D[2, 2] - 1.0)
+    if length > 0.0:
+        axis /= length
+    return _Arc(R, t, axis, angle, B[:3, 3] - t)
+
+
+@nb.njit(cache=True, nogil=True)
+def _put(out: FloatArray, n: int, arc: _Arc, share: float, point: tuple[float, float, float]) -> None:
+    """Write the sensor-frame `point`, measured at `share` (0-1) of the sweep, to out[n] in map coordinates."""
+    x, y, z = point
+    k = arc.axis
+    a, b = math.sin(share * arc.angle), 1.0 - math.cos(share * arc.angle)
+    # Rodrigues: u + sin k x u + (1 - cos) k x (k x u)
+    cx, cy, cz = k[1] * z - k[2] * y, k[2] * x - k[0] * z, k[0] * y - k[1] * x
+    ux = x + a * cx + b * (k[1] * cz - k[2] * cy)
+    uy = y + a * cy + b * (k[2] * cx - k[0] * cz)
+    uz = z + a * cz + b * (k[0] * cy - k[1] * cx)
+    for row in range(3):
+        out[n, row] = arc.R[row, 0] * ux + arc.R[row, 1] * uy + arc.R[row, 2] * uz + arc.t[row] + share * arc.shift[row]
+
+
+@nb.njit(cache=True, nogil=True)
+def project_scan(
+    ranges_m: Float32Array,
+    beams: BeamTable,
+    limits_m: tuple[float, float],
+    poses: SweepPoses,
+    rig: Rig,
+    out_points: FloatArray,
+    out_shares: FloatArray,
+) -> Counts:
+    """Project a scan into the map.
+
+    Args:
+        ranges_m: shape (N,); NaN, inf and values outside `limits_m` are no returns.
+        beams: directions, each of shape (N,).
+        limits_m: smallest and largest range.
+        poses: the machine at the first and at the last beam.
+        rig: mount of the scanner and boxes of the bodies.
+        out_points: shape (>= N, 3), takes the kept points, metres in `map`.
+        out_shares: shape (>= N,), takes each kept point's time as a share (0-1) of the sweep.
+    """
+    arc = _arc(poses, rig)
+    T_front, T_rear = body_poses(rig, 0.5 * (poses.articulation_start_rad + poses.articulation_end_rad))
+    n, no_return, own = 0, 0, 0
+    step = 1.0 / max(ranges_m.shape[0] - 1, 1)
+    for i in range(ranges_m.shape[0]):
+        r = np.float64(ranges_m[i])
+        if not (limits_m[0] <= r <= limits_m[1]):  # also true for NaN
+            no_return += 1
+            continue
+        x, y = r * beams.cos[i], r * beams.sin[i]
+        if r < rig.reach_m and (
+            in_boxes(T_front, rig.front_boxes, x, y, 0.0) or in_boxes(T_rear, rig.rear_boxes, x, y, 0.0)
+        ):
+            own += 1
+            continue
+        _put(out_points, n, arc, i * step, (x, y, 0.0))
+        out_shares[n] = i * step
+        n += 1
+    return Counts(n, no_return, own)
+
+
+@nb.njit(cache=True, nogil=True)
+def project_cloud(
+    points_m: Float32Array,
+    offsets_s: Float32Array,
+    limits_m: tuple[float, float],
+    poses: SweepPoses,
+    rig: Rig,
+    out_points: FloatArray,
+    out_shares: FloatArray,
+) -> Counts:
+    """Project a 3D scanner's points, shape (N, 3), into the map; `offsets_s` (N,) or empty; else as `project_scan`."""
+    arc = _arc(poses, rig)
+    T_front, T_rear = body_poses(rig, 0.5 * (poses.articulation_start_rad + poses.articulation_end_rad))
+    timed = offsets_s.shape[0] == points_m.shape[0] and offsets_s.shape[0] > 0
+    first = np.float64(offsets_s.min()) if timed else 0.0
+    span = np.float64(offsets_s.max()) - first if timed else 0.0
+    n, no_return, own = 0, 0, 0
+    for i in range(points_m.shape[0]):
+        x, y, z = np.float64(points_m[i, 0]), np.float64(points_m[i, 1]), np.float64(points_m[i, 2])
+        r = math.sqrt(x * x + y * y + z * z)
+        if not (limits_m[0] <= r <= limits_m[1]):
+            no_return += 1
+            continue
+        if r < rig.reach_m and (
+            in_boxes(T_front, rig.front_boxes, x, y, z) or in_boxes(T_rear, rig.rear_boxes, x, y, z)
+        ):
+            own += 1
+            continue
+        share = (offsets_s[i] - first) / span if span > 0.0 else 0.0
+        _put(out_points, n, arc, share, (x, y, z))
+        out_shares[n] = share
+        n += 1
+    return Counts(n, no_return, own)
