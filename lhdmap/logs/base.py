@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Iterator
+from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
 from typing import NamedTuple, Protocol, Self
@@ -11,7 +12,8 @@ from lhdmap.logs.stamps import TopicStamps
 from lhdmap.messages import Record
 
 
-class TopicInfo(NamedTuple):
+@dataclass(frozen=True, slots=True)
+class TopicInfo:
     """One topic of a log: `type_name` in ROS 2 form (`sensor_msgs/msg/LaserScan`), `count` None where not known yet."""
 
     name: str
@@ -21,7 +23,7 @@ class TopicInfo(NamedTuple):
 
 
 class Channel(NamedTuple):
-    """How the messages of one topic are stored: `encoding` is `cdr` (ROS 2), `ros1`, or another name that is not decoded."""
+    """How the messages of one topic are stored: `encoding` is `cdr` (ROS 2), `ros1`, or one that is not decoded."""
 
     topic: str
     type_name: str
@@ -40,8 +42,8 @@ class LogReader(Protocol):
     """A log, read lazily in log-time order with bounded memory; a context manager.
 
     What is damaged is skipped and noted in `damage`; what is odd but usable in `remarks`. Both fill while reading.
-    Log times are integer nanoseconds, None where the log has no message. `truth_topics` names ground-truth topics beyond
-    those whose name says so.
+    Log times are integer nanoseconds, None where the log has no message. `truth_topics` names ground-truth topics
+    beyond those whose name says so.
     """
 
     path: Path

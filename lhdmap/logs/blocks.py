@@ -1,8 +1,8 @@
 """Messages of a log file in log-time order, with bounded memory.
 
-MCAP files and bags are sequences of blocks: chunks (compressed or not), or stretches of records outside of any chunk. A
-block is loaded as a whole. Blocks that overlap in time are merged with a heap; what the blocks that are open at once hold
-is bounded by a budget: beyond it, content that was used longest ago is dropped and loaded again when it is needed.
+MCAP files and bags are sequences of blocks: chunks (compressed or not), or stretches of records outside of any chunk.
+A block is loaded as a whole. Blocks that overlap in time are merged with a heap; what the blocks that are open at once
+hold is bounded by a budget: beyond it, content that was used longest ago is dropped and loaded again when needed.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ Entry = tuple[int, int, int, int]
 
 
 class Block(NamedTuple):
-    """A stretch of whole records: where its (compressed) bytes are, the log times it claims, its size when decompressed."""
+    """A stretch of whole records: where its bytes are, its size when decompressed, the log times that it claims."""
 
     offset: int
     length: int

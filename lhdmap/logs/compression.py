@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import bz2
 import zlib
+from collections.abc import Callable
 from typing import Protocol
 
 import lz4.frame
@@ -34,7 +35,11 @@ class _Lz4:
         return b"".join(parts)
 
 
-_STREAMS = {"zstd": lambda: zstandard.ZstdDecompressor().decompressobj(), "lz4": _Lz4, "bz2": bz2.BZ2Decompressor}
+_STREAMS: dict[str, Callable[[], _Stream]] = {
+    "zstd": lambda: zstandard.ZstdDecompressor().decompressobj(),
+    "lz4": _Lz4,
+    "bz2": bz2.BZ2Decompressor,
+}
 _ERRORS = (zstandard.ZstdError, RuntimeError, OSError, EOFError, ValueError, zlib.error, MemoryError)
 COMPRESSIONS = frozenset({"", "none", *_STREAMS})
 
@@ -70,7 +75,7 @@ def _quick(data: bytes, compression: str, size: int) -> tuple[bytes, str | None]
 
 def _stepwise(data: bytes, compression: str) -> tuple[bytes, str | None]:
     """Decompress in small steps; on an error what came before it is kept."""
-    stream: _Stream = _STREAMS[compression]()  # type: ignore[operator]
+    stream = _STREAMS[compression]()
     parts: list[bytes] = []
     total = 0
     for start in range(0, len(data), _STEP):

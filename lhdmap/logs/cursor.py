@@ -27,7 +27,7 @@ class Layout:
         self.size, self.align = self.little.size, align
 
 
-UINT8, UINT32, INT32, FLOAT64 = Layout("B", 1), Layout("I", 4), Layout("i", 4), Layout("d", 8)
+UINT8, UINT32, FLOAT64 = Layout("B", 1), Layout("I", 4), Layout("d", 8)
 _STAMP_ROS1, _STAMP_ROS2 = Layout("III", 4), Layout("iI", 4)
 
 
@@ -60,21 +60,28 @@ class Cursor:
         return bytes(self._data[start : start + size]).rstrip(b"\0").decode("utf-8", "replace")
 
     def header(self) -> tuple[int, str]:
-        """Return stamp (nanoseconds, 0 where not set) and frame of a std_msgs/Header."""
+        """Return stamp (nanoseconds, 0 where not set) and frame (without ROS 1's leading slash) of a std_msgs/Header."""
         if self._ros1:
             _, seconds, nanoseconds = self.numbers(_STAMP_ROS1)
         else:
             seconds, nanoseconds = self.numbers(_STAMP_ROS2)
-        return max(int(seconds) * _SECOND_NS + int(nanoseconds), 0), self.text()
+        return max(int(seconds) * _SECOND_NS + int(nanoseconds), 0), self.text().lstrip("/")
 
-    def array(self, kind: str, count: int | None = None) -> npt.NDArray[np.generic]:
-        """Return a copy of `count` numbers (by default a sequence: its length comes first), kind as in numpy: `f4`, `f8`."""
-        count = self.uint32() if count is None else count
-        kind_ordered = np.dtype(self._order + kind)
+    def floats32(self) -> npt.NDArray[np.float32]:
+        """Return a copy of a sequence of float32."""
+        count = self.uint32()
         if not count:
-            return np.empty(0, kind)
-        start = self._advance(kind_ordered.itemsize, count * kind_ordered.itemsize)
-        return np.frombuffer(self._data, kind_ordered, count, start).astype(kind)
+            return np.empty(0, np.float32)
+        start = self._advance(4, 4 * count)
+        return np.frombuffer(self._data, self._order + "f4", count, start).astype(np.float32)
+
+    def floats64(self) -> list[float]:
+        """Return a sequence of float64."""
+        count = self.uint32()
+        if not count:
+            return []
+        start = self._advance(8, 8 * count)
+        return np.frombuffer(self._data, self._order + "f8", count, start).tolist()
 
     def view(self) -> memoryview:
         """Return the bytes of a uint8 sequence without copying them."""

@@ -12,7 +12,7 @@ import numpy as np
 
 from lhdmap.errors import InputError
 from lhdmap.geometry import se3
-from lhdmap.logs.cursor import FLOAT64, UINT8, Cursor, Layout
+from lhdmap.logs.cursor import FLOAT64, Cursor, Layout
 from lhdmap.logs.pointcloud import point_cloud
 from lhdmap.messages import (
     Command,
@@ -39,7 +39,7 @@ _COVARIANCE_3X3 = Layout("9d", 8)
 
 
 def scan_numbers(cursor: Cursor) -> tuple[int, str, tuple[float, ...]]:
-    """Return stamp, frame and the seven numbers of a LaserScan: angle min, max, increment, time increment, scan time, range."""
+    """Return stamp, frame and the numbers of a scan: angle min, max, increment, time increment, scan time, range limits."""
     stamp, frame = cursor.header()
     return stamp, frame, cursor.numbers(_SCAN_NUMBERS)
 
@@ -47,8 +47,8 @@ def scan_numbers(cursor: Cursor) -> tuple[int, str, tuple[float, ...]]:
 def _laser_scan(cursor: Cursor) -> tuple[Message, ...]:
     stamp, frame, numbers = scan_numbers(cursor)
     angle_min, _, increment, time_increment, _, range_min, range_max = numbers
-    ranges = cursor.array("f4")
-    cursor.array("f4")  # intensities: their length must fit, their values are not used
+    ranges = cursor.floats32()
+    cursor.floats32()  # intensities: their length must fit, their values are not used
     if not (math.isfinite(angle_min) and math.isfinite(increment)):
         raise InputError("angles that are not finite")
     if not math.isfinite(time_increment):
@@ -76,7 +76,7 @@ def _measured(cursor: Cursor) -> np.ndarray[tuple[int], np.dtype[np.float64]] | 
 
 
 def _odometry(cursor: Cursor) -> tuple[Message, ...]:
-    stamp, x, y, z, qx, qy, qz, qw = _pose(cursor)
+    stamp, x, y, _, qx, qy, qz, qw = _pose(cursor)
     heading = math.atan2(2.0 * (qw * qz + qx * qy), 1.0 - 2.0 * (qy * qy + qz * qz))
     return (WheelPose(int(stamp), x, y, heading),)
 
@@ -99,7 +99,7 @@ def _pose(cursor: Cursor) -> tuple[float, ...]:
 def _joints(cursor: Cursor) -> tuple[Message, ...]:
     stamp, _ = cursor.header()
     names = cursor.texts()
-    positions, velocities = cursor.array("f8").tolist(), cursor.array("f8").tolist()
+    positions, velocities = cursor.floats64(), cursor.floats64()
     if positions and len(positions) != len(names):
         raise InputError(f"{len(names)} joint names and {len(positions)} positions")
     return (Joints(stamp, dict(zip(names, positions, strict=False)), dict(zip(names, velocities, strict=False))),)
@@ -138,7 +138,7 @@ def _transform(cursor: Cursor) -> Mount:
     pose = np.array(cursor.numbers(_POSE))
     if not np.isfinite(pose).all() or not 0.5 < float(pose[3:] @ pose[3:]) < 2.0:
         raise InputError(f"a transform to '{child}' that is no pose")
-    return Mount(stamp, parent.lstrip("/"), child.lstrip("/"), se3.from_quaternion(pose[3:], pose[:3]))
+    return Mount(stamp, parent, child.lstrip("/"), se3.from_quaternion(pose[3:], pose[:3]))
 
 
 DECODERS: dict[str, Decoder] = {
@@ -156,8 +156,3 @@ DECODERS: dict[str, Decoder] = {
 }
 # Types whose messages carry no stamp of their own, or one that says nothing about a measurement.
 UNSTAMPED_TYPES = frozenset({"std_msgs/msg/String", "tf2_msgs/msg/TFMessage", "tf/msg/tfMessage"})
-
-
-def booleans(cursor: Cursor) -> bool:
-    """Return one boolean."""
-    return bool(cursor.numbers(UINT8)[0])

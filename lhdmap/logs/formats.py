@@ -6,6 +6,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from lhdmap.errors import InputError
+from lhdmap.logs.bag_log import BagFile
 from lhdmap.logs.base import LogReader
 from lhdmap.logs.decoded import DecodedLog
 from lhdmap.logs.mcap_log import McapFile
@@ -17,7 +18,11 @@ def _mcap(path: Path) -> LogReader:
     return DecodedLog(path, McapFile)
 
 
-_BY_SUFFIX: dict[str, Opener] = {".mcap": _mcap}
+def _bag(path: Path) -> LogReader:
+    return DecodedLog(path, BagFile)
+
+
+_BY_SUFFIX: dict[str, Opener] = {".mcap": _mcap, ".bag": _bag}
 _BY_START: dict[bytes, Opener] = {b"\x89MCAP": _mcap}
 
 

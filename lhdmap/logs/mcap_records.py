@@ -114,8 +114,8 @@ def statistics(content: bytes) -> Statistics:
     """Return the content of a statistics record; raises InputError where it is broken."""
     fields = Fields(content)
     *_, start_ns, end_ns, size = fields.take(_STATISTICS)
-    counts = dict(fields.take(_COUNT) for _ in range(size // _COUNT.size))
-    return Statistics(counts, start_ns, end_ns)  # type: ignore[arg-type]
+    pairs: list[tuple[int, int]] = [fields.take(_COUNT) for _ in range(size // _COUNT.size)]  # type: ignore[misc]
+    return Statistics(dict(pairs), start_ns, end_ns)
 
 
 def footer(content: bytes) -> tuple[int, int, int]:

@@ -1,4 +1,4 @@
-"""`sensor_msgs/PointCloud2` to a `PointCloud`: any order and padding of the fields, time fields of the usual drivers."""
+"""`sensor_msgs/PointCloud2` to a `PointCloud`: any order of fields, time fields of the usual drivers."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from lhdmap.errors import InputError
-from lhdmap.logs.cursor import Cursor, Layout
+from lhdmap.logs.cursor import UINT8, Cursor, Layout
 from lhdmap.messages import Message, PointCloud
 
 _FIELD = Layout("IB", 4)
@@ -33,12 +33,13 @@ def point_cloud(cursor: Cursor) -> tuple[Message, ...]:
     stamp, frame = cursor.header()
     height, width = cursor.uint32(), cursor.uint32()
     fields = _fields(cursor)
-    big = bool(cursor.numbers(Layout("B", 1))[0])
+    big = bool(cursor.numbers(UINT8)[0])
     shape = _Shape(height, width, cursor.uint32(), cursor.uint32())
     table = _table(cursor.view(), shape, fields, ">" if big else "<")
     points = np.stack([table[name].astype(np.float32) for name in "xyz"], axis=1)
-    finite = np.isfinite(points).all(axis=1)
-    return (PointCloud(stamp, frame, points[finite], _times(table, stamp)[finite[: _times_length(table)]]),)
+    finite = np.asarray(np.isfinite(points).all(axis=1))
+    times = _times(table, stamp)
+    return (PointCloud(stamp, frame, points[finite], times[finite] if len(times) else times),)
 
 
 def _fields(cursor: Cursor) -> dict[str, tuple[int, int]]:
@@ -75,16 +76,15 @@ def _table(data: memoryview, shape: _Shape, fields: dict[str, tuple[int, int]], 
     return np.concatenate(rows)
 
 
-def _times_length(table: npt.NDArray[Any]) -> int:
-    return len(table) if _time_field(table) else 0
-
-
 def _time_field(table: npt.NDArray[Any]) -> str | None:
     return next((name for name in _TIME_FIELDS if name in (table.dtype.names or ())), None)
 
 
 def _times(table: npt.NDArray[Any], stamp_ns: int) -> npt.NDArray[np.float32]:
-    """Return seconds after the stamp, shape (N,) or (0,): integers are nanoseconds, floats seconds, both may be absolute."""
+    """Return seconds after the stamp, shape (N,) or (0,).
+
+    Integers are nanoseconds, floats seconds (nanoseconds where they are that large); both may be absolute times.
+    """
     name = _time_field(table)
     if name is None or not len(table):
         return np.empty(0, np.float32)

@@ -36,6 +36,7 @@ _STORE = get_typestore(Stores.ROS2_HUMBLE)
 _STORE.register(get_types_from_msg(MACHINE_COMMAND, "lhd_msgs/msg/MachineCommand"))
 _T = _STORE.types
 _SECOND_NS = 1_000_000_000
+_FLOAT32 = 7  # sensor_msgs/PointField
 _UNKNOWN = np.array([-1.0] + [0.0] * 8)  # sensor_msgs/Imu: a first covariance of -1 means "not measured"
 _NO_COVARIANCE_3 = np.zeros(9)
 _NO_COVARIANCE_6 = np.zeros(36)
@@ -101,7 +102,7 @@ def _point_cloud(cloud: PointCloud) -> Any:
         header=_header(cloud.stamp_ns, cloud.frame_id),
         height=1,
         width=len(table),
-        fields=[field(name=name, offset=4 * i, datatype=field.FLOAT32, count=1) for i, name in enumerate(names)],
+        fields=[field(name=name, offset=4 * i, datatype=_FLOAT32, count=1) for i, name in enumerate(names)],
         is_bigendian=False,
         point_step=step,
         row_step=step * len(table),

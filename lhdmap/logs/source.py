@@ -5,6 +5,7 @@ from __future__ import annotations
 import heapq
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import ExitStack
+from dataclasses import replace
 from operator import itemgetter
 from pathlib import Path
 from types import TracebackType
@@ -86,7 +87,7 @@ class LogSource:
                 before = found.get(name)
                 if before is not None and before.type_name != info.type_name:
                     raise InputError(f"{reader.path}: {name} is {info.type_name}, in another file {before.type_name}")
-                found[name] = info if before is None else info._replace(count=_sum(before.count, info.count))
+                found[name] = info if before is None else replace(info, count=_sum(before.count, info.count))
         return found
 
     def messages(self, roles: Collection[str] | None = None) -> Iterator[tuple[str, Message]]:

@@ -15,8 +15,8 @@ UNSTAMPED = 0
 class TopicStamps:
     """What was seen of the stamps of one topic; counts of messages, times in integer nanoseconds.
 
-    `zero`: header stamps of zero; `backward`: header stamps before the one used last; `log_backward`: those where the log
-    time ran backwards too; `duplicate`: header stamps equal to the one used last. `first_ns`, `last_ns`: stamps used.
+    `zero`: header stamps of zero; `backward`: header stamps before the one used last; `log_backward`: those where the
+    log time ran backwards too; `duplicate`: those equal to the one used last. `first_ns`, `last_ns`: stamps used.
     `offset_min_ns`, `offset_max_ns`: log time minus header stamp.
     """
 

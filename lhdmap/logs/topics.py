@@ -82,9 +82,9 @@ def _assign_scanners(chosen: dict[str, str], free: dict[str, TopicInfo]) -> None
     if len(candidates) == 1:
         chosen["front"] = candidates[0]
     elif candidates:
-        listed = ", ".join(sorted(candidates))
+        listed, first = ", ".join(sorted(candidates)), min(candidates)
         raise InputError(
-            f"{len(candidates)} topics could be the front scanner: {listed}; name it: --topic front={sorted(candidates)[0]}"
+            f"{len(candidates)} topics could be the front scanner: {listed}; name it: --topic front={first}"
         )
 
 

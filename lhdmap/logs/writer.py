@@ -20,8 +20,8 @@ _CHUNK_BYTES = 1 << 20
 class LogWriter:
     """Writes one log; a context manager.
 
-    The file has the name `PATH.partial` until the `with` statement ends well; when it is left by an exception, the partial
-    file is finished (it can be read) but keeps that name. `metadata` goes into the file's metadata record.
+    The file has the name `PATH.partial` until the `with` statement ends well; when that is left by an exception, the
+    partial file is finished (it can be read) but keeps that name. `metadata` goes into the file's metadata record.
     """
 
     def __init__(self, path: Path | str, metadata: Mapping[str, str] | None = None) -> None:
@@ -50,7 +50,7 @@ class LogWriter:
         text = "\n".join(f"{key}: {value}" for key, value in self._metadata.items()) + "\n"
         self._writer.add_metadata("lhdmap", dict(self._metadata))
         self._writer.add_attachment(self._first_ns, self._first_ns, "lhdmap.txt", "text/plain", text.encode())
-        self._writer.finish()
+        self._writer.finish()  # type: ignore[no-untyped-call]
         self._file.close()
         if kind is None:
             self.partial_path.replace(self.path)
