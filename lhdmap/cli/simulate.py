@@ -1,0 +1,212 @@
+"""`lhdmap simulate SCENARIO`: writes a log, its truth and its scenario."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from lhdmap.cli.console import Console
+from lhdmap.errors import UsageError
+
+if TYPE_CHECKING:
+    from lhdmap.messages import Record
+    from lhdmap.simulation.scenario import DriftScenario
+
+BUILT_IN = ("drift",)
+DUST_SHARE, MIXED_PIXEL_SHARE, DROP_OUT_SHARE = 0.03, 0.5, 0.01
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the command's arguments; an option that is not given keeps the scenario's value."""
+    parser.add_argument("scenario", metavar="SCENARIO", help="'drift', or a scenario file (.toml)")
+    parser.add_argument(
+        "-o", "--output", type=Path, metavar="LOG", help="log to write (default: a new name in this folder)"
+    )
+    parser.add_argument("--seed", type=int, help="same seed, same log to the bit (default 0)")
+    parser.add_argument(
+        "--mesh", type=Path, metavar="PLY", help="also write the drift's surface as a mesh, in the frame map"
+    )
+    parser.add_argument("--machine", metavar="TOML", help="machine file (default: the 11-t loader of the papers)")
+    parser.add_argument(
+        "--no-truth", action="store_true", help="no /ground_truth/odometry in the log (the .truth.tum stays)"
+    )
+    parser.add_argument(
+        "--planar", action="store_true", help="2D world: level scanners, flat floor, upright walls, no inclinometer"
+    )
+    _add_drive(parser.add_argument_group("drift and drive"))
+    _add_sensors(parser.add_argument_group("sensors"))
+
+
+def _add_drive(group: Any) -> None:
+    group.add_argument("--length", type=float, metavar="M", help="distance to drive, m (default 100)")
+    group.add_argument("--speed-kmh", type=float, metavar="V", help="tramming speed, km/h (default 12)")
+    group.add_argument(
+        "--roughness", metavar="R", help="walls: rough (12 cm), moderate (3 cm), smooth (5 mm), or rms in m"
+    )
+    group.add_argument("--mesh-size", type=float, metavar="M", help="edge length of the mesh, m (default 0.06)")
+    group.add_argument(
+        "--cross-drift", action="append", metavar="AT,DEG,LENGTH", help="a side opening, m, degrees (left +), m"
+    )
+    group.add_argument("--stop", action="append", metavar="AT,SECONDS", help="stop after this driven distance")
+    group.add_argument(
+        "--reverse", action="append", metavar="AT,BACK", help="reverse at this driven distance, and go on"
+    )
+
+
+def _add_sensors(group: Any) -> None:
+    yes_or_no = argparse.BooleanOptionalAction
+    group.add_argument("--beams", type=int, metavar="N", help="beams over 190°: 381 or 761 (default 381)")
+    group.add_argument("--rate-hz", type=float, metavar="HZ", help="sweeps in a second (default 25)")
+    group.add_argument("--noise-mm", type=float, metavar="MM", help="range noise, standard deviation (default 12)")
+    group.add_argument("--max-range-m", type=float, metavar="M", help="longest range (default 80)")
+    group.add_argument("--sweep", action=yes_or_no, help="each beam at its own time: sweep distortion (default: off)")
+    group.add_argument("--dust", action="store_true", help="dust returns, mixed pixels at edges, drop-outs")
+    group.add_argument("--rear", action=yes_or_no, help="rear scanner (default: on)")
+    group.add_argument("--inclinometer", action=yes_or_no, help="inclinometer (default: on; off with --planar)")
+    group.add_argument("--wheels", action=yes_or_no, help="tachometer, joints, transmission pressure (default: on)")
+    group.add_argument("--slip", action="store_true", help="the wheels slip in bursts of 2 s")
+
+
+def run(arguments: argparse.Namespace, console: Console) -> int:
+    """Simulate and write; return the exit code."""
+    from lhdmap.simulation.drive import simulate_drift
+
+    scenario = scenario_of(arguments)
+    log = arguments.output or _free_name(_stem(arguments.scenario), scenario.seed)
+
+    def progress(records: Iterator[Record]) -> Iterator[Record]:
+        return _shown(records, console, scenario.drive.distance_m / scenario.drive.speed_kmh * 3.6)
+
+    console.note(
+        f"simulating {scenario.drive.distance_m:g} m at {scenario.drive.speed_kmh:g} km/h, seed {scenario.seed}"
+    )
+    drive = simulate_drift(scenario, log, mesh_path=arguments.mesh, progress=progress)
+    values = {
+        "log": str(drive.log),
+        "truth": str(drive.truth_file),
+        "scenario": str(drive.scenario_file),
+        "mesh": str(drive.mesh_file) if drive.mesh_file else None,
+        "scans": drive.scans,
+        "messages": drive.messages,
+        "duration_s": drive.duration_s,
+        "distance_m": drive.distance_m,
+    }
+    files = "\n".join(f"{name:9} {values[name]}" for name in ("log", "truth", "scenario", "mesh") if values[name])
+    console.result(values, f"{files}\n{drive.distance_m:.1f} m in {drive.duration_s:.1f} s, {drive.scans} front scans")
+    return 0
+
+
+def scenario_of(arguments: argparse.Namespace) -> DriftScenario:
+    """Return the scenario that a command line asks for: the file's or the built-in one, with the options over it.
+
+    Raises:
+        UsageError: the scenario is neither built in nor a file, or an option's value is wrong.
+        ConfigError: a value is out of its range.
+    """
+    from lhdmap.simulation.scenario import SECTIONS, DriftScenario, load_scenario
+    from lhdmap.settings import load_section
+
+    path = Path(arguments.scenario)
+    if arguments.scenario not in BUILT_IN and not path.is_file():
+        raise UsageError(f"'{arguments.scenario}': one of {', '.join(BUILT_IN)} or a scenario file was wanted")
+    scenario = DriftScenario() if arguments.scenario in BUILT_IN else load_scenario(path)
+    top, sections = _overrides(arguments)
+    for name, values in sections.items():
+        current = getattr(scenario, name)
+        checked = load_section(SECTIONS[name], name, values)
+        scenario = replace(scenario, **{name: replace(current, **{key: getattr(checked, key) for key in values})})
+    return replace(scenario, **top)
+
+
+def _overrides(arguments: argparse.Namespace) -> tuple[dict[str, Any], dict[str, dict[str, Any]]]:
+    """Return what the options set: top-level keys, and the keys of each section."""
+    top = {"seed": arguments.seed, "machine": arguments.machine}
+    top |= {"planar": arguments.planar or None, "truth": False if arguments.no_truth else None}
+    inclinometer = False if arguments.planar and arguments.inclinometer is None else arguments.inclinometer
+    sections = {
+        "drift": {
+            "roughness_m": _roughness(arguments.roughness),
+            "mesh_m": arguments.mesh_size,
+            "cross_drifts": _tuples("--cross-drift", arguments.cross_drift, 3),
+        },
+        "drive": {
+            "distance_m": arguments.length,
+            "speed_kmh": arguments.speed_kmh,
+            "stops": _tuples("--stop", arguments.stop, 2),
+            "reversals": _tuples("--reverse", arguments.reverse, 2),
+        },
+        "scanner": _scanner_values(arguments),
+        "inclinometer": {"enabled": inclinometer},
+        "wheels": {"enabled": arguments.wheels, "slip": arguments.slip or None},
+    }
+    return _given(top), {name: _given(values) for name, values in sections.items()}
+
+
+def _scanner_values(arguments: argparse.Namespace) -> dict[str, Any]:
+    dusty = arguments.dust
+    return {
+        "beams": arguments.beams,
+        "rate_hz": arguments.rate_hz,
+        "noise_m": None if arguments.noise_mm is None else arguments.noise_mm / 1000.0,
+        "max_range_m": arguments.max_range_m,
+        "sweep": arguments.sweep,
+        "rear": arguments.rear,
+        "dust_share": DUST_SHARE if dusty else None,
+        "mixed_pixel_share": MIXED_PIXEL_SHARE if dusty else None,
+        "drop_out_share": DROP_OUT_SHARE if dusty else None,
+    }
+
+
+def _given(values: dict[str, Any]) -> dict[str, Any]:
+    return {key: value for key, value in values.items() if value is not None}
+
+
+def _roughness(text: str | None) -> float | None:
+    from lhdmap.simulation.scenario import ROUGHNESS_M
+
+    if text is None:
+        return None
+    if text in ROUGHNESS_M:
+        return ROUGHNESS_M[text]
+    try:
+        return float(text)
+    except ValueError:
+        raise UsageError(f"--roughness {text}: {', '.join(ROUGHNESS_M)} or a number of metres was wanted") from None
+
+
+def _tuples(option: str, texts: list[str] | None, count: int) -> tuple[tuple[float, ...], ...] | None:
+    if texts is None:
+        return None
+    try:
+        rows = tuple(tuple(float(part) for part in text.split(",")) for text in texts)
+    except ValueError:
+        rows = ((),)
+    if any(len(row) != count for row in rows):
+        raise UsageError(f"{option} {' '.join(texts)}: {count} numbers with commas between them were wanted")
+    return rows
+
+
+def _stem(scenario: str) -> str:
+    return scenario if scenario in BUILT_IN else Path(scenario).stem.removesuffix(".scenario")
+
+
+def _free_name(stem: str, seed: int) -> Path:
+    """Return a log name in the current folder that does not exist yet."""
+    log, number = Path(f"{stem}_seed{seed}.mcap"), 1
+    while log.exists() or log.with_suffix(".truth.tum").exists() or log.with_suffix(".scenario.toml").exists():
+        number += 1
+        log = Path(f"{stem}_seed{seed}_{number}.mcap")
+    return log
+
+
+def _shown(records: Iterator[Record], console: Console, total_s: float) -> Iterator[Record]:
+    """Yield records with progress by their time in the log."""
+    from lhdmap.simulation.world import START_NS
+
+    def position(record: Record) -> float:
+        return (record.log_time_ns - START_NS) * 1e-9
+
+    return console.progress(records, total=total_s, label="simulate", position=position)

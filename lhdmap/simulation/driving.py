@@ -1,0 +1,132 @@
+"""The machine on the floor of the drift: its pose, joint angle and speed over time; the truth of a simulated log.
+
+The front axle follows its path without side slip, the rear follows by Eq. (1). Roll and pitch are those of the plane
+through both front wheels' contacts and the middle of the rear axle (which swings, so that four wheels touch).
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from lhdmap.kinematics import articulation_along_path
+from lhdmap.machine import Machine
+from lhdmap.messages import FloatArray
+from lhdmap.simulation.centre_line import STEP_M, CentreLine, beside
+from lhdmap.simulation.drift import Drift
+from lhdmap.simulation.noise_field import Scales, noise_field
+from lhdmap.simulation.scenario import DriveSettings
+from lhdmap.simulation.timetable import Timetable
+
+TABLE_RATE_HZ = 1000.0
+_FOOTPRINT_M = 0.25  # half length and width of the patch under a tyre that carries it
+
+
+class Motion(NamedTuple):
+    """State at `TABLE_RATE_HZ`, one row each, columns x, y, z, roll, pitch, yaw of `base_link` in `map`, articulation.
+
+    Shape (N, 7), metres and radians, yaw continuous; `s_m` (N,) is the place on the path, `speed_mps` (N,) signed.
+    """
+
+    table: FloatArray
+    s_m: FloatArray
+    speed_mps: FloatArray
+
+    @property
+    def duration_s(self) -> float:
+        """Length of the drive in seconds."""
+        return (len(self.table) - 1) / TABLE_RATE_HZ
+
+    def at(self, time_s: FloatArray) -> FloatArray:
+        """Return rows of the table at any times, shape (M, 7), linear in between."""
+        return interpolated(self.table, time_s)
+
+
+def interpolated(table: FloatArray, time_s: FloatArray) -> FloatArray:
+    """Return rows of a table sampled at `TABLE_RATE_HZ` at any times, linear in between, its ends held."""
+    position = np.clip(np.asarray(time_s, dtype=float) * TABLE_RATE_HZ, 0.0, len(table) - 1.0)
+    index = np.minimum(position.astype(np.int64), len(table) - 2)
+    share = (position - index).reshape(-1, *([1] * (table.ndim - 1)))
+    return table[index] * (1.0 - share) + table[index + 1] * share
+
+
+def drive_path(drift: Drift, settings: DriveSettings, rng: np.random.Generator) -> CentreLine:
+    """Return the path of the front axle: the centre line with some slow wandering to either side."""
+    line = drift.line
+    field = noise_field(rng, Scales(2, 9.0, 0.4), (0.0, line.length_m), (0.0, 1.0))
+    field.normalise(line.s_m[::50], np.zeros(1), settings.wander_m)
+    return beside(line, field.grid(line.s_m, np.zeros(1))[:, 0])
+
+
+def simulate_motion(drift: Drift, path: CentreLine, timetable: Timetable, machine: Machine, shaking: Shaking) -> Motion:
+    """Return the motion of `machine` over the floor of `drift` along `path` by `timetable`."""
+    time_s = np.arange(int(timetable.duration_s * TABLE_RATE_HZ) + 1) / TABLE_RATE_HZ
+    s_m, speed_mps = timetable.at(time_s)
+    on_path = _poses_on_path(drift, path, machine)
+    table = np.stack([np.interp(s_m, path.s_m, column) for column in on_path.T], axis=1)
+    table[:, 3:5] += shaking.angles(len(time_s))
+    return Motion(table, s_m, speed_mps)
+
+
+class Shaking(NamedTuple):
+    """Vibration of the front body by engine and road: standard deviation (rad) and its source of chance."""
+
+    size_rad: float
+    rng: np.random.Generator
+
+    def angles(self, count: int) -> FloatArray:
+        """Return roll and pitch, shape (count, 2), rad, at `TABLE_RATE_HZ`: noise around 6 Hz."""
+        if self.size_rad == 0.0:
+            return np.zeros((count, 2))
+        from scipy.signal import butter, sosfilt
+
+        white = self.rng.standard_normal((count + 2000, 2))
+        band = sosfilt(butter(2, (4.0, 9.0), "bandpass", fs=TABLE_RATE_HZ, output="sos"), white, axis=0)[2000:]
+        return self.size_rad * band / band.std(axis=0)
+
+
+def _poses_on_path(drift: Drift, path: CentreLine, machine: Machine) -> FloatArray:
+    """Return x, y, z, roll, pitch, yaw, articulation, shape (N, 7), for the front axle at each sample of the path."""
+    size = machine.dimensions
+    bend = articulation_along_path(path.curvature_pm, STEP_M, size.joint_to_front_axle_m, size.joint_to_rear_axle_m)
+    rear_x = -size.joint_to_front_axle_m - size.joint_to_rear_axle_m * np.cos(bend)
+    rear_y = size.joint_to_rear_axle_m * np.sin(bend)
+    half, sine, cosine = 0.5 * size.track_m, np.sin(bend), np.cos(bend)
+    ground = _Ground(drift, path)
+    left, right = ground.height(0.0 * bend, 0.0 * bend + half), ground.height(0.0 * bend, 0.0 * bend - half)
+    rear = 0.5 * (
+        ground.height(rear_x + half * sine, rear_y + half * cosine)
+        + ground.height(rear_x - half * sine, rear_y - half * cosine)
+    )
+    z, cross_slope = 0.5 * (left + right), (left - right) / size.track_m
+    slope = (rear - z - cross_slope * rear_y) / rear_x
+    pitch = -np.arctan(slope)
+    roll = np.arctan(cross_slope * np.cos(pitch))
+    return np.stack([path.x_m, path.y_m, z, roll, pitch, path.heading_rad, bend], axis=1)
+
+
+class _Ground:
+    """Height of the floor under points that are given in the (level) frame of the front axle along a path."""
+
+    def __init__(self, drift: Drift, path: CentreLine) -> None:
+        self._drift, self._path = drift, path
+
+    def height(self, x_m: FloatArray, y_m: FloatArray) -> FloatArray:
+        """Return the floor's height (m), averaged over a tyre's footprint, for a point per sample of the path."""
+        path = self._path
+        c, s = np.cos(path.heading_rad), np.sin(path.heading_rad)
+        place, lateral = self._project(path.x_m + c * x_m - s * y_m, path.y_m + s * x_m + c * y_m, path.s_m + x_m)
+        line_z = np.interp(place, self._drift.line.s_m, self._drift.line.z_m)
+        offsets = np.array([-1.0, 0.0, 1.0]) * _FOOTPRINT_M
+        patch = [self._drift.floor_offset(place + along, lateral + across) for along in offsets for across in offsets]
+        return line_z + np.mean(patch, axis=0)
+
+    def _project(self, x_m: FloatArray, y_m: FloatArray, guess_m: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return arc length and lateral offset on the drift's centre line, by a few Newton steps from `guess_m`."""
+        line, place = self._drift.line, guess_m.copy()
+        for _ in range(6):
+            at = line.at(place)
+            place = place + (x_m - at[:, 0]) * np.cos(at[:, 3]) + (y_m - at[:, 1]) * np.sin(at[:, 3])
+        at = line.at(place)
+        return place, (y_m - at[:, 1]) * np.cos(at[:, 3]) - (x_m - at[:, 0]) * np.sin(at[:, 3])
