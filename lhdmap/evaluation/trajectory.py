@@ -9,7 +9,7 @@ import numpy as np
 
 from lhdmap.errors import UsageError
 from lhdmap.evaluation import metrics
-from lhdmap.evaluation.alignment import ALIGNMENTS, align, aligned
+from lhdmap.evaluation.alignment import ALIGNMENTS, Alignment, align, aligned
 from lhdmap.evaluation.association import IndexArray, associate
 from lhdmap.evaluation.poses import Poses, distances_along, flattened
 from lhdmap.messages import FloatArray
@@ -57,7 +57,12 @@ class TrajectoryEvaluation:
     end_pct: float | None
     components: metrics.Components
     profile: Profile
+    motion: Alignment
     warnings: tuple[str, ...]
+
+    def truth_in_estimate_frame_m(self) -> FloatArray:
+        """Return the true positions (N, 3) moved into the frame of the estimate, for plots beside its own data."""
+        return (self.profile.truth_m - self.motion.t_m) @ self.motion.R
 
     def to_json(self) -> dict[str, Any]:
         """Return the result under the names of the public contract."""
@@ -121,6 +126,7 @@ def _compared(
         end_pct=100.0 * metrics.end_error_m(estimate, truth) / distance_m if distance_m > 0 else None,
         components=metrics.Components(*(float(value) for value in np.abs(errors).mean(axis=0))),
         profile=Profile(along, truth.positions_m, moved.positions_m, errors),
+        motion=alignment,
         warnings=tuple(text for text in hints if text),
     )
 

@@ -1,4 +1,4 @@
-"""What the report and the recording are made from: plain data, filled by the pipeline; what is None is said in words."""
+"""What the report is made from: plain data, filled by the pipeline; what is None is said in words."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ from lhdmap.trajectory import Trajectory
 
 
 class TopicRow(NamedTuple):
-    """One topic of the log: its count, mean rate, and a remark in words (used as the front scanner, gaps, not used)."""
+    """One topic of the log: number of messages, mean rate, and a remark (what it is used as, gaps)."""
 
     topic: str
     type_name: str
-    count: int | None
+    messages: int | None
     rate_hz: float | None
     remark: str = ""
 
@@ -65,7 +65,6 @@ class ReportData:
     topics: Sequence[TopicRow]
     trajectory: Trajectory
     odometry: Trajectory | None = None
-    truth: Trajectory | None = None
     evaluation: TrajectoryEvaluation | None = None
     cloud: CloudData | None = None
     diagnostics: Diagnostics | None = None
