@@ -60,7 +60,7 @@ class Cursor:
         return bytes(self._data[start : start + size]).rstrip(b"\0").decode("utf-8", "replace")
 
     def header(self) -> tuple[int, str]:
-        """Return stamp (nanoseconds, 0 where not set) and frame (without ROS 1's leading slash) of a std_msgs/Header."""
+        """Return stamp (nanoseconds, 0 where not set) and frame (without a leading slash) of a std_msgs/Header."""
         if self._ros1:
             _, seconds, nanoseconds = self.numbers(_STAMP_ROS1)
         else:

@@ -39,7 +39,7 @@ _COVARIANCE_3X3 = Layout("9d", 8)
 
 
 def scan_numbers(cursor: Cursor) -> tuple[int, str, tuple[float, ...]]:
-    """Return stamp, frame and the numbers of a scan: angle min, max, increment, time increment, scan time, range limits."""
+    """Return stamp, frame, and angle min, max, increment, time increment, scan time, range min, max of a LaserScan."""
     stamp, frame = cursor.header()
     return stamp, frame, cursor.numbers(_SCAN_NUMBERS)
 

@@ -1,4 +1,4 @@
-"""`open_log`: the reader for a path, chosen by suffix from a map, by the first bytes where the suffix is unknown."""
+"""`open_log`: the reader for a path, chosen by suffix from a map, by the first bytes where the suffix says nothing."""
 
 from __future__ import annotations
 
@@ -8,6 +8,8 @@ from pathlib import Path
 from lhdmap.errors import InputError
 from lhdmap.logs.bag_log import BagFile
 from lhdmap.logs.base import LogReader
+from lhdmap.logs.breezy_log import BreezyLog
+from lhdmap.logs.carmen_log import CarmenLog
 from lhdmap.logs.decoded import DecodedLog
 from lhdmap.logs.mcap_log import McapFile
 
@@ -22,8 +24,25 @@ def _bag(path: Path) -> LogReader:
     return DecodedLog(path, BagFile)
 
 
-_BY_SUFFIX: dict[str, Opener] = {".mcap": _mcap, ".bag": _bag}
-_BY_START: dict[bytes, Opener] = {b"\x89MCAP": _mcap}
+_BY_SUFFIX: dict[str, Opener] = {
+    ".mcap": _mcap,
+    ".bag": _bag,
+    ".clf": CarmenLog,
+    ".log": CarmenLog,
+    ".dat": BreezyLog,
+}
+_BY_START: dict[bytes, Opener] = {b"\x89MCAP": _mcap, b"#ROSBAG": _bag}
+_COMPRESSED = (".gz", ".bz2")
+# What people pass by mistake, and what it is.
+_NOT_LOGS = {
+    **dict.fromkeys((".ply", ".pcd", ".laz", ".las", ".xyz", ".e57"), "a point cloud"),
+    **dict.fromkeys((".dae", ".obj", ".stl", ".glb"), "a mesh"),
+    **dict.fromkeys((".tum", ".csv", ".txt", ".g2o", ".relations"), "a table"),
+    ".rawlog": "an MRPT rawlog (convert it to MCAP or a ROS bag first)",
+    ".rrd": "a Rerun recording",
+    ".yaml": "a description of a log (give its folder instead)",
+}
+WANTED = "MCAP, ROS 1 bag, ROS 2 bag folder or .db3, CARMEN .clf/.log (also .gz, .bz2) or BreezySLAM .dat was wanted"
 
 
 def open_log(path: Path | str) -> LogReader:
@@ -36,8 +55,22 @@ def open_log(path: Path | str) -> LogReader:
     if not path.exists():
         raise InputError(f"{path}: no such file or folder")
     if path.is_file() and not path.stat().st_size:
-        raise InputError(f"{path}: the file is empty")
-    opener = _BY_SUFFIX.get(path.suffix.lower())
-    if opener is None:
-        raise InputError(f"{path}: unknown format")
-    return opener(path)
+        raise InputError(f"{path}: the file is empty; {WANTED}")
+    return _opener(path)(path)
+
+
+def _opener(path: Path) -> Opener:
+    suffixes = [suffix.lower() for suffix in path.suffixes]
+    if suffixes and suffixes[-1] in _COMPRESSED:
+        suffixes.pop()
+    suffix = suffixes[-1] if suffixes else ""
+    found = _BY_SUFFIX.get(suffix) or _by_start(path)
+    if found is None:
+        raise InputError(f"{path}: {_NOT_LOGS.get(suffix, 'an unknown format')} is no log that can be read; {WANTED}")
+    return found
+
+
+def _by_start(path: Path) -> Opener | None:
+    with path.open("rb") as file:
+        start = file.read(16)
+    return next((opener for magic, opener in _BY_START.items() if start.startswith(magic)), None)

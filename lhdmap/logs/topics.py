@@ -32,7 +32,9 @@ ROLES: dict[str, tuple[str, str]] = {
 }
 # Roles that a topic of the right type takes whatever its name, if it is the only one.
 _BY_TYPE = ("points", "inclinometer", "joints", "tachometer", "command", "wheel_odometry")
-_REAR_WORDS = ("rear", "back")
+# Words in the names of scanner topics; the last ones are CARMEN's.
+_FRONT_WORDS = ("front", "flaser", "robotlaser1", "rawlaser1")
+_REAR_WORDS = ("rear", "back", "rlaser", "robotlaser2", "rawlaser2")
 
 
 def is_ground_truth(topic: str) -> bool:
@@ -77,7 +79,7 @@ def _assign_scanners(chosen: dict[str, str], free: dict[str, TopicInfo]) -> None
     if "front" in chosen:
         return
     scans = [name for name in scans if name != chosen.get("rear")]
-    named = [name for name in scans if "front" in name.lower()]
+    named = [name for name in scans if any(word in name.lower() for word in _FRONT_WORDS)]
     candidates = named or scans
     if len(candidates) == 1:
         chosen["front"] = candidates[0]
