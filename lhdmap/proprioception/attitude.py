@@ -1,0 +1,165 @@
+"""Roll and pitch of the front body from the inclinometer: smoothed without delay, and its lag undone.
+
+The paper (Section 3.2) says only that the inclinometer's data "is filtered". Here a local quadratic is fitted around
+the wanted time, with samples before and after it: no phase error, at the price that the attitude of a moment is final
+only `lag_s + half_window_s` later (`ready_until_ns`). What it is worth: 0.3 s of lag left in costs 2.8 degrees of a
+pile's inclination, 0.4 degrees of white noise 6.6 degrees.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from lhdmap.geometry import se3
+from lhdmap.messages import FloatArray, Inclination
+from lhdmap.proprioception.local_fit import fit_at
+from lhdmap.proprioception.samples import SampleBuffer, Warnings
+from lhdmap.settings import setting
+
+LARGEST_TILT_RAD = math.radians(60.0)
+JUMP_RUN = 10  # so many samples in a row at a new level are no outliers but the level
+THIRD_DIFFERENCE = math.sqrt(20.0)  # its standard deviation for white noise of one
+NOISE_EVERY = 50
+
+
+@dataclass(frozen=True, slots=True)
+class AttitudeSettings:
+    """Filter of the inclinometer."""
+
+    lag_s: float = setting(
+        0.1, unit="s", source="issue: inclinometer with 0.1 s lag", minimum=0.0, maximum=2.0,
+        doc="A sample stamped t shows the attitude at t - lag_s.",
+    )  # fmt: skip
+    half_window_s: float = setting(
+        0.2, unit="s", source="measured: docs/integration.md", minimum=0.0, maximum=5.0,
+        doc="Samples this long before and after a moment take part in its attitude.",
+    )  # fmt: skip
+    max_gap_s: float = setting(
+        0.5, unit="s", minimum=0.01, doc="Across a longer gap, or farther from any sample, there is no attitude."
+    )
+    jump_deg: float = setting(
+        4.0, unit="deg", minimum=0.1, doc="A sample this far from the last one is an outlier, unless it lasts."
+    )
+    std_floor_deg: float = setting(0.02, unit="deg", minimum=0.0, doc="No attitude claims to be better than this.")
+    frozen_s: float = setting(
+        5.0, unit="s", minimum=0.1, doc="A sensor that repeats one value for this long is reported."
+    )
+    keep_s: float = setting(60.0, unit="s", minimum=1.0, doc="Samples are kept for this long.")
+
+
+class Attitude(NamedTuple):
+    """Attitude of `base_link` at one moment, radians; `std_rad` holds for roll and for pitch."""
+
+    roll_rad: float
+    pitch_rad: float
+    std_rad: float
+
+
+class Attitudes(NamedTuple):
+    """Attitudes at many moments, each of shape (N,), radians; NaN where `valid` is false."""
+
+    roll_rad: FloatArray
+    pitch_rad: FloatArray
+    std_rad: FloatArray
+    valid: npt.NDArray[np.bool_]
+
+
+class AttitudeFilter:
+    """Takes inclinometer messages in the order of the log and gives the attitude at any moment that is kept."""
+
+    def __init__(self, settings: AttitudeSettings, R_base_sensor: FloatArray | None = None) -> None:
+        """Args: `R_base_sensor`: how the inclinometer is mounted, shape (3, 3); None where its axes are the body's."""
+        self.settings = settings
+        self.warnings = Warnings()
+        self._samples = SampleBuffer("inclinometer", 2, settings.keep_s, self.warnings)
+        self._R_sensor_base = None if R_base_sensor is None else np.asarray(R_base_sensor, dtype=float).T
+        self._jump_rad = math.radians(settings.jump_deg)
+        self._outliers = 0
+        self._same_since_ns: int | None = None
+        self._noise_rad = math.radians(settings.std_floor_deg)
+        self._taken = 0
+        self._finished = False
+
+    def update(self, message: Inclination) -> None:
+        """Take one message; values that cannot be are left out, with a warning."""
+        roll, pitch = message.roll_rad, message.pitch_rad
+        if abs(roll) > LARGEST_TILT_RAD or abs(pitch) > LARGEST_TILT_RAD:
+            self.warnings.add("inclinometer: a tilt of more than 60 degrees; left out")
+            return
+        if self._R_sensor_base is not None and math.isfinite(roll) and math.isfinite(pitch):
+            roll, pitch, _ = se3.to_rpy(se3.from_rpy(roll, pitch, 0.0)[:3, :3] @ self._R_sensor_base)
+        self._watch_frozen(message.stamp_ns, roll, pitch)
+        if self._is_outlier(message.stamp_ns, roll, pitch):
+            return
+        if self._samples.append(message.stamp_ns, (roll, pitch)):
+            self._taken += 1
+            if self._taken % NOISE_EVERY == 0:
+                self._noise_rad = _noise(self._samples.rows[-4 * NOISE_EVERY :])
+
+    def finish(self) -> None:
+        """Say that no more messages come: what there is, is final."""
+        self._finished = True
+
+    def ready_until_ns(self, now_ns: int) -> int:
+        """Return the latest time whose attitude later messages will not change any more.
+
+        `now_ns` is the newest stamp of the log: where the inclinometer has been silent for `max_gap_s`, or the log has
+        ended, nothing is waited for.
+        """
+        newest_ns = self._samples.latest_ns
+        if self._finished or (newest_ns is not None and now_ns - newest_ns > self.settings.max_gap_s * 1e9):
+            return now_ns
+        wait_ns = round((self.settings.lag_s + self.settings.half_window_s) * 1e9)
+        return (now_ns - round(self.settings.max_gap_s * 1e9) if newest_ns is None else newest_ns) - wait_ns
+
+    def attitude_at(self, stamp_ns: int) -> Attitude | None:
+        """Return the attitude of `base_link` at a time, or None where there are no samples around it."""
+        found = self.attitudes_at(np.array([stamp_ns], dtype=np.int64))
+        if not found.valid[0]:
+            return None
+        return Attitude(float(found.roll_rad[0]), float(found.pitch_rad[0]), float(found.std_rad[0]))
+
+    def attitudes_at(self, stamps_ns: npt.NDArray[np.int64]) -> Attitudes:
+        """Return the attitudes of `base_link` at many times, shape (N,), in any order."""
+        settings = self.settings
+        shown_ns = np.asarray(stamps_ns, dtype=np.int64) + round(settings.lag_s * 1e9)
+        values, factor = fit_at(
+            self._samples.stamps_ns, self._samples.rows, shown_ns, settings.half_window_s, settings.max_gap_s
+        )
+        std = np.hypot(self._noise_rad * factor, math.radians(settings.std_floor_deg))
+        return Attitudes(values[:, 0], values[:, 1], std, np.isfinite(factor))
+
+    def _is_outlier(self, stamp_ns: int, roll: float, pitch: float) -> bool:
+        newest_ns, last = self._samples.latest_ns, self._samples.latest_row
+        if newest_ns is None or stamp_ns - newest_ns > self.settings.max_gap_s * 1e9:
+            return False
+        if not max(abs(roll - last[0]), abs(pitch - last[1])) > self._jump_rad:
+            self._outliers = 0
+            return False
+        self._outliers += 1
+        if self._outliers < JUMP_RUN:
+            self.warnings.add(f"inclinometer: a jump of more than {self.settings.jump_deg:g} degrees; left out")
+            return True
+        self.warnings.add("inclinometer: its level changed at once and stayed; taken as true")
+        self._outliers = 0
+        return False
+
+    def _watch_frozen(self, stamp_ns: int, roll: float, pitch: float) -> None:
+        if (roll, pitch) != self._samples.latest_row:
+            self._same_since_ns = None
+        elif self._same_since_ns is None:
+            self._same_since_ns = self._samples.latest_ns
+        elif stamp_ns - self._same_since_ns > self.settings.frozen_s * 1e9:
+            self.warnings.add(f"inclinometer: the same values for more than {self.settings.frozen_s:g} s; frozen?")
+            self._same_since_ns = stamp_ns
+
+
+def _noise(rows: FloatArray) -> float:
+    """Return the standard deviation of the samples' white noise, robustly, from their third differences."""
+    differences = np.abs(np.diff(rows, n=3, axis=0)).ravel()
+    return float(1.4826 * np.median(differences) / THIRD_DIFFERENCE)
