@@ -11,7 +11,10 @@ from lhdmap.logs.base import LogReader
 from lhdmap.logs.breezy_log import BreezyLog
 from lhdmap.logs.carmen_log import CarmenLog
 from lhdmap.logs.decoded import DecodedLog
+from lhdmap.logs.folder_log import BagFolder
 from lhdmap.logs.mcap_log import McapFile
+from lhdmap.logs.sqlite_log import MAGIC as SQLITE_MAGIC
+from lhdmap.logs.sqlite_log import SqliteFile
 
 Opener = Callable[[Path], LogReader]
 
@@ -24,14 +27,23 @@ def _bag(path: Path) -> LogReader:
     return DecodedLog(path, BagFile)
 
 
+def _sqlite(path: Path) -> LogReader:
+    return DecodedLog(path, SqliteFile)
+
+
+def _folder(path: Path) -> LogReader:
+    return DecodedLog(path, BagFolder)
+
+
 _BY_SUFFIX: dict[str, Opener] = {
     ".mcap": _mcap,
     ".bag": _bag,
+    ".db3": _sqlite,
     ".clf": CarmenLog,
     ".log": CarmenLog,
     ".dat": BreezyLog,
 }
-_BY_START: dict[bytes, Opener] = {b"\x89MCAP": _mcap, b"#ROSBAG": _bag}
+_BY_START: dict[bytes, Opener] = {b"\x89MCAP": _mcap, b"#ROSBAG": _bag, SQLITE_MAGIC: _sqlite}
 _COMPRESSED = (".gz", ".bz2")
 # What people pass by mistake, and what it is.
 _NOT_LOGS = {
@@ -60,6 +72,8 @@ def open_log(path: Path | str) -> LogReader:
 
 
 def _opener(path: Path) -> Opener:
+    if path.is_dir():
+        return _folder
     suffixes = [suffix.lower() for suffix in path.suffixes]
     if suffixes and suffixes[-1] in _COMPRESSED:
         suffixes.pop()
