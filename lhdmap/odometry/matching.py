@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numba as nb
 import numpy as np
@@ -11,12 +12,32 @@ from lhdmap.messages import FloatArray
 from lhdmap.odometry.surface_map import SurfaceMap, fit_line
 
 
+class MatchModel(NamedTuple):
+    """How far a hit may be from the wall's line: see `AnchorSettings` and `OdometrySettings` for the units."""
+
+    noise_m: float
+    cutoff_sigmas: float
+    min_cells: float
+    coarse_noise: float
+    rounds: int
+
+
+class Match(NamedTuple):
+    """Result: `pose` (3,), `information` (3, 3) of the scan alone in map axes, share of hits with a line, share that agrees."""
+
+    pose: FloatArray
+    information: FloatArray
+    covered: float
+    support: float
+    residual_sigmas: float
+    lines: FloatArray
+
+
 @nb.njit(cache=True, nogil=True)
-def lines_at(map_: SurfaceMap, pose: FloatArray, points: FloatArray, spacing: FloatArray, lines: FloatArray) -> int:
+def lines_at(map_: SurfaceMap, pose: FloatArray, points: FloatArray, min_cells: float, lines: FloatArray) -> int:
     """Fit the wall's line at each scan point; return how many have one.
 
-    `points` (N, 2) in base frame, `spacing` (N,) metres between neighbouring hits, `lines` (N, 7): as `fit_line` and the cell
-    size of the level that served (0: none).
+    `points` (N, 2) in base frame; `lines` (N, 7): as `fit_line`, then the cell size of the level that served (0: none).
     """
     c, s = math.cos(pose[2]), math.sin(pose[2])
     found = 0
@@ -24,70 +45,72 @@ def lines_at(map_: SurfaceMap, pose: FloatArray, points: FloatArray, spacing: Fl
         x = pose[0] + c * points[i, 0] - s * points[i, 1]
         y = pose[1] + s * points[i, 0] + c * points[i, 1]
         lines[i, 6] = 0.0
-        if fit_line(map_.fine, x, y, lines[i]):
+        if fit_line(map_.fine, x, y, min_cells, lines[i]):
             lines[i, 6] = map_.fine.cell_m
-        elif fit_line(map_.middle, x, y, lines[i]):
+        elif fit_line(map_.middle, x, y, min_cells, lines[i]):
             lines[i, 6] = map_.middle.cell_m
-        elif fit_line(map_.coarse, x, y, lines[i]):
+        elif fit_line(map_.coarse, x, y, min_cells, lines[i]):
             lines[i, 6] = map_.coarse.cell_m
         found += lines[i, 6] > 0.0
     return found
 
 
 @nb.njit(cache=True, nogil=True)
-def normal_equations(
-    pose: FloatArray, points: FloatArray, lines: FloatArray, noise_m: float, cutoff: float, H: FloatArray, b: FloatArray
-) -> FloatArray:
-    """Fill H (3, 3) and b (3,) of the weighted distances at `pose`; H is in the map frame about the machine.
+def normal_equations(pose, points, lines, fine_m, model, H, b):  # type: ignore[no-untyped-def]
+    """Fill H (3, 3) and b (3,) of the weighted distances at `pose`; both in the map's axes about the machine.
 
-    Returns (weighted square sum, sum of robust weights, points with a line).
+    Returns (weighted square sum, sum of robust weights).
     """
     c, s = math.cos(pose[2]), math.sin(pose[2])
-    H[:] = 0.0
-    b[:] = 0.0
-    total = weights = count = 0.0
+    h00 = h01 = h02 = h11 = h12 = h22 = b0 = b1 = b2 = total = weights = 0.0
     for i in range(points.shape[0]):
         if lines[i, 6] == 0.0:
             continue
         rx, ry = c * points[i, 0] - s * points[i, 1], s * points[i, 0] + c * points[i, 1]
         nx, ny = lines[i, 2], lines[i, 3]
         d = nx * (pose[0] + rx - lines[i, 0]) + ny * (pose[1] + ry - lines[i, 1])
-        r2 = rx * rx + ry * ry
-        incidence2 = (nx * rx + ny * ry) ** 2 / r2
-        variance = noise_m * noise_m * incidence2 + lines[i, 4] * (1.0 + 1.0 / lines[i, 5]) + 1e-6
-        u2 = d * d / variance / (cutoff * cutoff)
-        robust = (1.0 - u2) ** 2 if u2 < 1.0 else 0.0
+        incidence2 = (nx * rx + ny * ry) ** 2 / (rx * rx + ry * ry + 1e-12)
+        coarse_m = model.coarse_noise * (lines[i, 6] - fine_m)
+        variance = model.noise_m**2 * incidence2 + lines[i, 4] * (1.0 + 1.0 / lines[i, 5]) + coarse_m * coarse_m + 1e-6
+        u2 = d * d / (variance * model.cutoff_sigmas**2)
+        if u2 >= 1.0:
+            continue
+        robust = (1.0 - u2) ** 2
         w = robust / variance
         jt = -nx * ry + ny * rx
-        H[0, 0] += w * nx * nx
-        H[0, 1] += w * nx * ny
-        H[0, 2] += w * nx * jt
-        H[1, 1] += w * ny * ny
-        H[1, 2] += w * ny * jt
-        H[2, 2] += w * jt * jt
-        b[0] -= w * nx * d
-        b[1] -= w * ny * d
-        b[2] -= w * jt * d
+        h00 += w * nx * nx
+        h01 += w * nx * ny
+        h02 += w * nx * jt
+        h11 += w * ny * ny
+        h12 += w * ny * jt
+        h22 += w * jt * jt
+        b0 -= w * nx * d
+        b1 -= w * ny * d
+        b2 -= w * jt * d
         total += w * d * d
         weights += robust
-        count += 1.0
-    H[1, 0], H[2, 0], H[2, 1] = H[0, 1], H[0, 2], H[1, 2]
-    return np.array([total, weights, count])
+    H[0, 0], H[0, 1], H[0, 2] = h00, h01, h02
+    H[1, 0], H[1, 1], H[1, 2] = h01, h11, h12
+    H[2, 0], H[2, 1], H[2, 2] = h02, h12, h22
+    b[0], b[1], b[2] = b0, b1, b2
+    return total, weights
 
 
 @nb.njit(cache=True, nogil=True)
 def solve3(A: FloatArray, b: FloatArray) -> FloatArray:
     """Solve a symmetric positive definite 3 x 3 system by Cholesky; zeros where it is singular."""
     x = np.zeros(3)
-    l00 = math.sqrt(max(A[0, 0], 1e-300))
+    if not A[0, 0] > 0.0:
+        return x
+    l00 = math.sqrt(A[0, 0])
     l10, l20 = A[1, 0] / l00, A[2, 0] / l00
     d1 = A[1, 1] - l10 * l10
-    if d1 <= 0.0:
+    if not d1 > 0.0:
         return x
     l11 = math.sqrt(d1)
     l21 = (A[2, 1] - l20 * l10) / l11
     d2 = A[2, 2] - l20 * l20 - l21 * l21
-    if d2 <= 0.0:
+    if not d2 > 0.0:
         return x
     l22 = math.sqrt(d2)
     y0 = b[0] / l00
@@ -100,26 +123,29 @@ def solve3(A: FloatArray, b: FloatArray) -> FloatArray:
 
 
 @nb.njit(cache=True, nogil=True)
-def match(map_, points, spacing, predicted, prior_information, noise_m, cutoff, rounds):  # type: ignore[no-untyped-def]
-    """Return pose, H (3, 3) of the scan alone, and (square sum, robust weights, lines, points)."""
-    pose = predicted.copy()
+def match(map_, points, predicted, prior_information, start, model):  # type: ignore[no-untyped-def]
+    """Return the `Match` of `points` (N, 2), base frame: maximum a posteriori from `start` under the prior.
+
+    The prior has mean `predicted` (3,) and weight `prior_information` (3, 3); lines are fitted anew when the pose has moved.
+    """
+    pose = start.copy()
     lines = np.zeros((points.shape[0], 7))
-    H = np.zeros((3, 3))
-    b = np.zeros(3)
+    H, b = np.zeros((3, 3)), np.zeros(3)
+    fine_m = map_.fine.cell_m
     found = 0
-    stats = np.zeros(3)
-    for round_ in range(rounds):
-        found = lines_at(map_, pose, points, spacing, lines)
+    for _ in range(model.rounds):
+        found = lines_at(map_, pose, points, model.min_cells, lines)
         moved = 0.0
         for _ in range(3):
-            stats = normal_equations(pose, points, lines, noise_m, cutoff, H, b)
-            error = predicted - pose
-            step = solve3(H + prior_information, b + prior_information @ error)
+            normal_equations(pose, points, lines, fine_m, model, H, b)
+            step = solve3(H + prior_information, b + prior_information @ (predicted - pose))
             pose += step
-            moved += abs(step[0]) + abs(step[1]) + 5.0 * abs(step[2])
-            if abs(step[0]) + abs(step[1]) + 5.0 * abs(step[2]) < 2e-5:
+            size = abs(step[0]) + abs(step[1]) + 5.0 * abs(step[2])
+            moved += size
+            if size < 2e-5:
                 break
         if moved < 2e-3:
             break
-    stats = normal_equations(pose, points, lines, noise_m, cutoff, H, b)
-    return pose, H, stats, found
+    total, weights = normal_equations(pose, points, lines, fine_m, model, H, b)
+    n = max(points.shape[0], 1)
+    return Match(pose, H, found / n, weights / n, math.sqrt(total / max(weights, 1e-9)), lines)

@@ -17,8 +17,6 @@ from lhdmap.messages import FloatArray, Float32Array
 
 KERNEL_CELLS = 3  # a line is fitted to the cells within this many cells of a point
 KERNEL_SIGMA_CELLS = 2.0
-_EMPTY = -(2**62)
-_KEY_SPAN = 1 << 31
 
 
 class Level(NamedTuple):
@@ -78,7 +76,7 @@ def insert(level: Level, points_m: FloatArray, count_limit: float) -> None:
 
 
 @nb.njit(cache=True, nogil=True)
-def fit_line(level: Level, x: float, y: float, line: FloatArray) -> bool:
+def fit_line(level: Level, x: float, y: float, min_cells: float, line: FloatArray) -> bool:
     """Fit the wall near (x, y) by a line with Gaussian weights; return whether the cells there support one.
 
     `line`, shape (6,), receives: centre x, y, normal x, y, scatter across the line (variance, m²), effective number of cells.
@@ -118,8 +116,9 @@ def fit_line(level: Level, x: float, y: float, line: FloatArray) -> bool:
     half_trace, half_difference = 0.5 * (cxx + cyy), 0.5 * (cxx - cyy)
     root = math.sqrt(half_difference * half_difference + cxy * cxy)
     small, large = max(half_trace - root, 0.0), half_trace + root
-    # A line wants cells spread along it over about a kernel's width, and little beside it.
-    if effective < 2.5 or large < (0.7 * cell) ** 2 or small > 0.3 * large:
+    # A line wants cells spread along it over about a kernel's width, and little beside it. Chords between a few sparse hits
+    # fit best where those beams hit before: they pull the estimate towards standing still.
+    if effective < min_cells or large < (0.7 * cell) ** 2 or small > 0.3 * large:
         return False
     angle = 0.5 * math.atan2(2.0 * cxy, cxx - cyy)
     line[0] = x + mx
@@ -129,3 +128,11 @@ def fit_line(level: Level, x: float, y: float, line: FloatArray) -> bool:
     line[4] = small
     line[5] = effective
     return True
+
+
+@nb.njit(cache=True, nogil=True)
+def insert_all(map_: SurfaceMap, points_m: FloatArray, count_limit: float) -> None:
+    """Insert points, shape (N, 2), map frame, into all levels."""
+    insert(map_.fine, points_m, count_limit)
+    insert(map_.middle, points_m, count_limit)
+    insert(map_.coarse, points_m, count_limit)

@@ -52,7 +52,7 @@ class PlanarWorld:
         )
 
 
-def rough_profile(rng: np.random.Generator, length_m: float, rms_m: float, octaves: int = 6, persistence: float = 0.57) -> CubicSpline:
+def rough_profile(rng: np.random.Generator, length_m: float, rms_m: float, octaves: int = 6, persistence: float = 0.75) -> CubicSpline:
     """Return a random smooth function of arc length with the given rms over `octaves` from 4 m down by halves."""
     s = np.arange(-5.0, length_m + 5.0, 0.02)
     total = np.zeros_like(s)

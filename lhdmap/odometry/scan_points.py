@@ -1,0 +1,76 @@
+"""A scan as points in the level plane of the machine: mount and attitude applied, sweep undone, own body left out."""
+
+from __future__ import annotations
+
+import math
+
+import numba as nb
+import numpy as np
+
+from lhdmap.messages import FloatArray, LaserScan
+
+NO_BOXES = np.zeros((0, 6))
+
+
+def planar_points(
+    scan: LaserScan,
+    T_level_sensor: FloatArray,
+    velocity: FloatArray,
+    min_height_m: float = -math.inf,
+    boxes_m: FloatArray = NO_BOXES,
+) -> FloatArray:
+    """Return the hits as points, shape (N, 2), metres, in the level frame of `base_link` at the scan's stamp.
+
+    Args:
+        scan: the scan; beams without a valid return are left out.
+        T_level_sensor: pose (4, 4) of the sensor in the level frame (mount, roll and pitch applied; heading of the machine).
+        velocity: forward, lateral, turning speed (3,) that undoes the sweep (beam i was measured `i * time_increment` later).
+        min_height_m: hits below this height in the level frame are floor and left out.
+        boxes_m: shape (K, 6), x y z minimum and maximum of the machine's bodies in the level frame: own hits are left out.
+    """
+    out = np.empty((scan.ranges_m.size, 2))
+    count = _points(
+        scan.ranges_m,
+        (scan.angle_min_rad, scan.angle_increment_rad, scan.time_increment_s),
+        (scan.range_min_m, scan.range_max_m),
+        T_level_sensor,
+        velocity,
+        min_height_m,
+        boxes_m,
+        out,
+    )
+    return out[:count]
+
+
+@nb.njit(cache=True, nogil=True)
+def _points(ranges, sweep, limits, T, velocity, min_height, boxes, out):  # type: ignore[no-untyped-def]
+    angle_min, increment, beam_s = sweep
+    count = 0
+    for i in range(ranges.size):
+        r = ranges[i]
+        if not (limits[0] <= r <= limits[1]) or r == np.inf:
+            continue
+        a = angle_min + i * increment
+        x_s, y_s = r * math.cos(a), r * math.sin(a)
+        x = T[0, 0] * x_s + T[0, 1] * y_s + T[0, 3]
+        y = T[1, 0] * x_s + T[1, 1] * y_s + T[1, 3]
+        z = T[2, 0] * x_s + T[2, 1] * y_s + T[2, 3]
+        if z < min_height or _inside(x, y, z, boxes):
+            continue
+        after = i * beam_s
+        turn = velocity[2] * after
+        c, s = math.cos(turn), math.sin(turn)
+        ch, sh = math.cos(0.5 * turn), math.sin(0.5 * turn)
+        out[count, 0] = c * x - s * y + (ch * velocity[0] - sh * velocity[1]) * after
+        out[count, 1] = s * x + c * y + (sh * velocity[0] + ch * velocity[1]) * after
+        count += 1
+    return count
+
+
+@nb.njit(cache=True, nogil=True)
+def _inside(x, y, z, boxes):  # type: ignore[no-untyped-def]
+    for k in range(boxes.shape[0]):
+        b = boxes[k]
+        if b[0] <= x <= b[3] and b[1] <= y <= b[4] and b[2] <= z <= b[5]:
+            return True
+    return False

@@ -1,0 +1,59 @@
+"""What the planar odometry says of each scan."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from lhdmap.messages import FloatArray
+
+
+class WheelSpeed(NamedTuple):
+    """Body speeds by the wheels, mean since the scan before: forward and turning, with `None` for what is not measured."""
+
+    forward_mps: float | None
+    turning_rps: float | None
+
+
+class OdometryStep(NamedTuple):
+    """Outcome of one scan.
+
+    `T_odom_base`: planar pose (3,); `covariance`: (3, 3) of the step from the scan before, in body axes (m, rad);
+    `information`: (3,) along, across (1/m²) and heading (1/rad²) of this scan against the map, the others given;
+    `degenerate`: a direction was not observed; `substitute`: what stood in for it (`wheels`, `motion` or empty);
+    `processed`: False where the adaptive rate only predicted; `lost`: the scan did not fit the map.
+    """
+
+    stamp_ns: int
+    T_odom_base: FloatArray
+    covariance: FloatArray
+    velocity: FloatArray
+    information: FloatArray
+    residual_m: float
+    support: float
+    degenerate: bool
+    substitute: str
+    processed: bool
+    lost: bool
+
+
+def body_information(H_map: FloatArray, heading_rad: float) -> FloatArray:
+    """Return H (3, 3) in the body's axes."""
+    c, s = math.cos(heading_rad), math.sin(heading_rad)
+    R = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+    return R.T @ H_map @ R
+
+
+def marginal_information(H: FloatArray) -> FloatArray:
+    """Return for each axis the information left when the other two are unknown: 1 / diag(H^-1), shape (3,).
+
+    A direction that only shows together with another (along and heading in a bend) counts as unobserved here.
+    """
+    out = np.zeros(3)
+    for axis in range(3):
+        others = [k for k in range(3) if k != axis]
+        block = H[np.ix_(others, others)] + 1e-9 * np.eye(2)
+        out[axis] = max(H[axis, axis] - H[axis, others] @ np.linalg.solve(block, H[others, axis]), 0.0)
+    return out
