@@ -26,7 +26,7 @@ def heading_rate(speed_mps: float, articulation_rad: float, articulation_rate_rp
 
 
 def articulation_for_curvature(curvature_pm: float, machine: Machine) -> float:
-    """Return the steady γ (rad) on an arc of signed curvature (1/m): κ (L_f cos γ + L_r) = sin γ, solved in closed form.
+    """Return the steady γ (rad) on an arc of signed curvature (1/m): κ (L_f cos γ + L_r) = sin γ, in closed form.
 
     Raises:
         ValueError: no articulation drives so tight an arc.
@@ -52,8 +52,8 @@ def T_base_rear(articulation_rad: float, machine: Machine) -> FloatArray:  # noq
 def articulation_along_path(curvature_pm: FloatArray, step_m: float, front_m: float, rear_m: float) -> FloatArray:
     """Return γ (rad), shape (N,), for a front axle that follows a path of the given curvature, sampled each `step_m`.
 
-    Eq. (1) with dθ/ds = κ gives dγ/ds = (κ (L_f cos γ + L_r) − sin γ) / L_r, free of time: it holds for any speed, and in
-    reverse the joint goes back through the same angles. Integrated by Heun's rule from the steady angle of the start.
+    Eq. (1) with dθ/ds = κ gives dγ/ds = (κ (L_f cos γ + L_r) − sin γ) / L_r, free of time: it holds for any speed, and
+    in reverse the joint goes back through the same angles. Heun's rule, from the steady angle of the start.
     """
     angle = np.empty(len(curvature_pm))
     angle[0] = math.atan(curvature_pm[0] * front_m) + math.asin(

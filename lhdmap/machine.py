@@ -22,7 +22,6 @@ from lhdmap.settings import load_section, nearest, section_toml, setting
 
 PAPER = "topological_navigation, section 3.1"
 ASSUMED = "assumed, typical of 10 to 11-t loaders"
-Vector = tuple[float, float, float]
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,8 +69,12 @@ class BodyBox:
     frame: str = setting(
         "base_link", source="contract", choices=("base_link", "rear_link"), doc="Body that carries the part."
     )
-    min_m: Vector = setting((0.0, 0.0, 0.0), unit="m", source=ASSUMED, doc="Lower corner (x, y, z) in that frame.")
-    max_m: Vector = setting((0.0, 0.0, 0.0), unit="m", source=ASSUMED, doc="Upper corner (x, y, z) in that frame.")
+    min_m: tuple[float, float, float] = setting(
+        (0.0, 0.0, 0.0), unit="m", source=ASSUMED, doc="Lower corner (x, y, z) in that frame."
+    )
+    max_m: tuple[float, float, float] = setting(
+        (0.0, 0.0, 0.0), unit="m", source=ASSUMED, doc="Upper corner (x, y, z) in that frame."
+    )
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,13 +84,15 @@ class SensorMount:
     parent: str = setting(
         "base_link", source="contract", choices=("base_link", "rear_link"), doc="Body that carries the sensor."
     )
-    position_m: Vector = setting((0.0, 0.0, 0.0), unit="m", source=ASSUMED, doc="Position (x, y, z) in the parent.")
+    position_m: tuple[float, float, float] = setting(
+        (0.0, 0.0, 0.0), unit="m", source=ASSUMED, doc="Position (x, y, z) in the parent."
+    )
     roll_deg: float = setting(0.0, unit="deg", source=ASSUMED, doc="Roll of the sensor frame.")
     pitch_deg: float = setting(0.0, unit="deg", source=ASSUMED, doc="Pitch of the sensor frame; positive looks down.")
     yaw_deg: float = setting(0.0, unit="deg", source=ASSUMED, doc="Yaw of the sensor frame; 180 looks backwards.")
 
     @property
-    def T_parent_sensor(self) -> FloatArray:
+    def T_parent_sensor(self) -> FloatArray:  # noqa: N802  # frames in the name
         """Pose of the sensor in its parent frame, shape (4, 4)."""
         roll, pitch, yaw = (math.radians(angle) for angle in (self.roll_deg, self.pitch_deg, self.yaw_deg))
         return se3.from_rpy(roll, pitch, yaw, self.position_m)
@@ -120,7 +125,7 @@ class Machine:
     mounts: dict[str, SensorMount] = field(default_factory=_default_mounts)
 
     def boxes(self, frame: str) -> FloatArray:
-        """Return the boxes on `frame` (`base_link` or `rear_link`) as (x, y, z) min and max, shape (N, 2, 3), metres."""
+        """Return the boxes on `frame` (`base_link` or `rear_link`) as lower and upper corners, shape (N, 2, 3), m."""
         chosen = [(body.min_m, body.max_m) for body in self.bodies.values() if body.frame == frame]
         return np.array(chosen, dtype=float).reshape(-1, 2, 3)
 

@@ -77,8 +77,8 @@ def run(arguments: argparse.Namespace, console: Console) -> int:
     scenario = scenario_of(arguments)
     log = arguments.output or _free_name(_stem(arguments.scenario), scenario.seed)
 
-    def progress(records: Iterator[Record]) -> Iterator[Record]:
-        return _shown(records, console, scenario.drive.distance_m / scenario.drive.speed_kmh * 3.6)
+    def progress(records: Iterator[Record], duration_s: float) -> Iterator[Record]:
+        return _shown(records, console, duration_s)
 
     console.note(
         f"simulating {scenario.drive.distance_m:g} m at {scenario.drive.speed_kmh:g} km/h, seed {scenario.seed}"
@@ -106,8 +106,8 @@ def scenario_of(arguments: argparse.Namespace) -> DriftScenario:
         UsageError: the scenario is neither built in nor a file, or an option's value is wrong.
         ConfigError: a value is out of its range.
     """
-    from lhdmap.simulation.scenario import SECTIONS, DriftScenario, load_scenario
     from lhdmap.settings import load_section
+    from lhdmap.simulation.scenario import SECTIONS, DriftScenario, load_scenario
 
     path = Path(arguments.scenario)
     if arguments.scenario not in BUILT_IN and not path.is_file():

@@ -13,7 +13,7 @@ Pieces = tuple[tuple[float, float, float], ...]
 
 
 class CentreLine(NamedTuple):
-    """A line sampled each `STEP_M` of horizontal arc length; all shapes (N,): metres, radians, 1/m, dimensionless grade."""
+    """A line sampled each `STEP_M` of horizontal arc length; all shapes (N,): metres, radians, 1/m."""
 
     s_m: FloatArray
     x_m: FloatArray
@@ -47,8 +47,7 @@ def centre_line(pieces: Pieces, length_m: float, transition_m: float, start: Sta
 
     Curvature and grade change linearly over `transition_m`; the total turn of a bend stays what its piece says.
     """
-    count = int(round(length_m / STEP_M)) + 1
-    s = np.arange(count) * STEP_M
+    s = np.arange(round(length_m / STEP_M) + 1, dtype=float) * STEP_M
     ends = np.cumsum([piece[0] for piece in pieces])
     index = np.minimum(np.searchsorted(ends, s % ends[-1], side="right"), len(pieces) - 1)
     curvature = np.array([1.0 / radius if radius else 0.0 for _, radius, _ in pieces])[index]
@@ -69,14 +68,14 @@ def beside(line: CentreLine, offset_m: FloatArray) -> CentreLine:
     heading = line.heading_rad + np.arctan2(slope, stretch)
     x = line.x_m - offset_m * np.sin(line.heading_rad)
     y = line.y_m + offset_m * np.cos(line.heading_rad)
-    s = np.arange(int(own[-1] / STEP_M) + 1) * STEP_M
+    s = np.arange(int(own[-1] / STEP_M) + 1, dtype=float) * STEP_M
     x, y, z, heading = (np.interp(s, own, column) for column in (x, y, line.z_m, heading))
     return CentreLine(s, x, y, z, heading, np.gradient(heading, STEP_M))
 
 
 def _smoothed(values: FloatArray, width_m: float) -> FloatArray:
     """Return the moving mean over `width_m`; the ends go on as they are."""
-    half = int(round(0.5 * width_m / STEP_M))
+    half = round(0.5 * width_m / STEP_M)
     if half == 0:
         return values
     padded = np.concatenate([np.full(half + 1, values[0]), values, np.full(half, values[-1])])

@@ -12,18 +12,21 @@ import numpy.typing as npt
 
 from lhdmap.messages import FloatArray
 from lhdmap.simulation.centre_line import CentreLine
-from lhdmap.simulation.noise_field import NoiseField, Scales, noise_field
+from lhdmap.simulation.noise_field import Scales, noise_field
 from lhdmap.simulation.scenario import DriftSettings
 
 _UNDULATION = Scales(3, 4.0, 0.6)  # waves of about 8, 4 and 2 m: what a machine of 3.4 m wheelbase rides up and down
 _ROUGH_FLOOR = Scales(3, 0.4, 0.7)
 
 
+Triangles = npt.NDArray[np.uint32]
+
+
 class Mesh(NamedTuple):
     """A triangle mesh: vertices (N, 3), metres, in `map`; triangles (M, 3), vertex indices."""
 
     vertices_m: FloatArray
-    triangles: npt.NDArray[np.uint32]
+    triangles: Triangles
 
 
 class Profile(NamedTuple):
@@ -124,19 +127,19 @@ class Drift:
     def mesh(self, first: int, last: int, *, closed: tuple[bool, bool] = (False, False)) -> Mesh:
         """Mesh the rings `first` to `last` (exclusive), with end faces where `closed` says so (start, end)."""
         first, last = max(first, 0), min(last, self.ring_count())
-        s = np.arange(first, last) * self.settings.mesh_m
+        s = np.arange(first, last, dtype=float) * self.settings.mesh_m
         rings = self.rings(s)
         vertices = [self._to_map(s, rings).reshape(-1, 3)]
         triangles = [_tube(rings.shape[0], rings.shape[1])]
         for index, wanted in zip((0, -1), closed, strict=True):
             if wanted:
                 face = self._end_face(float(s[index]), rings[index], outward=-1.0 if index == 0 else 1.0)
-                triangles.append(face.triangles + sum(len(part) for part in vertices))
+                triangles.append(face.triangles + np.uint32(sum(len(part) for part in vertices)))
                 vertices.append(face.vertices_m)
-        return Mesh(np.concatenate(vertices), np.concatenate(triangles).astype(np.uint32))
+        return Mesh(np.concatenate(vertices), np.concatenate(triangles))
 
     def rings(self, s_m: FloatArray) -> FloatArray:
-        """Return closed rings (lateral, height over the centre line), shape (len(s), N, 2): walls and roof, then floor."""
+        """Return closed rings (lateral, height over the centre line), shape (S, N, 2): walls and roof, then floor."""
         shape = self.profile
         walls = shape.points_m + self.wall_offset(s_m)[:, :, None] * shape.normals
         floor_count = max(2, int(np.ceil(2 * self.settings.half_width_m / self.settings.mesh_m)))
@@ -168,9 +171,11 @@ class Drift:
         return Mesh(vertices.reshape(-1, 3), _tube(steps, ring.shape[0]))
 
 
-def _tube(rings: int, points: int) -> npt.NDArray[np.int64]:
+def _tube(rings: int, points: int) -> Triangles:
     """Return the triangles between successive closed rings, shape (2·(rings − 1)·points, 3)."""
-    start = np.arange(rings - 1)[:, None] * points
-    here, after = np.arange(points), (np.arange(points) + 1) % points
+    start = np.arange(rings - 1, dtype=np.uint32)[:, None] * np.uint32(points)
+    here = np.arange(points, dtype=np.uint32)
+    after = (here + np.uint32(1)) % np.uint32(points)
+    step = np.uint32(points)
     a, b = (start + here).ravel(), (start + after).ravel()
-    return np.concatenate([np.stack([a, b, a + points], axis=1), np.stack([b, b + points, a + points], axis=1)])
+    return np.concatenate([np.stack([a, b, a + step], axis=1), np.stack([b, b + step, a + step], axis=1)])

@@ -22,7 +22,7 @@ from lhdmap.trajectory import Trajectory, write_tum
 
 BATCH_SCANS = 25
 _REAR_PHASE = 0.37  # the rear scanner is not synchronised with the front one: share of a sweep that it is behind
-Progress = Callable[[Iterator[Record]], Iterator[Record]]
+Progress = Callable[[Iterator[Record], float], Iterator[Record]]
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,7 +56,8 @@ def simulate_drift(
 ) -> SimulatedDrive:
     """Simulate the drive of `scenario` into the log `path`, with `.truth.tum` and `.scenario.toml` beside it.
 
-    `mesh_path` takes the drift's mesh (PLY, in `map`). `progress` wraps the records on their way into the log.
+    `mesh_path` takes the drift's mesh (PLY, in `map`). `progress(records, duration_s)` wraps the records on their
+    way into the log.
 
     Raises:
         UsageError: a file to be written exists already.
@@ -76,13 +77,20 @@ def simulate_drift(
         world.write_mesh(mesh_path)
     stream, messages = records(world), 0
     with LogWriter(path) as writer:
-        for record in progress(stream) if progress else stream:
+        for record in progress(stream, world.motion.duration_s) if progress else stream:
             writer.write(record.topic, record.message, record.log_time_ns)
             messages += 1
-    distance_m = float(np.abs(np.diff(world.motion.s_m)).sum())
     scans = len(truth.stamps_ns)
     return SimulatedDrive(
-        path, truth_file, scenario_file, mesh_path, truth, scans, messages, world.motion.duration_s, distance_m
+        path,
+        truth_file,
+        scenario_file,
+        mesh_path,
+        truth,
+        scans,
+        messages,
+        world.motion.duration_s,
+        world.motion.distance_m,
     )
 
 
@@ -147,9 +155,9 @@ def scans(world: DriftWorld, stream: ScannerStream) -> Iterator[Record]:
 def exact_ranges(world: DriftWorld, stream: ScannerStream, stamps_ns: npt.NDArray[np.int64]) -> Float32Array:
     """Return exact ranges, shape (S, N), metres, inf for none, of the scans at `stamps_ns`."""
     time_s = world.clock.seconds(stamps_ns)
-    origin_m = world.scene.origin_m(world.place_m(float(np.mean(time_s))))
-    rays, blocked = rays_of(world.motion.table, time_s, stream.beams, stream.rig, origin_m)
-    return np.minimum(world.scene.cast(rays), blocked).reshape(len(stamps_ns), -1)
+    surface = world.surface.near(world.place_m(float(np.mean(time_s))))
+    rays, blocked = rays_of(world.motion.table, time_s, stream.beams, stream.rig, surface.origin_m)
+    return np.minimum(surface.cast(rays), blocked).reshape(len(stamps_ns), -1)
 
 
 def _scan(stream: ScannerStream, low_m: float, high_m: float, stamp_ns: int, ranges_m: Float32Array) -> LaserScan:

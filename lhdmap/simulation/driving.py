@@ -20,13 +20,15 @@ from lhdmap.simulation.scenario import DriveSettings
 from lhdmap.simulation.timetable import Timetable
 
 TABLE_RATE_HZ = 1000.0
+_EVERY = 4  # of the path's samples the floor is asked for: 4 cm, far below a footprint
 _FOOTPRINT_M = 0.25  # half length and width of the patch under a tyre that carries it
 
 
 class Motion(NamedTuple):
     """State at `TABLE_RATE_HZ`, one row each, columns x, y, z, roll, pitch, yaw of `base_link` in `map`, articulation.
 
-    Shape (N, 7), metres and radians, yaw continuous; `s_m` (N,) is the place on the path, `speed_mps` (N,) signed.
+    Shape (N, 7), metres and radians, yaw continuous; `s_m` (N,) is the place on the path (horizontal arc length),
+    `speed_mps` (N,) the signed speed of the front axle along the floor.
     """
 
     table: FloatArray
@@ -37,6 +39,11 @@ class Motion(NamedTuple):
     def duration_s(self) -> float:
         """Length of the drive in seconds."""
         return (len(self.table) - 1) / TABLE_RATE_HZ
+
+    @property
+    def distance_m(self) -> float:
+        """Distance driven along the floor, forwards and in reverse, metres."""
+        return float(np.abs(self.speed_mps).sum()) / TABLE_RATE_HZ
 
     def at(self, time_s: FloatArray) -> FloatArray:
         """Return rows of the table at any times, shape (M, 7), linear in between."""
@@ -59,11 +66,23 @@ def drive_path(drift: Drift, settings: DriveSettings, rng: np.random.Generator) 
     return beside(line, field.grid(line.s_m, np.zeros(1))[:, 0])
 
 
-def simulate_motion(drift: Drift, path: CentreLine, timetable: Timetable, machine: Machine, shaking: Shaking) -> Motion:
-    """Return the motion of `machine` over the floor of `drift` along `path` by `timetable`."""
+class Plan(NamedTuple):
+    """Where and when to drive: path of the front axle, place on it where the drive starts (m), timetable."""
+
+    path: CentreLine
+    start_m: float
+    timetable: Timetable
+
+
+def simulate_motion(drift: Drift, plan: Plan, machine: Machine, shaking: Shaking) -> Motion:
+    """Return the motion of `machine` over the floor of `drift` as planned."""
+    path, timetable = plan.path, plan.timetable
     time_s = np.arange(int(timetable.duration_s * TABLE_RATE_HZ) + 1) / TABLE_RATE_HZ
-    s_m, speed_mps = timetable.at(time_s)
     on_path = _poses_on_path(drift, path, machine)
+    way_m = np.concatenate([[0.0], np.cumsum(np.hypot(STEP_M, np.diff(on_path[:, 2])))])
+    way_m -= np.interp(plan.start_m, path.s_m, way_m)
+    driven_m, speed_mps = timetable.at(time_s)
+    s_m = np.interp(driven_m, way_m, path.s_m)
     table = np.stack([np.interp(s_m, path.s_m, column) for column in on_path.T], axis=1)
     table[:, 3:5] += shaking.angles(len(time_s))
     return Motion(table, s_m, speed_mps)
@@ -111,16 +130,20 @@ class _Ground:
 
     def __init__(self, drift: Drift, path: CentreLine) -> None:
         self._drift, self._path = drift, path
+        self._picked = np.append(np.arange(0, len(path.s_m) - 1, _EVERY), len(path.s_m) - 1)
 
     def height(self, x_m: FloatArray, y_m: FloatArray) -> FloatArray:
         """Return the floor's height (m), averaged over a tyre's footprint, for a point per sample of the path."""
-        path = self._path
-        c, s = np.cos(path.heading_rad), np.sin(path.heading_rad)
-        place, lateral = self._project(path.x_m + c * x_m - s * y_m, path.y_m + s * x_m + c * y_m, path.s_m + x_m)
+        path, picked = self._path, self._picked
+        c, s = np.cos(path.heading_rad[picked]), np.sin(path.heading_rad[picked])
+        x, y = x_m[picked], y_m[picked]
+        place, lateral = self._project(
+            path.x_m[picked] + c * x - s * y, path.y_m[picked] + s * x + c * y, path.s_m[picked] + x
+        )
         line_z = np.interp(place, self._drift.line.s_m, self._drift.line.z_m)
         offsets = np.array([-1.0, 0.0, 1.0]) * _FOOTPRINT_M
         patch = [self._drift.floor_offset(place + along, lateral + across) for along in offsets for across in offsets]
-        return line_z + np.mean(patch, axis=0)
+        return np.interp(path.s_m, path.s_m[picked], line_z + np.mean(patch, axis=0))
 
     def _project(self, x_m: FloatArray, y_m: FloatArray, guess_m: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return arc length and lateral offset on the drift's centre line, by a few Newton steps from `guess_m`."""

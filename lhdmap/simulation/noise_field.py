@@ -1,6 +1,6 @@
 """Smooth random functions of two coordinates: cubic B-splines with random coefficients, several scales summed.
 
-A value depends on the seed and on where it is asked for only, not on the mesh that asks: refining a mesh refines one world.
+A value depends on the seed and the place only, not on the mesh that asks: a finer mesh shows the same world finer.
 """
 
 from __future__ import annotations
@@ -37,9 +37,11 @@ class NoiseField:
         for octave in self._octaves:
             rows, row_weights = _basis((s_m - self._origin_m[0]) / octave.spacing_m, octave.coefficients.shape[0])
             columns, weights = _basis((u_m - self._origin_m[1]) / octave.spacing_m, octave.coefficients.shape[1])
-            along = sum(row_weights[:, k, None] * octave.coefficients[rows[:, k]] for k in range(4))
-            across = sum(along[:, columns[:, k]] * weights[:, k] for k in range(4))
-            total += octave.amplitude_m / _MEAN_SQUARE * across
+            along = np.zeros((len(s_m), octave.coefficients.shape[1]))
+            for k in range(4):
+                along += row_weights[:, k, None] * octave.coefficients[rows[:, k]]
+            for k in range(4):
+                total += octave.amplitude_m / _MEAN_SQUARE * along[:, columns[:, k]] * weights[:, k]
         return (total - self._mean_m) * self._scale
 
     def at(self, s_m: FloatArray, u_m: FloatArray) -> FloatArray:
@@ -54,7 +56,7 @@ class NoiseField:
         return ((total - self._mean_m) * self._scale).reshape(np.shape(s_m))
 
     def normalise(self, s_m: FloatArray, u_m: FloatArray, rms_m: float) -> None:
-        """Shift and scale the field so that over the grid (s, u) its mean is zero and its standard deviation `rms_m`."""
+        """Shift and scale the field: over the grid (s, u) its mean becomes zero, its standard deviation `rms_m`."""
         self._mean_m, self._scale = 0.0, 1.0
         values = self.grid(s_m, u_m)
         self._mean_m, spread = float(values.mean()), float(values.std())
@@ -64,7 +66,7 @@ class NoiseField:
 class Scales(NamedTuple):
     """Octaves to draw: how many, the coarsest knot spacing (m), and the amplitude of each over the coarser one."""
 
-    count: int
+    octaves: int
     spacing_m: float
     gain: float
 
@@ -73,7 +75,7 @@ def noise_field(
     rng: np.random.Generator, scales: Scales, s_range_m: tuple[float, float], u_range_m: tuple[float, float]
 ) -> NoiseField:
     """Draw a field with unit total variance over the given ranges, metres."""
-    amplitudes = scales.gain ** np.arange(scales.count)
+    amplitudes = scales.gain ** np.arange(scales.octaves)
     amplitudes /= np.sqrt(np.sum(amplitudes**2))
     octaves = []
     for index, amplitude in enumerate(amplitudes):
@@ -85,7 +87,7 @@ def noise_field(
 
 
 def _basis(position: FloatArray, count: int) -> tuple[npt.NDArray[np.int64], FloatArray]:
-    """Return indices and weights, both (N, 4), of the uniform cubic B-splines that are not zero at `position` (in knots)."""
+    """Return indices and weights, both (N, 4), of the cubic B-splines that are not zero at `position` (in knots)."""
     cell = np.floor(position)
     t = position - cell
     weights = np.stack([(1 - t) ** 3, 3 * t**3 - 6 * t**2 + 4, -3 * t**3 + 3 * t**2 + 3 * t + 1, t**3], axis=1) / 6.0

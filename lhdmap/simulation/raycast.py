@@ -1,11 +1,13 @@
-"""Rays against the drift: the mesh near the machine in an Embree scene, renewed as the machine drives on."""
+"""Rays against meshes by Embree (inside open3d), and the part of a long drift that a machine in it can see."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from lhdmap.messages import Float32Array, FloatArray
 from lhdmap.simulation.drift import Mesh
@@ -14,36 +16,45 @@ _TILE_M = 40.0
 MeshBetween = Callable[[float, float], Mesh]
 
 
-class TiledScene:
-    """Casts rays against the part of a long mesh that scanners at a place can see; memory does not grow with length."""
+class Surface:
+    """A mesh to cast rays against; `origin_m` (3,) in `map` is near it, so that float32 coordinates stay exact."""
 
-    def __init__(self, mesh_between: MeshBetween, reach_m: float) -> None:
-        """`mesh_between(s0, s1)` gives the mesh between two arc lengths; `reach_m` is how far from the machine rays go."""
-        self._mesh_between, self._reach_m = mesh_between, reach_m
-        self._tile: int | None = None
-        self._scene: Any = None
-        self._origin_m = np.zeros(3)
+    def __init__(self, mesh: Mesh) -> None:
+        import open3d as o3d
 
-    def origin_m(self, s_m: float) -> FloatArray:
-        """Return the origin (3,) in `map` that rays near arc length `s_m` must be given in (keeps float32 exact)."""
-        self._load(int(np.floor(s_m / _TILE_M)))
-        return self._origin_m
+        self.origin_m: FloatArray = np.round(mesh.vertices_m.mean(axis=0))
+        core: Any = o3d.core  # its stubs know no array
+        self._tensor = core.Tensor
+        self._scene: Any = o3d.t.geometry.RaycastingScene(nthreads=1)
+        vertices = (mesh.vertices_m - self.origin_m).astype(np.float32)
+        self._scene.add_triangles(self._tensor(vertices), self._tensor(np.ascontiguousarray(mesh.triangles)))
 
     def cast(self, rays: Float32Array) -> Float32Array:
-        """Return the range of each ray, shape (N,), metres, inf for none; `rays` (N, 6) origin and unit direction."""
-        import open3d as o3d
+        """Return the range of each ray, shape (N,), metres, inf for none.
 
-        return self._scene.cast_rays(o3d.core.Tensor(rays), nthreads=1)["t_hit"].numpy()
+        `rays`, shape (N, 6): origin less `origin_m`, and unit direction.
+        """
+        return self._scene.cast_rays(self._tensor(rays), nthreads=1)["t_hit"].numpy()
 
-    def _load(self, tile: int) -> None:
-        if tile == self._tile:
-            return
-        import open3d as o3d
+    def crossings(self, rays: Float32Array) -> npt.NDArray[np.int64]:
+        """Return how many surfaces each ray crosses, shape (N,); `rays` as for `cast`."""
+        return self._scene.count_intersections(self._tensor(rays), nthreads=1).numpy()
 
-        self._scene = None  # the old one must go before the new one takes its memory
-        mesh = self._mesh_between(tile * _TILE_M - self._reach_m, (tile + 1) * _TILE_M + self._reach_m)
-        self._origin_m = np.round(mesh.vertices_m.mean(axis=0))
-        vertices = (mesh.vertices_m - self._origin_m).astype(np.float32)
-        self._scene = o3d.t.geometry.RaycastingScene(nthreads=1)
-        self._scene.add_triangles(o3d.core.Tensor(vertices), o3d.core.Tensor(np.ascontiguousarray(mesh.triangles)))
-        self._tile = tile
+
+class TiledSurface:
+    """The surface around a place of a long drift; it is renewed as the machine drives on, so memory does not grow."""
+
+    def __init__(self, mesh_between: MeshBetween, reach_m: float) -> None:
+        """`mesh_between(s0, s1)` meshes the drift between two arc lengths; `reach_m` is how far rays go."""
+        self._mesh_between, self._reach_m = mesh_between, reach_m
+        self._tile: int | None = None
+        self._surface: Surface | None = None
+
+    def near(self, s_m: float) -> Surface:
+        """Return the surface that a scanner at arc length `s_m` can see."""
+        tile = math.floor(s_m / _TILE_M)
+        if self._surface is None or tile != self._tile:
+            self._surface = None  # the old one must go before the new one takes its memory
+            start_m, end_m = tile * _TILE_M - self._reach_m, (tile + 1) * _TILE_M + self._reach_m
+            self._surface, self._tile = Surface(self._mesh_between(start_m, end_m)), tile
+        return self._surface

@@ -1,4 +1,4 @@
-"""What a simulated drive is: typed sections, read from and written to TOML; same scenario and seed, same log to the bit."""
+"""What a simulated drive is: typed sections, read from and written to TOML; same scenario, same log to the bit."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ class DriftSettings:
         DEFAULT_PIECES,
         unit="m, m, %",
         source=FINDINGS,
-        doc="Centre line as (length, radius, grade): radius 0 is straight, positive bends left; repeated until long enough.",
+        doc="Centre line as (length, radius, grade); radius 0 is straight, positive bends left; repeated as needed.",
     )
     transition_m: float = setting(
         3.0, unit="m", minimum=0.0, maximum=20.0, doc="Length over which curvature and grade change between pieces."
@@ -49,7 +49,7 @@ class DriftSettings:
     roughness_scale_m: float = setting(
         2.0, unit="m", minimum=0.2, maximum=20.0, doc="Knot spacing of the coarsest scale."
     )
-    roughness_gain: float = setting(0.57, minimum=0.1, maximum=1.0, doc="Amplitude of each scale over the coarser one.")
+    roughness_gain: float = setting(0.7, minimum=0.1, maximum=1.0, doc="Amplitude of each scale over the coarser one.")
     floor_undulation_m: float = setting(
         0.035,
         unit="m",
@@ -175,8 +175,8 @@ class WheelSettings:
 class DriftScenario:
     """A drive through a drift: everything that the simulator needs to know.
 
-    `planar` makes a 2D world: level scanners, flat floor, walls without height. `truth` writes `/ground_truth/odometry`.
-    `machine` is a machine file, or empty for the default.
+    `planar` makes a 2D world: level scanners, flat floor, walls alike at all heights. `truth` writes the topic
+    `/ground_truth/odometry`. `machine` is a machine file, or empty for the default.
     """
 
     seed: int = 0
@@ -235,6 +235,8 @@ def scenario_from(table: Mapping[str, Any]) -> DriftScenario:
             if type(table[key]) is not kind:
                 raise ConfigError(f"{key} = {table[key]!r}: a value of type {kind.__name__} was wanted")
             values[key] = table[key]
+    if values.get("seed", 0) < 0:
+        raise ConfigError(f"seed = {values['seed']}: zero or a positive number was wanted")
     for key, section in SECTIONS.items():
         values[key] = load_section(section, key, table.get(key, {}))
     return DriftScenario(**values)

@@ -32,7 +32,7 @@ class Clock(NamedTuple):
 
     def seconds(self, stamps_ns: npt.NDArray[np.int64]) -> FloatArray:
         """Return seconds after the log's start."""
-        return (stamps_ns - self.start_ns) * 1e-9
+        return (stamps_ns - self.start_ns).astype(np.float64) * 1e-9
 
 
 def inclinations(

@@ -1,4 +1,4 @@
-"""Where on its path the machine is at what time: legs between stops, each with start and stop ramps."""
+"""How far the machine has come at what time: legs between stops, each with start and stop ramps."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ _STEP_M = 0.01
 class Timetable(NamedTuple):
     """Nodes of the motion, all shape (N,): between two nodes the acceleration is constant.
 
-    `time_s` from the start of the log; `s_m` along the path; `speed_mps` signed (negative in reverse).
+    `time_s` from the log's start; `way_m` along the floor (it falls in reverse); `speed_mps` signed.
     """
 
     time_s: FloatArray
-    s_m: FloatArray
+    way_m: FloatArray
     speed_mps: FloatArray
 
     @property
@@ -28,24 +28,24 @@ class Timetable(NamedTuple):
         return float(self.time_s[-1])
 
     def at(self, time_s: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return position on the path (m) and signed speed (m/s) at the given times; at rest before and after."""
+        """Return the way (m) and the signed speed (m/s) at the given times; at rest before and after."""
         index = np.clip(np.searchsorted(self.time_s, time_s, side="right") - 1, 0, len(self.time_s) - 2)
         span = self.time_s[index + 1] - self.time_s[index]
         passed = np.clip(time_s - self.time_s[index], 0.0, span)
         start, end = self.speed_mps[index], self.speed_mps[index + 1]
         acceleration = np.divide(end - start, span, out=np.zeros_like(span), where=span > 0)
-        return self.s_m[index] + passed * (start + 0.5 * acceleration * passed), start + acceleration * passed
+        return self.way_m[index] + passed * (start + 0.5 * acceleration * passed), start + acceleration * passed
 
 
-def timetable(settings: DriveSettings, start_m: float, rng: np.random.Generator) -> Timetable:
-    """Return the motion of a drive that starts at `start_m` on the path: legs between stops and turning points."""
-    times, places, speeds = [np.zeros(1)], [np.array([start_m])], [np.zeros(1)]
+def timetable(settings: DriveSettings, rng: np.random.Generator) -> Timetable:
+    """Return the motion of a drive: legs between stops and turning points."""
+    times, places, speeds = [np.zeros(1)], [np.zeros(1)], [np.zeros(1)]
     phase = rng.uniform(0.0, 2 * np.pi, 3)
-    clock, place = settings.standstill_s, start_m
-    for target, rest_s in _targets(settings, start_m):
-        time_s, s_m, speed_mps = _leg(settings, place, target, phase)
+    clock, place = settings.standstill_s, 0.0
+    for target, rest_s in _targets(settings):
+        time_s, way_m, speed_mps = _leg(settings, place, target, phase)
         times.append(clock + time_s)
-        places.append(s_m)
+        places.append(way_m)
         speeds.append(speed_mps)
         clock, place = clock + float(time_s[-1]) + rest_s, target
     times.append(np.array([clock]))
@@ -54,14 +54,14 @@ def timetable(settings: DriveSettings, start_m: float, rng: np.random.Generator)
     return Timetable(np.concatenate(times), np.concatenate(places), np.concatenate(speeds))
 
 
-def _targets(settings: DriveSettings, start_m: float) -> list[tuple[float, float]]:
+def _targets(settings: DriveSettings) -> list[tuple[float, float]]:
     """Return the places (m) where the machine comes to rest, in the order of the drive, and for how long (s)."""
     pause = 1.0
     events = [(at, [(at, rest)]) for at, rest in settings.stops]
     events += [(at, [(at, pause), (max(at - back, 0.0), pause)]) for at, back in settings.reversals]
     inside = [(at, places) for at, places in sorted(events, key=lambda event: event[0]) if 0 < at < settings.distance_m]
     stops = [place for _, places in inside for place in places]
-    return [(start_m + at, rest) for at, rest in [*stops, (settings.distance_m, settings.standstill_s)]]
+    return [*stops, (settings.distance_m, settings.standstill_s)]
 
 
 def _leg(settings: DriveSettings, start_m: float, end_m: float, phase: FloatArray) -> tuple[FloatArray, ...]:

@@ -10,18 +10,22 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
+from lhdmap.errors import ConfigError
+from lhdmap.kinematics import articulation_along_path
 from lhdmap.machine import Machine, load_machine
 from lhdmap.messages import FloatArray
-from lhdmap.simulation.centre_line import Start, centre_line
+from lhdmap.simulation.centre_line import STEP_M, CentreLine, Start, centre_line
+from lhdmap.simulation.crossing import Crossing, side_drift
 from lhdmap.simulation.drift import Drift, Mesh
-from lhdmap.simulation.driving import Motion, Shaking, drive_path, simulate_motion
+from lhdmap.simulation.driving import Motion, Plan, Shaking, drive_path, simulate_motion
 from lhdmap.simulation.mesh_file import write_ply
-from lhdmap.simulation.raycast import TiledScene
+from lhdmap.simulation.raycast import TiledSurface
 from lhdmap.simulation.scanner import Beams, Rig, beams_of, rig_of
 from lhdmap.simulation.scenario import DriftScenario, flattened
 from lhdmap.simulation.sensors import Clock
 from lhdmap.simulation.timetable import timetable
 
+_PIECE_M = 30.0
 START_NS = 1_700_000_000_123_456_789
 _BEHIND_M, _AHEAD_M = 14.0, 20.0  # drift behind the machine's start and ahead of its end
 
@@ -34,10 +38,11 @@ class DriftWorld:
         self.machine = _levelled(load_machine(Path(scenario.machine) if scenario.machine else None), scenario.planar)
         self.clock = Clock(START_NS)
         self.drift = self._make_drift()
+        self.crossing = self._make_crossing()
         self.motion = self._make_motion()
         self.beams: Beams = beams_of(self.scenario.scanner)
         reach_m = min(self.scenario.scanner.max_range_m, 85.0) + 15.0
-        self.scene = TiledScene(self.mesh_between, reach_m)
+        self.surface = TiledSurface(self.mesh_between, reach_m)
 
     def rng(self, name: str) -> np.random.Generator:
         """Return the source of chance of the part `name`: independent of all others and of the order of use."""
@@ -51,15 +56,40 @@ class DriftWorld:
         line = centre_line(settings.pieces, length, settings.transition_m, start)
         return Drift(settings, line, self.rng("drift"), planar=self.scenario.planar)
 
+    def _make_crossing(self) -> Crossing:
+        planar, sides = self.scenario.planar, []
+        for index, (at_m, angle_deg, length_m) in enumerate(self.scenario.drift.cross_drifts):
+            place = (at_m + _BEHIND_M, angle_deg, length_m)
+            sides.append(side_drift(self.drift, place, self.rng(f"cross drift {index}"), planar=planar))
+        return Crossing(self.drift, sides, planar=planar)
+
     def _make_motion(self) -> Motion:
         settings = self.scenario.drive
         path = drive_path(self.drift, settings, self.rng("path"))
-        times = timetable(settings, _BEHIND_M, self.rng("speed"))
+        plan = Plan(path, _BEHIND_M, timetable(settings, self.rng("speed")))
+        self._check_bends(path)
         shaking = Shaking(math.radians(settings.vibration_deg), self.rng("shaking"))
-        return simulate_motion(self.drift, path, times, self.machine, shaking)
+        return simulate_motion(self.drift, plan, self.machine, shaking)
+
+    def _check_bends(self, path: CentreLine) -> None:
+        size = self.machine.dimensions
+        front_m, rear_m = size.joint_to_front_axle_m, size.joint_to_rear_axle_m
+        bend_rad = articulation_along_path(path.curvature_pm, STEP_M, front_m, rear_m)
+        largest_deg = math.degrees(float(np.abs(bend_rad).max()))
+        if not largest_deg <= size.max_articulation_deg:
+            raise ConfigError(
+                f"the bends of drift.pieces ask for an articulation of {largest_deg:.0f}°, but the machine bends to "
+                f"{size.max_articulation_deg:g}° only: use larger radii"
+            )
 
     def rig(self, mount: str) -> Rig:
-        """Return the rig of the scanner with that mount."""
+        """Return the rig of the scanner with that mount.
+
+        Raises:
+            ConfigError: the machine has no such mount.
+        """
+        if mount not in self.machine.mounts:
+            raise ConfigError(f"machine '{self.machine.name}' has no [mount.{mount}]: the simulator needs one")
         return rig_of(self.machine, self.machine.mounts[mount], occlusion=self.scenario.scanner.occlusion)
 
     def place_m(self, time_s: float) -> float:
@@ -78,13 +108,16 @@ class DriftWorld:
 
     def mesh_between(self, start_m: float, end_m: float) -> Mesh:
         """Return the mesh between two arc lengths; the drift's own ends are closed."""
-        spacing, count = self.scenario.drift.mesh_m, self.drift.ring_count()
-        first, last = math.floor(start_m / spacing), math.ceil(end_m / spacing) + 1
-        return self.drift.mesh(first, last, closed=(first <= 0, last >= count))
+        spacing = self.scenario.drift.mesh_m
+        return self.crossing.mesh(math.floor(start_m / spacing), math.ceil(end_m / spacing) + 1)
 
     def write_mesh(self, path: Path) -> None:
-        """Write the whole mesh as PLY, in `map`."""
-        write_ply(path, self.mesh_between(0.0, self.drift.line.length_m))
+        """Write the whole mesh as PLY, in `map`.
+
+        Raises:
+            OSError: the file exists or cannot be written.
+        """
+        write_ply(path, self.crossing.pieces(max(round(_PIECE_M / self.scenario.drift.mesh_m), 1)))
 
 
 def _levelled(machine: Machine, planar: bool) -> Machine:
