@@ -10,8 +10,9 @@ import numpy as np
 import numpy.typing as npt
 
 from lhdmap.evaluation.trajectory import TrajectoryEvaluation
+from lhdmap.integration.cloud import Cloud
 from lhdmap.mapfolder import Diagnostics
-from lhdmap.messages import Float32Array, FloatArray
+from lhdmap.messages import FloatArray
 from lhdmap.trajectory import Trajectory
 
 
@@ -25,19 +26,18 @@ class TopicRow(NamedTuple):
     remark: str = ""
 
 
-class CloudData(NamedTuple):
-    """The integrated cloud in map: `points_m` (N, 3), float32; `normals` (N, 3) and `curvature` (N,) where known."""
-
-    points_m: Float32Array
-    normals: Float32Array | None = None
-    curvature: Float32Array | None = None
-
-
 class SpeedSeries(NamedTuple):
     """A speed over time: `stamps_ns` (M,) and signed `speed_mps` (M,)."""
 
     stamps_ns: npt.NDArray[np.int64]
     speed_mps: FloatArray
+
+
+class AngleSeries(NamedTuple):
+    """A joint angle over time: `stamps_ns` (M,) and `angle_rad` (M,)."""
+
+    stamps_ns: npt.NDArray[np.int64]
+    angle_rad: FloatArray
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,10 +66,11 @@ class ReportData:
     trajectory: Trajectory
     odometry: Trajectory | None = None
     evaluation: TrajectoryEvaluation | None = None
-    cloud: CloudData | None = None
+    cloud: Cloud | None = None
     diagnostics: Diagnostics | None = None
     odometry_speed: SpeedSeries | None = None
     tachometer_speed: SpeedSeries | None = None
+    articulation: AngleSeries | None = None
     has_inclinometer: bool = True
     warnings: Sequence[str] = ()
     settings_text: str = ""

@@ -25,7 +25,7 @@ def plot_evaluation(found: TrajectoryEvaluation, path: Path) -> None:
         figure = charts.new_figure(plan_in + 2.6)
         figure.set_facecolor("white")
         plan, errors = figure.subplots(2, 1, height_ratios=(plan_in, 2.0))
-        figure.subplots_adjust(hspace=0.25)
+        figure.subplots_adjust(hspace=1.6 / (plan_in + 2.0))
         rows = charts.thinned(found.pairs)
         for label, points, colour in (
             ("truth", found.profile.truth_m, charts.TRUTH),

@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 from lhdmap.evaluation.trajectory import evaluate_trajectory
 from lhdmap.geometry.se3 import quaternions_from_rpy
+from lhdmap.integration.cloud import Cloud
 from lhdmap.mapfolder import Diagnostics
-from lhdmap.report.data import CloudData, ReportData, SpeedSeries, Summary, TopicRow
+from lhdmap.report.data import AngleSeries, ReportData, SpeedSeries, Summary, TopicRow
 from lhdmap.trajectory import Trajectory
 
 START_NS = 1_700_000_000_000_000_000
@@ -26,7 +27,7 @@ def drive(scans: int = 9000, speed_mps: float = 2.0, scale: float = 1.0, heading
     return Trajectory(stamps, positions, quaternions)
 
 
-def tunnel_cloud(path: Trajectory, points: int, seed: int = 0) -> CloudData:
+def tunnel_cloud(path: Trajectory, points: int, seed: int = 0) -> Cloud:
     """Return points on walls, floor and roof of a tunnel round the path, with normals and curvature."""
     rng = np.random.default_rng(seed)
     rows = rng.integers(0, len(path.stamps_ns), points)
@@ -40,7 +41,7 @@ def tunnel_cloud(path: Trajectory, points: int, seed: int = 0) -> CloudData:
     rough = 0.15 * np.sin(rows / 90.0) + rng.normal(0, 0.05, points)
     xy = path.positions_m[rows, :2] + left * (across + np.sign(across) * rough)[:, None]
     cloud = np.column_stack([xy, path.positions_m[rows, 2] + up + 0.3 * rough]).astype(np.float32)
-    return CloudData(cloud, np.zeros_like(cloud), np.zeros(points, np.float32))
+    return Cloud(cloud, np.zeros_like(cloud), np.zeros(points, np.float32), path.stamps_ns[rows])
 
 
 def diagnostics(path: Trajectory, seed: int = 0) -> Diagnostics:
@@ -80,6 +81,7 @@ def report_data(scans: int = 9000, points: int = 500_000) -> ReportData:
         diagnostics=found,
         odometry_speed=SpeedSeries(final.stamps_ns, speed),
         tachometer_speed=SpeedSeries(final.stamps_ns, speed * (1 + wheels)),
+        articulation=AngleSeries(final.stamps_ns[::5], 0.3 * np.sin(np.arange(len(final.stamps_ns[::5])) / 50.0)),
         warnings=["/lidar/front/scan: 3 scans came late", "no mounts in the log: a level scanner at base_link"],
         settings_text="[odometry]\n# Spacing of the compared scans. Unit: m.\nspacing_m = 0.5\n",
         provenance={"log": "drive_north.mcap, SHA-256 2cf24dba5fb0", "software": "lhdmap 0.1.0"},

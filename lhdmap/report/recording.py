@@ -1,0 +1,222 @@
+"""The Rerun recording of a run: written to a file without a display, in bulk where it can be, so that it costs little.
+
+Entities: `map/cloud/NNN` (parts of the cloud, each shown from the time it was first seen), `map/path/…` (static lines),
+`map/base_link` (the machine, moved over time), `map/scan/…`, `motion/…` and `scan_match/…` (curves), `log` (texts).
+The timeline `time` is the duration since the first scan.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from types import TracebackType
+from typing import Any, Self
+
+import numpy as np
+import numpy.typing as npt
+
+from lhdmap.integration.cloud import Cloud
+from lhdmap.machine import Machine
+from lhdmap.mapfolder import Diagnostics
+from lhdmap.messages import Float32Array, FloatArray
+from lhdmap.report.data import ReportData
+from lhdmap.report.recording_layout import RUN_CURVES, blueprint
+from lhdmap.settings import setting
+from lhdmap.trajectory import Trajectory
+
+APPLICATION = "lhdmap"
+TIMELINE = "time"
+Stamps = npt.NDArray[np.int64]
+_VIRIDIS = np.array([[68, 1, 84], [59, 82, 139], [33, 145, 140], [94, 201, 98], [253, 231, 37]], dtype=float)
+
+
+@dataclass(frozen=True, slots=True)
+class RecordingSettings:
+    """What of a run goes into its Rerun recording."""
+
+    scan_interval_s: float = setting(
+        0.5, unit="s", minimum=0.0, maximum=60.0, doc="Time between the scans that are recorded; 0 records each."
+    )
+    cloud_parts: int = setting(90, unit="parts", minimum=1, maximum=1000, doc="Parts in which the cloud appears.")
+    height_window_m: float = setting(
+        4.0, unit="m", minimum=0.1, maximum=100.0, doc="Height over the floor that the colours of the cloud span."
+    )
+    point_size_px: float = setting(1.5, unit="px", minimum=0.1, maximum=20.0, doc="Size of a cloud point on screen.")
+
+
+class RecordingWriter:
+    """Writes one `.rrd` file. Scans and texts may come while the run goes on, the rest comes when it is known."""
+
+    def __init__(self, path: Path, title: str, start_ns: int, settings: RecordingSettings | None = None) -> None:
+        """Open the file; `start_ns` is the stamp that counts as time zero."""
+        import rerun as rr
+
+        self._rr: Any = rr
+        self._settings = settings or RecordingSettings()
+        self._start_ns = self._end_ns = start_ns
+        self._next_scan_ns: dict[str, int] = {}
+        self._floor: tuple[Stamps, FloatArray] | None = None
+        self._bounds: FloatArray | None = None
+        self._drawn: set[str] = set()
+        self.curves = RUN_CURVES
+        self._stream = rr.RecordingStream(APPLICATION, recording_id=f"{title} {start_ns}")
+        self._stream.save(path)
+        self._stream.send_recording_name(title)
+        self._stream.log("map", rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        """Close the file; what was recorded before an interruption is kept."""
+        self.close()
+
+    def wants_scan(self, stamp_ns: int, name: str = "front") -> bool:
+        """Return whether a scan of this stamp would be recorded, so that its points need not be made in vain."""
+        return stamp_ns >= self._next_scan_ns.get(name, stamp_ns)
+
+    def add_scan(self, stamp_ns: int, points_map: FloatArray, name: str = "front") -> None:
+        """Record the points (N, 3) of one scan in map, unless the last one was recorded just before."""
+        if not self.wants_scan(stamp_ns, name):
+            return
+        self._next_scan_ns[name] = stamp_ns + round(self._settings.scan_interval_s * 1e9)
+        self._at(stamp_ns)
+        points = self._rr.Points3D(points_map, colors=0xE69F00FF, radii=self._points_px(2.0))
+        self._stream.log(f"map/scan/{name}", points)
+
+    def add_text(self, text: str, stamp_ns: int | None = None, level: str = "WARN") -> None:
+        """Record a line of the text log; one without a stamp stands at the start."""
+        self._at(self._start_ns if stamp_ns is None else stamp_ns)
+        self._stream.log("log", self._rr.TextLog(text, level=level))
+
+    def add_path(self, name: str, trajectory: Trajectory, rgba: int) -> None:
+        """Record a whole trajectory as a line, 0xRRGGBBAA."""
+        step = max(1, len(trajectory.positions_m) // 5000)
+        line = self._rr.LineStrips3D([trajectory.positions_m[::step]], colors=rgba, radii=self._points_px(1.2))
+        self._stream.log(f"map/path/{name}", line, static=True)
+
+    def add_motion(self, trajectory: Trajectory, machine: Machine) -> None:
+        """Record the final trajectory: the machine moves along it, and the cloud is coloured by height over it."""
+        order = np.argsort(trajectory.stamps_ns, kind="stable")
+        step = max(1, len(order) // 10_000)
+        rows = order[::step]
+        poses = self._rr.Transform3D.columns(
+            translation=trajectory.positions_m[rows], quaternion=trajectory.quaternions_xyzw[rows]
+        )
+        self._stream.send_columns("map/base_link", [self._times(trajectory.stamps_ns[rows])], poses)
+        self._boxes("map/base_link/front_body", machine.boxes("base_link"))
+        self._floor = trajectory.stamps_ns[order], trajectory.positions_m[order, 2]
+        self.widen(trajectory.positions_m)
+
+    def add_articulation(self, stamps_ns: Stamps, angles_rad: FloatArray, machine: Machine) -> None:
+        """Record the rear body, which follows the joint angles (M,), positive when the machine bends to the left."""
+        front_m, rear_m = machine.dimensions.joint_to_front_axle_m, machine.dimensions.joint_to_rear_axle_m
+        x, y = -front_m - rear_m * np.cos(angles_rad), rear_m * np.sin(angles_rad)
+        zero = np.zeros(len(x))
+        quaternions = np.column_stack([zero, zero, np.sin(-angles_rad / 2), np.cos(-angles_rad / 2)])
+        poses = self._rr.Transform3D.columns(translation=np.column_stack([x, y, zero]), quaternion=quaternions)
+        self._stream.send_columns("map/base_link/rear_link", [self._times(stamps_ns)], poses)
+        self._boxes("map/base_link/rear_link/rear_body", machine.boxes("rear_link"))
+
+    def add_cloud(self, cloud: Cloud) -> None:
+        """Record the cloud in parts, each from the time on at which its points were first measured."""
+        if not len(cloud):
+            return
+        stamps = cloud.stamps_ns if cloud.stamps_ns is not None else np.full(len(cloud), self._start_ns)
+        order = np.argsort(stamps, kind="stable")
+        colours = self._height_colours(cloud.points_m[:, 2], stamps)
+        for number, rows in enumerate(np.array_split(order, min(self._settings.cloud_parts, len(order)))):
+            self._at(int(stamps[rows[0]]))
+            size = self._points_px(self._settings.point_size_px)
+            part = self._rr.Points3D(cloud.points_m[rows], colors=colours[rows], radii=size)
+            self._stream.log(f"map/cloud/{number:03d}", part)
+        self.widen(np.percentile(cloud.points_m[:: max(1, len(cloud) // 20_000)], [0.5, 99.5], axis=0))
+
+    def add_curve(self, entity: str, stamps_ns: Stamps, values: FloatArray, rgba: int, name: str) -> None:
+        """Record a curve over time: stamps (M,), values (M,)."""
+        self._drawn.add(entity)
+        self._stream.log(entity, self._rr.SeriesLines(colors=rgba, names=name, widths=1.5), static=True)
+        self._stream.send_columns(entity, [self._times(stamps_ns)], self._rr.Scalars.columns(scalars=values))
+
+    def add_diagnostics(self, found: Diagnostics) -> None:
+        """Record the standard deviations that the information stands for, residual, flags and slip."""
+        stamps = found.stamp_ns
+        along, across, heading = (
+            1.0 / np.sqrt(np.maximum(values, 1e-12))
+            for values in (found.information_along, found.information_across, found.information_heading)
+        )
+        self.add_curve("scan_match/deviation/along", stamps, 1e3 * along, 0x2F86C9FF, "along, mm")
+        self.add_curve("scan_match/deviation/across", stamps, 1e3 * across, 0xE69F00FF, "across, mm")
+        self.add_curve("scan_match/deviation/heading", stamps, 1e3 * heading, 0x009E73FF, "heading, mrad")
+        self.add_curve("scan_match/weak", stamps, found.degenerate.astype(float), 0xCC79A7FF, "direction not observed")
+        self.add_curve("scan_match/residual", stamps, 1e3 * found.residual, 0x999999FF, "residual, mm")
+        if np.isfinite(found.slip).any():
+            self.add_curve("motion/slip", stamps, 100.0 * found.slip, 0xD55E00FF, "slip, %")
+
+    def close(self) -> None:
+        """Add the layout of the viewer and close the file."""
+        used = tuple(view for view in self.curves if any(self._has(entity) for entity in view[1]))
+        self._stream.send_blueprint(blueprint(self._bounds, self._end_ns - self._start_ns, used))
+        self._stream.disconnect()
+
+    def _has(self, pattern: str) -> bool:
+        """Return whether a curve of this entity, or below it (`…/**`), was recorded."""
+        return any(entity.startswith(pattern.removesuffix("**")) for entity in self._drawn)
+
+    def _at(self, stamp_ns: int) -> None:
+        self._end_ns = max(self._end_ns, stamp_ns)
+        self._stream.set_time(TIMELINE, duration=np.timedelta64(stamp_ns - self._start_ns, "ns"))
+
+    def _times(self, stamps_ns: Stamps) -> Any:
+        self._end_ns = max(self._end_ns, int(stamps_ns.max(initial=self._end_ns)))
+        return self._rr.TimeColumn(TIMELINE, duration=(stamps_ns - self._start_ns).astype("timedelta64[ns]"))
+
+    def _points_px(self, size: float) -> Any:
+        return self._rr.Radius.ui_points(size)
+
+    def _boxes(self, entity: str, corners_m: FloatArray) -> None:
+        """Record boxes (K, 2, 3) of lower and upper corners, fixed to their parent entity."""
+        if len(corners_m):
+            sizes, centres = corners_m[:, 1] - corners_m[:, 0], corners_m.mean(axis=1)
+            boxes = self._rr.Boxes3D(centers=centres, sizes=sizes, colors=0xF0C419FF, fill_mode="solid")
+            self._stream.log(entity, boxes, static=True)
+
+    def _height_colours(self, heights_m: Float32Array, stamps_ns: Stamps) -> npt.NDArray[np.uint32]:
+        """Return RGBA of heights (N,) over the floor at the stamps (N,), or over the lowest point."""
+        floor = heights_m.min() if self._floor is None else np.interp(stamps_ns, *self._floor)
+        share = np.clip((heights_m - floor) / self._settings.height_window_m, 0.0, 1.0)
+        return _palette()[(255 * share).astype(np.int64)]
+
+    def widen(self, points_m: npt.NDArray[np.floating[Any]]) -> None:
+        """Widen the bounds that the views are laid out for, so that they hold the points (N, 3) in map."""
+        seen = points_m if self._bounds is None else np.vstack([self._bounds, points_m])
+        self._bounds = np.array([seen.min(axis=0), seen.max(axis=0)], dtype=float)
+
+
+def _palette() -> npt.NDArray[np.uint32]:
+    """Return 256 colours from viridis as 0xRRGGBBAA."""
+    steps = np.linspace(0, len(_VIRIDIS) - 1, 256)
+    r, g, b = (np.interp(steps, range(len(_VIRIDIS)), _VIRIDIS[:, i]).astype(np.uint32) for i in range(3))
+    return r << 24 | g << 16 | b << 8 | np.uint32(255)
+
+
+def record_run(writer: RecordingWriter, data: ReportData, machine: Machine) -> None:
+    """Record all that a finished run knows; the scans and texts of the run itself are in `writer` already."""
+    writer.add_motion(data.trajectory, machine)
+    writer.add_path("final", data.trajectory, 0x2F86C9FF)
+    if data.odometry is not None:
+        writer.add_path("odometry", data.odometry, 0xE69F00FF)
+    if data.articulation is not None and len(data.articulation.stamps_ns):
+        writer.add_articulation(*data.articulation, machine)
+    if data.cloud is not None:
+        writer.add_cloud(data.cloud)
+    if data.odometry_speed is not None:
+        writer.add_curve("motion/speed/odometry", *data.odometry_speed, 0x2F86C9FF, "odometry, m/s")
+    if data.tachometer_speed is not None:
+        writer.add_curve("motion/speed/tachometer", *data.tachometer_speed, 0xD55E00FF, "tachometer, m/s")
+    if data.diagnostics is not None and len(data.diagnostics.stamp_ns):
+        writer.add_diagnostics(data.diagnostics)
+    for text in data.warnings:
+        writer.add_text(text)
