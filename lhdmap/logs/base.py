@@ -85,6 +85,9 @@ class LogReader(Protocol):
     def topics(self) -> dict[str, TopicInfo]:
         """Return the topics by name."""
 
+    def stated_end_rad(self, topic: str) -> float | None:
+        """Return the angle that the log states for the last beam of a scanner's first scan, None where it does not."""
+
     def records(self, topics: Collection[str] | None = None) -> Iterator[Record]:
         """Yield the decoded messages of `topics` (all that can be decoded by default)."""
 

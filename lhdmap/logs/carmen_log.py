@@ -51,6 +51,12 @@ class CarmenLog(TextLog):
             listed[topic] = TopicInfo(topic, _ODOMETRY, found.counts[keyword])
         return listed
 
+    def stated_end_rad(self, topic: str) -> float | None:
+        """Return start angle plus field of view of the first scan; FLASER lines do not state them."""
+        first = self._found.first.get(topic)
+        stated = first is not None and topic not in ("FLASER", "RLASER")
+        return first.angle_min_rad + first.fov_rad if first is not None and stated else None
+
     def _messages(self, topics: Collection[str]) -> Iterator[Found]:
         if _MOUNTS in topics:
             yield from self._mounts()

@@ -11,7 +11,7 @@ from lhdmap.errors import InputError
 from lhdmap.logs.base import Channel, RawMessage, TopicInfo, span_s
 from lhdmap.logs.container import Container, Contents, OpenContainer
 from lhdmap.logs.cursor import Cursor
-from lhdmap.logs.decoders import DECODERS, UNSTAMPED_TYPES, Decoder, ground_truth
+from lhdmap.logs.decoders import DECODERS, LASER_SCAN, UNSTAMPED_TYPES, Decoder, ground_truth, scan_numbers
 from lhdmap.logs.findings import Findings
 from lhdmap.logs.stamps import StampKeeper, TopicStamps
 from lhdmap.logs.topics import is_ground_truth
@@ -90,6 +90,17 @@ class DecodedLog:
         channels = self._chosen(topics)
         for log_ns, number, data in self._need().messages(channels):
             yield RawMessage(channels[number], log_ns, data)
+
+    def stated_end_rad(self, topic: str) -> float | None:
+        """Return the `angle_max` of the first LaserScan of `topic`, None where there is none."""
+        for channel, _, data in self.raw({topic}):
+            if channel.type_name != LASER_SCAN or channel.encoding not in _ENCODINGS:
+                return None
+            try:
+                return scan_numbers(Cursor(data, channel.encoding))[2][1]
+            except InputError:
+                continue
+        return None
 
     def records(self, topics: Collection[str] | None = None) -> Iterator[Record]:
         """Yield the decoded messages of `topics` (all that can be decoded by default) in log-time order."""

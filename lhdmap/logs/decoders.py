@@ -141,8 +141,9 @@ def _transform(cursor: Cursor) -> Mount:
     return Mount(stamp, parent, child.lstrip("/"), se3.from_quaternion(pose[3:], pose[:3]))
 
 
+LASER_SCAN = "sensor_msgs/msg/LaserScan"
 DECODERS: dict[str, Decoder] = {
-    "sensor_msgs/msg/LaserScan": _laser_scan,
+    LASER_SCAN: _laser_scan,
     "sensor_msgs/msg/PointCloud2": point_cloud,
     "sensor_msgs/msg/Imu": _imu,
     "sensor_msgs/msg/JointState": _joints,

@@ -14,6 +14,7 @@ from typing import Self
 from lhdmap.errors import InputError
 from lhdmap.logs.base import LogReader, TopicInfo
 from lhdmap.logs.formats import open_log
+from lhdmap.logs.inventory import Inventory, take_inventory
 from lhdmap.logs.topics import assign_topics, missing_scanner
 from lhdmap.messages import Message
 
@@ -97,6 +98,10 @@ class LogSource:
         merged = streams[0] if len(streams) == 1 else heapq.merge(*streams, key=itemgetter(1))
         for topic, _, message in merged:
             yield wanted[topic], message
+
+    def inventory(self) -> list[Inventory]:
+        """Return what is in each file; rates and gaps are there once the messages have been read."""
+        return [take_inventory(reader, self.roles) for reader in self._readers]
 
     def _names(self) -> str:
         return ", ".join(str(path) for path in self.paths)

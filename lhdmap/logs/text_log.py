@@ -83,6 +83,10 @@ class TextLog(ABC):
     def topics(self) -> dict[str, TopicInfo]:
         """Return the topics by name."""
 
+    def stated_end_rad(self, topic: str) -> float | None:  # noqa: ARG002  # for formats that state it
+        """Return the angle that the log states for the last beam, None where it does not."""
+        return None
+
     def records(self, topics: Collection[str] | None = None) -> Iterator[Record]:
         """Yield the messages of `topics` (all by default) in the order of the file."""
         self._keeper = keeper = StampKeeper()

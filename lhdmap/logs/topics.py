@@ -55,7 +55,9 @@ def assign_topics(topics: Mapping[str, TopicInfo], overrides: Mapping[str, str] 
     for role, (name, kind) in ROLES.items():
         if role not in chosen and name in free and free[name].type_name == kind:
             chosen[role] = free.pop(name).name
-    free = {name: info for name, info in free.items() if not is_ground_truth(name)}
+    truths = {name: info for name, info in free.items() if is_ground_truth(name)}
+    _assign_by_type("ground_truth", chosen, truths)
+    free = {name: info for name, info in free.items() if name not in truths}
     _assign_scanners(chosen, free)
     for role in _BY_TYPE:
         _assign_by_type(role, chosen, free)

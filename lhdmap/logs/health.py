@@ -1,0 +1,168 @@
+"""The examination of a log: one pass over all messages, a list of findings, a verdict."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import ExitStack
+from dataclasses import dataclass, field
+from enum import StrEnum
+from pathlib import Path
+
+from lhdmap.errors import InputError
+from lhdmap.logs.base import LogReader
+from lhdmap.logs.decoders import DECODERS
+from lhdmap.logs.finding import Finding, Severity
+from lhdmap.logs.formats import open_log
+from lhdmap.logs.inventory import Inventory, take_inventory
+from lhdmap.logs.scan_health import ScanWatch
+from lhdmap.logs.stamp_health import StampWatch
+from lhdmap.logs.topics import SCAN, assign_topics, missing_scanner
+from lhdmap.logs.value_health import ValueWatch
+from lhdmap.messages import LaserScan, Message, Record
+
+_KEY_SCAN_STEP_M = 0.5
+# Wraps the records while they are read, for a progress display: reader and records in, records out.
+Progress = Callable[[LogReader, Iterator[Record]], Iterator[Record]]
+
+
+class Verdict(StrEnum):
+    """Whether a log can be used."""
+
+    USABLE = "usable"
+    REMARKS = "usable with remarks"
+    UNUSABLE = "not usable"
+
+
+@dataclass(frozen=True)
+class Examination:
+    """The outcome for one log; `inventory` is None where it could not be opened."""
+
+    path: Path
+    verdict: Verdict
+    findings: list[Finding] = field(default_factory=list)
+    inventory: Inventory | None = None
+
+
+class _Watches:
+    """One set of watches for each topic."""
+
+    def __init__(self) -> None:
+        self.scans: dict[str, ScanWatch] = {}
+        self.values: dict[str, ValueWatch] = {}
+        self.stamps: dict[str, StampWatch] = {}
+
+    def update(self, topic: str, message: Message) -> None:
+        if topic not in self.stamps:
+            self.stamps[topic] = StampWatch(topic)
+            self.scans[topic], self.values[topic] = ScanWatch(topic), ValueWatch(topic)
+        self.stamps[topic].update(message.stamp_ns)
+        if isinstance(message, LaserScan):
+            self.scans[topic].update(message)
+        else:
+            self.values[topic].update(message)
+
+
+def examine(path: Path, overrides: Mapping[str, str] | None = None, progress: Progress | None = None) -> Examination:
+    """Read a log once and say what is in it and what is wrong with it; never raises for what is wrong with the log."""
+    with ExitStack() as stack:
+        try:
+            reader = stack.enter_context(open_log(path))
+            return _examined(reader, overrides or {}, progress or (lambda _, records: records))
+        except InputError as error:
+            return Examination(path, Verdict.UNUSABLE, [Finding(Severity.FATAL, "", str(error))])
+
+
+def _examined(reader: LogReader, overrides: Mapping[str, str], progress: Progress) -> Examination:
+    roles, findings = _roles(reader, overrides)
+    watches = _Watches()
+    for record in progress(reader, reader.records()):
+        watches.update(record.topic, record.message)
+    findings += [
+        Finding(Severity.PROBLEM, "", f"damaged: {line}", "all whole messages are used") for line in reader.damage
+    ]
+    findings += _topic_findings(reader, watches)
+    findings += _missing(reader, roles, watches)
+    findings += _key_scans(roles, watches)
+    findings += [Finding(Severity.NOTE, "", line) for line in reader.remarks if "stamp" not in line]
+    findings = _scanner_verdicts(findings, roles)
+    return Examination(reader.path, _verdict(findings), findings, take_inventory(reader, roles))
+
+
+def _roles(reader: LogReader, overrides: Mapping[str, str]) -> tuple[dict[str, str], list[Finding]]:
+    try:
+        return assign_topics(reader.topics(), overrides), []
+    except InputError as error:
+        if overrides:
+            raise
+        return {}, [Finding(Severity.PROBLEM, "", str(error), "give that option to the other commands too")]
+
+
+def _topic_findings(reader: LogReader, watches: _Watches) -> list[Finding]:
+    found = []
+    for topic, watch in watches.stamps.items():
+        found += watch.findings(reader.stamps[topic], reader.start_ns or 0)
+        found += watches.scans[topic].findings(watch.period_s, _stated_end(reader, topic))
+        found += watches.values[topic].findings()
+    return found
+
+
+def _stated_end(reader: LogReader, topic: str) -> float | None:
+    return reader.stated_end_rad(topic) if reader.topics()[topic].type_name == SCAN else None
+
+
+def _missing(reader: LogReader, roles: Mapping[str, str], watches: _Watches) -> list[Finding]:
+    """Return what the log lacks."""
+    found = []
+    topics = reader.topics()
+    scanners = [name for name, info in topics.items() if info.type_name in (SCAN, "sensor_msgs/msg/PointCloud2")]
+    if not scanners:
+        found.append(Finding(Severity.FATAL, "", str(missing_scanner(topics)), "record the scanner's topic"))
+    elif not any(name in watches.stamps for name in scanners):
+        text = "no scan in the log: its scanner topics hold no whole message"
+        found.append(Finding(Severity.FATAL, "", text, "record it again"))
+    frames = {frame for watch in watches.values.values() for frame in watch.mounted_frames}
+    for name, watch in watches.scans.items():
+        if watch.frame_id and watch.frame_id not in frames:
+            text = f"no mount of its frame '{watch.frame_id}' in the log"
+            advice = "the machine file's is used, else a level scanner at base_link"
+            found.append(Finding(Severity.REMARK, name, text, advice))
+    if "inclinometer" not in roles:
+        found.append(Finding(Severity.NOTE, "", "no inclinometer: the drive is treated as level"))
+    if "wheel_odometry" not in roles and "tachometer" not in roles:
+        found.append(
+            Finding(Severity.NOTE, "", "no wheel speed: where scans do not show the motion, the last one is kept")
+        )
+    undecoded = [info for info in topics.values() if info.type_name not in DECODERS]
+    if undecoded:
+        listed = ", ".join(f"{info.name} ({info.type_name})" for info in undecoded)
+        found.append(Finding(Severity.NOTE, "", f"not read: {listed}"))
+    return found
+
+
+def _key_scans(roles: Mapping[str, str], watches: _Watches) -> list[Finding]:
+    """Tell a log of key scans (about a metre apart) from a drive."""
+    path_m = max((watch.path_m for watch in watches.values.values()), default=0.0)
+    front = roles.get("front", "")
+    count = watches.stamps[front].count if front in watches.stamps else 0
+    if count < 2 or path_m < _KEY_SCAN_STEP_M * count:
+        return []
+    text = f"key scans only: {path_m / count:.2f} m between scans"
+    return [Finding(Severity.PROBLEM, front, text, "too far for odometry: build the map with given poses")]
+
+
+def _scanner_verdicts(findings: list[Finding], roles: Mapping[str, str]) -> list[Finding]:
+    """Lower what is fatal for a scanner that the log can do without."""
+    needed = {"", roles.get("front", roles.get("points", ""))}
+    return [
+        finding._replace(severity=Severity.PROBLEM)
+        if finding.severity is Severity.FATAL and finding.topic not in needed
+        else finding
+        for finding in findings
+    ]
+
+
+def _verdict(findings: list[Finding]) -> Verdict:
+    severities = {finding.severity for finding in findings}
+    if Severity.FATAL in severities:
+        return Verdict.UNUSABLE
+    return Verdict.REMARKS if severities & {Severity.REMARK, Severity.PROBLEM} else Verdict.USABLE
