@@ -1,12 +1,12 @@
 """The map folder: written under a partial name, renamed when complete, never over another one; and its reader.
 
-`MapFolderWriter` is a context manager. Each `write_…` leaves a whole file; `complete` hashes all files, writes `map.json`
-and renames the folder. Left without `complete` (an error, Ctrl-C), the folder keeps its partial name and what was finished.
+`MapFolderWriter` is a context manager. Each `write_…` leaves a whole file; `complete` hashes all files, writes
+`map.json` and renames the folder. Left without `complete` (an error, Ctrl-C), the folder keeps its partial name, and
+what was finished stays in it.
 """
 
 from __future__ import annotations
 
-import hashlib
 import itertools
 import json
 import math
@@ -22,6 +22,7 @@ import numpy.typing as npt
 from lhdmap import __version__
 from lhdmap.errors import InputError
 from lhdmap.messages import FloatArray
+from lhdmap.provenance import file_entry, sha256_of, source_entry
 from lhdmap.trajectory import Trajectory, read_tum, write_tum
 
 FORMAT_VERSION = 1
@@ -116,7 +117,7 @@ class MapFolderWriter:
         """
         known = source_hashes or {}
         entries = [known[path] if path in known else source_entry(path) for path in info.sources]
-        files = {path.name: _file_entry(path) for path in sorted(self.path.iterdir()) if path.is_file()}
+        files = {path.name: file_entry(path) for path in sorted(self.path.iterdir()) if path.is_file()}
         _write_json(
             self.path / "map.json",
             {
@@ -239,31 +240,6 @@ class MapFolder:
             for name, entry in recorded.items()
             if not (self.path / name).is_file() or sha256_of(self.path / name) != entry["sha256"]
         ]
-
-
-def sha256_of(path: Path) -> str:
-    """Return the SHA-256 of a file, in hex."""
-    with path.open("rb") as file:
-        return hashlib.file_digest(file, "sha256").hexdigest()
-
-
-def source_entry(path: Path) -> dict[str, Any]:
-    """Return what `map.json` records of a source: its path as given, size and SHA-256; of a bag folder, each file's.
-
-    Raises:
-        InputError: the source cannot be read.
-    """
-    try:
-        if path.is_dir():
-            files = {item.name: _file_entry(item) for item in sorted(path.iterdir()) if item.is_file()}
-            return {"path": str(path), "files": files}
-        return {"path": str(path), **_file_entry(path)}
-    except OSError as error:
-        raise InputError(f"{path}: {error.strerror or error}") from error
-
-
-def _file_entry(path: Path) -> dict[str, Any]:
-    return {"sha256": sha256_of(path), "bytes": path.stat().st_size}
 
 
 def _numbered(name: str) -> itertools.chain[str]:

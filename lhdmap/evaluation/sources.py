@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import bz2
 import gzip
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TextIO
+from typing import Any, TextIO
 
 import numpy as np
 
@@ -16,7 +17,8 @@ from lhdmap.messages import GroundTruth
 from lhdmap.trajectory import Trajectory, read_tum, seconds_to_ns
 
 LOG_SUFFIXES = (".mcap", ".bag", ".db3")
-TEXT_LOG_SUFFIXES = (".log", ".clf", ".log.gz", ".clf.gz")
+TEXT_LOG_SUFFIXES = tuple(kind + packed for kind in (".log", ".clf") for packed in ("", ".gz", ".bz2"))
+_OPENERS: Mapping[str, Callable[..., Any]] = {".gz": gzip.open, ".bz2": bz2.open}
 ROBOT_POSE_FIELDS = 11
 """ROBOTLASER1 ends with laser pose (3), robot pose (3), speeds and safety margins (5), stamp, host, logger stamp."""
 
@@ -107,14 +109,13 @@ def _corrected_pose(path: Path, number: int, fields: list[str]) -> tuple[int, fl
 
 @contextmanager
 def _text(path: Path) -> Iterator[TextIO]:
-    """Open a plain or gzipped text file.
+    """Open a text file, plain or packed by gzip or bzip2.
 
     Raises:
         InputError: it is missing or not readable.
     """
     try:
-        opener = gzip.open if path.suffix == ".gz" else open
-        with opener(path, "rt", encoding="ascii", errors="replace") as file:
+        with _OPENERS.get(path.suffix.lower(), open)(path, "rt", encoding="ascii", errors="replace") as file:
             yield file
     except (OSError, EOFError) as error:
         raise InputError(f"{path}: {getattr(error, 'strerror', None) or error}") from error
