@@ -189,6 +189,11 @@ class DriftScenario:
     inclinometer: InclinometerSettings = field(default_factory=InclinometerSettings)
     wheels: WheelSettings = field(default_factory=WheelSettings)
 
+    def __post_init__(self) -> None:
+        """Check what the sections cannot; raises ConfigError."""
+        if self.seed < 0:
+            raise ConfigError(f"seed = {self.seed}: zero or a positive number was wanted")
+
 
 SECTIONS: dict[str, type[Any]] = {
     "drift": DriftSettings,
@@ -235,8 +240,6 @@ def scenario_from(table: Mapping[str, Any]) -> DriftScenario:
             if type(table[key]) is not kind:
                 raise ConfigError(f"{key} = {table[key]!r}: a value of type {kind.__name__} was wanted")
             values[key] = table[key]
-    if values.get("seed", 0) < 0:
-        raise ConfigError(f"seed = {values['seed']}: zero or a positive number was wanted")
     for key, section in SECTIONS.items():
         values[key] = load_section(section, key, table.get(key, {}))
     return DriftScenario(**values)
