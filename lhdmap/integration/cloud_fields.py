@@ -12,6 +12,7 @@ import numpy.typing as npt
 from lhdmap.errors import InputError
 from lhdmap.integration.cloud import Cloud
 
+LARGEST_COORDINATE_M = 131072.0  # where float32 steps reach 8 to 16 mm
 Table = npt.NDArray[np.void]
 
 
@@ -49,12 +50,12 @@ def cloud_of(path: Path, table: Table, stamps_ns: npt.NDArray[np.int64] | None) 
     """Return the cloud of a file's table; points that are not finite are left out, unknown fields are passed over.
 
     Raises:
-        InputError: the table has no x, y and z.
+        InputError: the table has no x, y and z, or its coordinates are too large.
     """
     names = table.dtype.names or ()
     if not {"x", "y", "z"} <= set(names):
         raise InputError(f"{path}: its fields are {', '.join(names) or 'none'}; x, y and z were wanted")
-    points = _columns(table, ("x", "y", "z"))
+    points = _points(path, table)
     keep = np.isfinite(points).all(axis=1)
     normal = next((n.normal for n in (PLY_NAMES, PCD_NAMES) if set(n.normal) <= set(names)), None)
     return Cloud(
@@ -64,6 +65,18 @@ def cloud_of(path: Path, table: Table, stamps_ns: npt.NDArray[np.int64] | None) 
         stamps_ns=None if stamps_ns is None else stamps_ns[keep],
         hits=table["hits"][keep].astype(np.uint32) if "hits" in names else None,
     )
+
+
+def _points(path: Path, table: Table) -> npt.NDArray[np.float32]:
+    """Return x, y and z; refuse coordinates of a national grid, of which a float32 keeps only decimetres."""
+    points = _columns(table, ("x", "y", "z"))
+    middle_m = float(np.median(np.abs(points), axis=0).max()) if len(points) else 0.0
+    if middle_m > LARGEST_COORDINATE_M:
+        raise InputError(
+            f"{path}: its coordinates are around {middle_m:.0f} m; less than {LARGEST_COORDINATE_M:.0f} m was wanted: "
+            "shift the cloud to a local origin first"
+        )
+    return points
 
 
 def _columns(table: Table, names: tuple[str, ...]) -> npt.NDArray[np.float32]:
@@ -107,5 +120,7 @@ def binary_table(path: Path, body: memoryview, dtype: np.dtype[np.void], count: 
         InputError: there are fewer rows.
     """
     if len(body) < count * dtype.itemsize:
-        raise InputError(f"{path}: cut off: {len(body) // max(dtype.itemsize, 1)} of {count} points are there")
+        raise InputError(f"{path}: cut off: {len(body) // dtype.itemsize} of {count} points are there")
+    if count == 0 or dtype.itemsize == 0:
+        return np.zeros(0, dtype=dtype)
     return np.frombuffer(body, dtype=dtype, count=count)

@@ -78,7 +78,7 @@ def _header(path: Path, data: bytes) -> _Header:
         raise InputError(f"{path}: no PCD file (no DATA line in its header), or it is cut off")
     lines = [line.split() for line in data[:newline].decode("ascii", errors="replace").splitlines()]
     entries = {line[0].upper(): line[1:] for line in lines if line and not line[0].startswith("#")}
-    encoding = " ".join(entries["DATA"])
+    encoding = " ".join(entries.get("DATA", []))
     if encoding not in ("ascii", "binary", "binary_compressed"):
         raise InputError(f"{path}: PCD data '{encoding}'; ascii, binary or binary_compressed was wanted")
     try:

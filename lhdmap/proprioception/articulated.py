@@ -62,3 +62,36 @@ def integrate_motion(
         lever += ds * (c + s * s * L_f / below) / below
         gamma = next_gamma
     return pose, path, abs(lever)
+
+
+@nb.njit(cache=True, nogil=True)
+def covered(stamps_ns: npt.NDArray[np.int64], span_ns: tuple[int, int], gap_ns: int, hold_ns: int) -> bool:
+    """Return whether samples go from start to end of a span without a long gap; those at the ends hold for a while."""
+    n = stamps_ns.shape[0]
+    if n == 0 or span_ns[0] < stamps_ns[0] - hold_ns or span_ns[1] > stamps_ns[n - 1] + hold_ns:
+        return False
+    i = max(int(np.searchsorted(stamps_ns, span_ns[0], side="right")) - 1, 0)
+    while i < n - 1 and stamps_ns[i] < span_ns[1]:
+        if stamps_ns[i + 1] - stamps_ns[i] > gap_ns:
+            return False
+        i += 1
+    return True
+
+
+@nb.njit(cache=True, nogil=True)
+def motion_covariance(along_m: float, across_m: float, heading_rad: float, delta: FloatArray) -> FloatArray:
+    """Return the covariance, shape (3, 3), of a motion (3,) from three independent errors, standard deviations.
+
+    The heading error grows evenly along the way, so half of it acts across the chord and turns the end sideways.
+    """
+    c, s = math.cos(0.5 * delta[2]), math.sin(0.5 * delta[2])
+    a, b, h = along_m**2, across_m**2, heading_rad**2
+    x, y = -0.5 * delta[1], 0.5 * delta[0]
+    out = np.empty((3, 3))
+    out[0, 0] = a * c * c + b * s * s + h * x * x + 1e-10
+    out[1, 1] = a * s * s + b * c * c + h * y * y + 1e-10
+    out[0, 1] = out[1, 0] = (a - b) * c * s + h * x * y
+    out[0, 2] = out[2, 0] = h * x
+    out[1, 2] = out[2, 1] = h * y
+    out[2, 2] = h + 1e-10
+    return out

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from lhdmap.messages import FloatArray
 from lhdmap.settings import setting
 
 
@@ -43,7 +44,9 @@ class SlipSettings:
     )
     block_m: float = setting(1.0, unit="m", minimum=0.1, doc="Distance over which one ratio of both speeds is formed.")
     min_blocks: int = setting(5, unit="blocks", minimum=1, doc="The scale is used from so many ratios on.")
-    max_blocks: int = setting(200, unit="blocks", minimum=1, doc="The scale is the median of the last so many ratios.")
+    max_blocks: int = setting(
+        200, unit="blocks", minimum=1, doc="The scale is a robust mean of the last so many ratios."
+    )
 
 
 class SlipEstimator:
@@ -157,21 +160,32 @@ class SlipEstimator:
             self._fuse(wheel_mps * self.scale, wheel_std)
 
     def _learn(self, wheel_m: float, lidar_m: float, lidar_std_mps: float) -> None:
-        """Add to the block of distance; where it is complete, its ratio joins the median.
+        """Add to the block of distance; where it is complete, its ratio joins the others.
 
-        Slip does not bias the median as long as it lasts for less than half of the way.
+        Slip does not bias the scale as long as it lasts for less than half of the way.
         """
-        if lidar_std_mps > self.settings.max_lidar_std_mps or wheel_m * lidar_m < 0.0:
+        if lidar_std_mps > self.settings.max_lidar_std_mps:
             return
         self._wheel_m += abs(wheel_m)
-        self._lidar_m += abs(lidar_m)
-        if max(self._wheel_m, self._lidar_m) < self.settings.block_m:
+        self._lidar_m += math.copysign(1.0, wheel_m) * lidar_m
+        if max(self._wheel_m, abs(self._lidar_m)) < self.settings.block_m:
             return
         if self._wheel_m > 0.5 * self._lidar_m > 0.125 * self._wheel_m:
             self._ratios.append(self._lidar_m / self._wheel_m)
         self._wheel_m = self._lidar_m = 0.0
         if len(self._ratios) >= self.settings.min_blocks:
-            ratios = np.array(self._ratios)
-            self.scale = float(np.median(ratios))
-            spread = 1.4826 * float(np.median(np.abs(ratios - self.scale)))
-            self.scale_std = max(1.2533 * spread / math.sqrt(len(ratios)), 0.001)
+            self.scale, self.scale_std = _robust_mean(np.array(self._ratios))
+
+
+def _robust_mean(values: FloatArray) -> tuple[float, float]:
+    """Return the mean of the values that are no outliers, and its standard deviation (no less than 0.001).
+
+    From the median on, values beyond 2.5 sigma (by the median deviation) are left out: outliers that are all on one
+    side, as slip makes them, would pull the median itself.
+    """
+    centre = float(np.median(values))
+    for _ in range(5):
+        spread = max(1.4826 * float(np.median(np.abs(values - centre))), 1e-4)
+        kept = values[np.abs(values - centre) <= 2.5 * spread]
+        centre = float(kept.mean())
+    return centre, max(float(kept.std()) / math.sqrt(len(kept)), 0.001)

@@ -16,7 +16,7 @@ import numpy as np
 from lhdmap.geometry import se2
 from lhdmap.machine import Machine
 from lhdmap.messages import FloatArray, Joints, Tachometer, WheelPose
-from lhdmap.proprioception.articulated import integrate_motion, interpolate
+from lhdmap.proprioception.articulated import covered, integrate_motion, interpolate, motion_covariance
 from lhdmap.proprioception.samples import SampleBuffer, Warnings
 from lhdmap.settings import setting
 
@@ -75,6 +75,7 @@ class WheelOdometry:
         self._angles = SampleBuffer("articulation", 1, keep_s, self.warnings)
         self._poses = SampleBuffer("wheel odometry", 4, keep_s, self.warnings)  # x, y, heading, number of the stretch
         self._stretch = 0
+        self._gap_ns, self._hold_ns = round(settings.max_gap_s * 1e9), round(settings.max_hold_s * 1e9)
 
     def update(self, message: Tachometer | Joints | WheelPose) -> None:
         """Take one message; values that cannot be are left out, with a warning."""
@@ -144,14 +145,7 @@ class WheelOdometry:
 
     def _covers(self, samples: SampleBuffer, start_ns: int, end_ns: int) -> bool:
         """Return whether samples go from start to end without a long gap (the last one may be held for a while)."""
-        stamps = samples.stamps_ns
-        hold_ns, gap_ns = self.settings.max_hold_s * 1e9, self.settings.max_gap_s * 1e9
-        if len(stamps) == 0 or start_ns < stamps[0] - hold_ns or end_ns > stamps[-1] + hold_ns:
-            return False
-        first = max(int(np.searchsorted(stamps, start_ns, side="right")) - 1, 0)
-        last = int(np.searchsorted(stamps, end_ns)) + 1
-        steps = np.diff(stamps[first:last])
-        return len(steps) == 0 or bool(steps.max() <= gap_ns)
+        return bool(covered(samples.stamps_ns, (start_ns, end_ns), self._gap_ns, self._hold_ns))
 
     def _driven(self, start_ns: int, end_ns: int, source: Source) -> Motion:
         L_f, L_r = self._lengths
@@ -170,7 +164,9 @@ class WheelOdometry:
         error_deg = settings.articulation_std_deg if source == "articulated" else settings.unknown_articulation_deg
         along = math.hypot(self.scale_std * path_m, settings.speed_std_mps * (end_ns - start_ns) / 1e9)
         return Motion(
-            delta, _covariance(along, settings.side_slip_std * path_m, lever * math.radians(error_deg), delta), source
+            delta,
+            motion_covariance(along, settings.side_slip_std * path_m, lever * math.radians(error_deg), delta),
+            source,
         )
 
     def _reckoned(self, start_ns: int, end_ns: int) -> Motion | None:
@@ -184,7 +180,7 @@ class WheelOdometry:
         heading = math.hypot(settings.pose_turn_std * delta[2], math.radians(settings.pose_drift_deg) * path_m)
         floor_m = 1e-3  # resolution of the poses in logs
         along = math.hypot(settings.pose_distance_std * path_m, floor_m)
-        return Motion(delta, _covariance(along, along, math.hypot(heading, 1e-3), delta), "wheel_pose")
+        return Motion(delta, motion_covariance(along, along, math.hypot(heading, 1e-3), delta), "wheel_pose")
 
     def _pose_at(self, stamp_ns: int) -> FloatArray | None:
         """Return x, y, heading and stretch at a time, carried on from the last two where it is later; shape (4,)."""
@@ -203,20 +199,3 @@ class WheelOdometry:
         step = following - before
         step[2] = se2.wrap(step[2])
         return before + share * step
-
-
-def _covariance(along_m: float, across_m: float, heading_rad: float, delta: FloatArray) -> FloatArray:
-    """Return the covariance, shape (3, 3), of a motion whose heading error grows evenly along the way.
-
-    Then half of the final heading error acts across the chord: it moves the end sideways by half of the chord's length.
-    """
-    chord = np.array([delta[0], delta[1]])
-    direction = np.array([math.cos(0.5 * delta[2]), math.sin(0.5 * delta[2])])
-    side = np.array([-direction[1], direction[0]])
-    lever = 0.5 * np.array([-chord[1], chord[0]])
-    covariance = np.zeros((3, 3))
-    covariance[:2, :2] = along_m**2 * np.outer(direction, direction) + across_m**2 * np.outer(side, side)
-    covariance[:2, :2] += heading_rad**2 * np.outer(lever, lever)
-    covariance[:2, 2] = covariance[2, :2] = heading_rad**2 * lever
-    covariance[2, 2] = heading_rad**2
-    return covariance + np.diag([1e-10, 1e-10, 1e-10])
