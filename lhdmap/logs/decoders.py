@@ -35,6 +35,7 @@ _VECTOR = Layout("3d", 8)
 _QUATERNION = Layout("4d", 8)
 _POSE = Layout("7d", 8)
 _COMMAND = Layout("4d2B", 8)
+_MAX_METRES = 1e9
 _COVARIANCE_3X3 = Layout("9d", 8)
 
 
@@ -91,7 +92,7 @@ def _pose(cursor: Cursor) -> tuple[float, ...]:
     stamp, _ = cursor.header()
     cursor.text()
     pose = cursor.numbers(_POSE)
-    if not all(map(math.isfinite, pose)):
+    if not all(abs(value) < _MAX_METRES for value in pose):
         raise InputError("a pose that is not finite")
     return (stamp, *pose)
 
@@ -136,7 +137,7 @@ def _transform(cursor: Cursor) -> Mount:
     stamp, parent = cursor.header()
     child = cursor.text()
     pose = np.array(cursor.numbers(_POSE))
-    if not np.isfinite(pose).all() or not 0.5 < float(pose[3:] @ pose[3:]) < 2.0:
+    if not (np.abs(pose) < _MAX_METRES).all() or not 0.5 < float(pose[3:] @ pose[3:]) < 2.0:
         raise InputError(f"a transform to '{child}' that is no pose")
     return Mount(stamp, parent, child.lstrip("/"), se3.from_quaternion(pose[3:], pose[:3]))
 

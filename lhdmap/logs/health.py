@@ -16,11 +16,11 @@ from lhdmap.logs.formats import open_log
 from lhdmap.logs.inventory import Inventory, take_inventory
 from lhdmap.logs.scan_health import ScanWatch
 from lhdmap.logs.stamp_health import StampWatch
-from lhdmap.logs.topics import SCAN, assign_topics, missing_scanner
+from lhdmap.logs.topics import SCAN, assign_topics, is_ground_truth, missing_scanner
 from lhdmap.logs.value_health import ValueWatch
 from lhdmap.messages import LaserScan, Message, Record
 
-_KEY_SCAN_STEP_M = 0.5
+_KEY_SCAN_STEP_M, _KEY_SCAN_PERIOD_S = 0.5, 0.3
 # Wraps the records while they are read, for a progress display: reader and records in, records out.
 Progress = Callable[[LogReader, Iterator[Record]], Iterator[Record]]
 
@@ -100,6 +100,8 @@ def _roles(reader: LogReader, overrides: Mapping[str, str]) -> tuple[dict[str, s
 def _topic_findings(reader: LogReader, watches: _Watches) -> list[Finding]:
     found = []
     for topic, watch in watches.stamps.items():
+        if is_ground_truth(topic):
+            continue
         found += watch.findings(reader.stamps[topic], reader.start_ns or 0)
         found += watches.scans[topic].findings(watch.period_s, _stated_end(reader, topic))
         found += watches.values[topic].findings()
@@ -144,7 +146,9 @@ def _key_scans(roles: Mapping[str, str], watches: _Watches) -> list[Finding]:
     path_m = max((watch.path_m for watch in watches.values.values()), default=0.0)
     front = roles.get("front", "")
     count = watches.stamps[front].count if front in watches.stamps else 0
-    if count < 2 or path_m < _KEY_SCAN_STEP_M * count:
+    period_s = watches.stamps[front].period_s if count > 2 else None
+    quick = period_s is not None and 0.0 < period_s < _KEY_SCAN_PERIOD_S
+    if count < 2 or quick or path_m < _KEY_SCAN_STEP_M * count:
         return []
     text = f"key scans only: {path_m / count:.2f} m between scans"
     return [Finding(Severity.PROBLEM, front, text, "too far for odometry: build the map with given poses")]

@@ -49,14 +49,15 @@ def _fields(cursor: Cursor) -> dict[str, tuple[int, int]]:
         offset, kind = cursor.numbers(_FIELD)
         cursor.uint32()
         fields[name] = (int(offset), int(kind))
-    if not {"x", "y", "z"} <= fields.keys():
-        raise InputError(f"a cloud without x, y, z (it has {', '.join(fields) or 'no fields'})")
-    return fields
+    known = {name: field for name, field in fields.items() if field[1] in _KINDS}
+    if not {"x", "y", "z"} <= known.keys():
+        raise InputError("a cloud without x, y, z")
+    return known
 
 
 def _table(data: memoryview, shape: _Shape, fields: dict[str, tuple[int, int]], order: str) -> npt.NDArray[Any]:
     """Return a structured array of all points, shape (height * width,)."""
-    wanted = {n: f for n, f in fields.items() if n in ("x", "y", "z", *_TIME_FIELDS) and f[1] in _KINDS}
+    wanted = {name: field for name, field in fields.items() if name in ("x", "y", "z", *_TIME_FIELDS)}
     sizes = [offset + np.dtype(_KINDS[kind]).itemsize for offset, kind in wanted.values()]
     row_bytes = shape.width * shape.point_step
     row_step = shape.row_step if shape.height > 1 else row_bytes
@@ -70,6 +71,8 @@ def _table(data: memoryview, shape: _Shape, fields: dict[str, tuple[int, int]], 
             "itemsize": shape.point_step,
         }
     )
+    if not shape.height * shape.width:
+        return np.empty(0, kind)
     if row_step == row_bytes:
         return np.frombuffer(data, kind, shape.height * shape.width)
     rows = [np.frombuffer(data, kind, shape.width, row * row_step) for row in range(shape.height)]

@@ -42,7 +42,7 @@ class ValueWatch:
         if not values:
             return
         if isinstance(message, Inclination) and message.acceleration_mps2 is not None:
-            self._gravity_sum += float(np.linalg.norm(message.acceleration_mps2))
+            self._gravity_sum += math.hypot(*message.acceleration_mps2.tolist())
             self._gravity_count += 1
         if isinstance(message, (WheelPose, GroundTruth)) and self._count:
             step_m = math.hypot(values[0] - self._last[0], values[1] - self._last[1])

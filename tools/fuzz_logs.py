@@ -1,0 +1,274 @@
+"""Mutated logs against the readers: no crash, no hang, no memory blow-up, no error other than InputError.
+
+    python -m tools.fuzz_logs --count 10000
+
+writes one small log of each format, changes it at random (bytes flipped, overwritten, inserted, deleted, repeated,
+cut), reads each copy, and reports what went wrong. Each input has a time limit, the process a memory limit.
+"""
+
+from __future__ import annotations
+
+import argparse
+import random
+import resource
+import signal
+import sys
+import tempfile
+import time
+import warnings
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from types import FrameType
+
+import numpy as np
+from lhdmap.errors import InputError
+from lhdmap.logs import open_log
+from lhdmap.logs.health import examine
+from lhdmap.logs.ros_messages import definition, serialized
+from lhdmap.messages import (
+    Command,
+    GroundTruth,
+    Inclination,
+    Joints,
+    LaserScan,
+    Message,
+    Mount,
+    PointCloud,
+    Pressure,
+    Tachometer,
+    Text,
+    WheelPose,
+)
+from mcap.writer import CompressionType, Writer
+from rosbags.rosbag1 import Writer as BagWriter
+from rosbags.rosbag2 import StoragePlugin
+from rosbags.rosbag2 import Writer as Bag2Writer
+from rosbags.typesys import Stores, get_typestore
+
+START_NS = 1_700_000_000_000_000_000
+STEP_NS = 20_000_000
+SECONDS_PER_INPUT = 10.0
+MEMORY_BYTES = 2 << 30
+
+
+def sample_messages(count: int) -> Iterator[tuple[str, Message, int]]:
+    """Yield (topic, message, log time): a scan each step, the other topics in turn; each scan unique."""
+    yield "/tf_static", Mount(START_NS, "base_link", "front", np.eye(4)), START_NS
+    rng = np.random.default_rng(1)
+    for i in range(count):
+        stamp = START_NS + i * STEP_NS
+        ranges = rng.uniform(1.0, 30.0, 91).astype(np.float32)
+        yield "/lidar/front/scan", LaserScan(stamp, "front", -0.8, 0.0175, 1e-5, 0.1, 80.0, ranges), stamp
+        yield *_slow(i, stamp), stamp + 1000
+
+
+def _slow(i: int, stamp: int) -> tuple[str, Message]:
+    topics: list[tuple[str, Message]] = [
+        ("/inclinometer", Inclination(stamp, "front", 0.01, -0.02, np.zeros(3), np.array([0, 0, 9.8]))),
+        ("/machine/joints", Joints(stamp, {"articulation": 0.1 + i, "boom_lift": 0.2}, {})),
+        ("/machine/tachometer", Tachometer(stamp, 1.0 + i)),
+        ("/machine/pressure/lift", Pressure(stamp, 1e6 + i)),
+        ("/machine/command", Command(stamp, 0.5, 0.1, 0.0, 0.0, False, True)),
+        ("/operation/mode", Text(stamp, f"autonomous {i}")),
+        ("/odom", WheelPose(stamp, 0.1 * i, 0.0, 0.01)),
+        ("/ground_truth/odometry", GroundTruth(stamp, np.array([0.1 * i, 0, 0]), np.array([0, 0, 0, 1.0]))),
+        ("/lidar/points", PointCloud(stamp, "top", np.full((20, 3), i, np.float32), np.empty(0, np.float32))),
+    ]
+    return topics[i % len(topics)]
+
+
+def write_mcap(path: Path, count: int, compression: CompressionType, *, chunked: bool = True) -> Path:
+    """Write a small MCAP log; returns its path."""
+    channels: dict[str, int] = {}
+    with path.open("wb") as file:
+        writer = Writer(file, chunk_size=8192, compression=compression, use_chunking=chunked)
+        writer.start(profile="ros2", library="fuzz")
+        for topic, message, log_ns in sample_messages(count):
+            kind, data = serialized(message)
+            if topic not in channels:
+                schema = writer.register_schema(kind, "ros2msg", definition(kind).encode())
+                channels[topic] = writer.register_channel(topic, "cdr", schema)
+            writer.add_message(channels[topic], log_ns, data, log_ns)
+        writer.finish()  # type: ignore[no-untyped-call]
+    return path
+
+
+def write_bag(path: Path, count: int, compression: BagWriter.CompressionFormat | None) -> Path:
+    """Write a small ROS 1 bag of scans and speeds; returns its path."""
+    store, humble = get_typestore(Stores.ROS1_NOETIC), get_typestore(Stores.ROS2_HUMBLE)
+    kinds = {"/lidar/front/scan": "sensor_msgs/msg/LaserScan", "/machine/tachometer": "geometry_msgs/msg/TwistStamped"}
+    writer = BagWriter(path)
+    if compression is not None:
+        writer.set_compression(compression)
+    writer.chunk_threshold = 8192
+    with writer:
+        connections = {topic: writer.add_connection(topic, kind, typestore=store) for topic, kind in kinds.items()}
+        for topic, message, log_ns in sample_messages(count):
+            if topic in kinds:
+                cdr = serialized(message)[1]
+                humble_message = humble.deserialize_cdr(cdr, kinds[topic])
+                data = store.serialize_ros1(_with_seq(humble_message, store), kinds[topic])
+                writer.write(connections[topic], log_ns, data)
+    return path
+
+
+def _with_seq(message: object, store: object) -> object:
+    """Give the header of a ROS 2 message the sequence number that ROS 1 has."""
+    header_type = store.types["std_msgs/msg/Header"]  # type: ignore[attr-defined]
+    header = message.header  # type: ignore[attr-defined]
+    stamped = header_type(seq=0, stamp=header.stamp, frame_id=header.frame_id)
+    values = {name: getattr(message, name) for name in message.__dataclass_fields__ if name != "header"}  # type: ignore[attr-defined]
+    return store.types[message.__msgtype__](header=stamped, **values)  # type: ignore[attr-defined]
+
+
+def write_db3(path: Path, count: int) -> Path:
+    """Write a small ROS 2 bag folder at `path`; returns the path of the database in it."""
+    store = get_typestore(Stores.ROS2_HUMBLE)
+    known = set(store.types)
+    with Bag2Writer(path, version=9, storage_plugin=StoragePlugin.SQLITE3) as writer:
+        connections = {}
+        for topic, message, log_ns in sample_messages(count):
+            kind, data = serialized(message)
+            if kind not in known:
+                continue
+            if topic not in connections:
+                connections[topic] = writer.add_connection(topic, kind, typestore=store)
+            writer.write(connections[topic], log_ns, data)
+    return next(path.glob("*.db3"))
+
+
+def write_carmen(path: Path, count: int) -> Path:
+    """Write a small CARMEN log; returns its path."""
+    rng = np.random.default_rng(2)
+    lines = ["PARAM robot_frontlaser_offset 0.25 nohost 0"]
+    for i in range(count):
+        time_s = f"{976052857 + i}.{i % 1000:03d}250"
+        ranges = " ".join(f"{value:.2f}" for value in rng.uniform(1.0, 20.0, 181))
+        lines.append(f"ODOM {0.1 * i:.6f} 0.0 0.0 0.1 0.0 0.0 {time_s} nohost {i}.0")
+        lines.append(f"FLASER 181 {ranges} {0.1 * i:.6f} 0 0 {0.1 * i:.6f} 0 0 {time_s} nohost {i}.1")
+    path.write_text("\n".join(lines) + "\n")
+    return path
+
+
+def write_breezy(path: Path, count: int) -> Path:
+    """Write a small BreezySLAM log; returns its path."""
+    rng = np.random.default_rng(3)
+    rows = []
+    for i in range(count):
+        ranges = " ".join(str(value) for value in rng.integers(0, 5500, 682))
+        rows.append(f"{361431443 + 98000 * i} 1 {100 * i} {101 * i} {' 0' * 20} {ranges} 0")
+    path.write_text("\n".join(rows) + "\n")
+    return path
+
+
+Seed = Callable[[Path, int], Path]
+SEEDS: dict[str, Seed] = {
+    "mcap-zstd": lambda folder, count: write_mcap(folder / "zstd.mcap", count, CompressionType.ZSTD),
+    "mcap-lz4": lambda folder, count: write_mcap(folder / "lz4.mcap", count, CompressionType.LZ4),
+    "mcap-none": lambda folder, count: write_mcap(folder / "none.mcap", count, CompressionType.NONE),
+    "mcap-unchunked": lambda folder, count: write_mcap(
+        folder / "flat.mcap", count, CompressionType.NONE, chunked=False
+    ),
+    "bag-none": lambda folder, count: write_bag(folder / "none.bag", count, None),
+    "bag-lz4": lambda folder, count: write_bag(folder / "lz4.bag", count, BagWriter.CompressionFormat.LZ4),
+    "bag-bz2": lambda folder, count: write_bag(folder / "bz2.bag", count, BagWriter.CompressionFormat.BZ2),
+    "db3": lambda folder, count: write_db3(folder / "bag2", count),
+    "carmen": lambda folder, count: write_carmen(folder / "drive.clf", count),
+    "breezy": lambda folder, count: write_breezy(folder / "drive.dat", count),
+}
+
+
+def mutated(data: bytes, rng: random.Random) -> bytes:
+    """Return a copy with one to six random changes."""
+    out = bytearray(data)
+    for _ in range(rng.choice((1, 1, 2, 3, 6))):
+        at, size = rng.randrange(len(out)), min(rng.choice((1, 2, 4, 8, 64, 1000)), len(out) // 4)
+        kind = rng.randrange(7)
+        if kind == 0:
+            out[at] ^= 1 << rng.randrange(8)
+        elif kind == 1:
+            out[at : at + size] = rng.randbytes(len(out[at : at + size]))
+        elif kind == 2:
+            out[at : at + size] = rng.choice((b"\0", b"\xff", b"\x7f")) * len(out[at : at + size])
+        elif kind == 3:
+            out[at:at] = rng.randbytes(size)
+        elif kind == 4:
+            del out[at : at + size]
+        elif kind == 5:
+            out[at:at] = out[at : at + 8 * size]
+        else:
+            del out[max(at, 64) :]
+    return bytes(out)
+
+
+def read_all(path: Path) -> int:
+    """Examine a log, and read it; returns the number of messages, -1 where it is refused with an InputError."""
+    examine(path)
+    try:
+        with open_log(path) as reader:
+            reader.topics()
+            return sum(1 for _ in reader.records())
+    except InputError:
+        return -1
+
+
+def main() -> int:
+    """Run the fuzz and return 1 where anything went wrong."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--count", type=int, default=10_000, help="inputs of all formats together")
+    parser.add_argument("--messages", type=int, default=60, help="scans in the log that is mutated")
+    parser.add_argument("--seed", type=int, default=1, help="start of the random numbers")
+    arguments = parser.parse_args()
+    resource.setrlimit(resource.RLIMIT_AS, (MEMORY_BYTES, MEMORY_BYTES))
+    signal.signal(signal.SIGALRM, _too_slow)
+    warnings.simplefilter("error")
+    with tempfile.TemporaryDirectory() as folder:
+        return _fuzz(Path(folder), arguments.count, arguments.messages, arguments.seed)
+
+
+def _fuzz(folder: Path, count: int, messages: int, seed: int) -> int:
+    failures = 0
+    for number, (name, write) in enumerate(SEEDS.items()):
+        path = write(folder, messages)
+        whole, data = read_all(path), path.read_bytes()
+        share = count // len(SEEDS) + (number < count % len(SEEDS))
+        delivered, refused, slowest, failed = _fuzz_one(path, data, share, seed)
+        failures += failed
+        print(
+            f"{name:15} {share} inputs of {len(data)} bytes: {failed} failures, {refused} refused, "
+            f"{100 * delivered / max(whole * share, 1):.0f} % of the messages delivered, slowest {slowest:.2f} s"
+        )
+    peak_mib = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
+    print(f"peak memory {peak_mib:.0f} MiB, {failures} failures")
+    return 1 if failures else 0
+
+
+def _fuzz_one(path: Path, data: bytes, count: int, seed: int) -> tuple[int, int, float, int]:
+    target = path.with_name("mutated" + path.suffix)
+    delivered = refused = failed = 0
+    slowest = 0.0
+    for number in range(count):
+        rng = random.Random(f"{path.name} {seed} {number}")  # noqa: S311  # to repeat one input, not a secret
+        target.write_bytes(mutated(data, rng))
+        begin = time.monotonic()
+        signal.setitimer(signal.ITIMER_REAL, SECONDS_PER_INPUT)
+        try:
+            got = read_all(target)
+        except Exception as error:  # noqa: BLE001  # finding these is what the tool is for
+            failed += 1
+            print(f"FAILED {path.name} seed {seed} number {number}: {type(error).__name__}: {error}", file=sys.stderr)
+            continue
+        finally:
+            signal.setitimer(signal.ITIMER_REAL, 0.0)
+        slowest = max(slowest, time.monotonic() - begin)
+        refused += got < 0
+        delivered += max(got, 0)
+    return delivered, refused, slowest, failed
+
+
+def _too_slow(_number: int, _frame: FrameType | None) -> None:
+    raise TimeoutError(f"longer than {SECONDS_PER_INPUT} s")
+
+
+if __name__ == "__main__":
+    sys.exit(main())
