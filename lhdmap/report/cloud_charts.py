@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -37,7 +37,7 @@ def above_chart(points_m: Float32Array, path_m: FloatArray) -> Figure:
         raster.values,
         extent=raster.extent,
         origin="lower",
-        cmap="viridis",
+        cmap=_palette(),
         vmin=low,
         vmax=max(high, low + 0.1),
         interpolation="nearest",
@@ -59,7 +59,7 @@ def side_chart(points_m: Float32Array, path_m: FloatArray) -> Figure:
     figure = charts.new_figure(2.8)
     axes = figure.add_subplot()
     axes.imshow(
-        raster.values, extent=raster.extent, origin="lower", cmap="viridis", aspect="auto", interpolation="nearest"
+        raster.values, extent=raster.extent, origin="lower", cmap=_palette(), aspect="auto", interpolation="nearest"
     )
     axes.plot(path_along, path_z, color=charts.WHEELS, linewidth=1.2, label="path of base_link (floor)")
     low, high = np.percentile(points_m[::7, 2], [0.1, 99.9])
@@ -69,6 +69,14 @@ def side_chart(points_m: Float32Array, path_m: FloatArray) -> Figure:
     axes.grid(visible=False)
     charts.legend_above(axes)
     return figure
+
+
+def _palette() -> Any:
+    """Return viridis without its darkest part, which would vanish on dark ground."""
+    from matplotlib import colormaps
+    from matplotlib.colors import ListedColormap
+
+    return ListedColormap(colormaps["viridis"](np.linspace(0.15, 1.0, 256)))
 
 
 def unrolled(points_m: Float32Array, path_m: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:

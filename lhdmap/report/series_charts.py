@@ -36,7 +36,7 @@ def speed_chart(data: ReportData) -> Figure:
         panels[1].set(ylabel="slip, %", ylim=(min(1.2 * low, -5.0), max(1.2 * high, 5.0)))
         charts.legend_above(panels[1])
     panels[-1].set_xlabel("time since the first scan, s")
-    panels[-1].set_xlim(0.0, _seconds(data.trajectory.stamps_ns[-1:], data)[0])
+    panels[-1].set_xlim(0.0, max(float(_seconds(data.trajectory.stamps_ns[-1:], data)[0]), 1.0))
     charts.legend_above(panels[0])
     return figure
 
@@ -60,7 +60,7 @@ def information_chart(data: ReportData, diagnostics: Diagnostics) -> Figure:
     for axes in panels:
         axes.yaxis.set_label_coords(-0.055, 0.5)
     panels[-1].set_xlabel("time since the first scan, s")
-    panels[-1].set_xlim(0.0, _seconds(data.trajectory.stamps_ns[-1:], data)[0])
+    panels[-1].set_xlim(0.0, max(float(_seconds(data.trajectory.stamps_ns[-1:], data)[0]), 1.0))
     charts.legend_above(panels[0])
     return figure
 

@@ -1,0 +1,143 @@
+"""The Rerun recording, read back with Rerun's own reader: entities, times, points and curves are what went in."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from lhdmap.errors import InputError
+from lhdmap.integration.cloud import Cloud
+from lhdmap.machine import Machine
+from lhdmap.messages import Joints, LaserScan, Mount, Tachometer
+from lhdmap.report.log_recording import LogRecorder
+from lhdmap.report.recording import RecordingSettings, RecordingWriter, record_run
+
+from tests.report.synthetic import START_NS, drive, report_data
+
+
+def read(path: Path) -> dict[str, list[Any]]:
+    """Return the record batches of each entity of a recording; the layout is left out."""
+    from rerun.chunk import RrdReader
+
+    batches: dict[str, list[Any]] = {}
+    for chunk in RrdReader(path).stream():
+        batches.setdefault(str(chunk.entity_path).strip("/"), []).append(chunk.to_record_batch())
+    return batches
+
+
+def column(batches: list[Any], ending: str) -> list[Any]:
+    """Return the values of the column with that ending, over all batches."""
+    return [
+        value
+        for batch in batches
+        for name in batch.schema.names
+        if name.endswith(ending)
+        for value in batch.column(name).to_pylist()
+    ]
+
+
+def seconds(batches: list[Any]) -> list[float]:
+    """Return the times of all rows on the timeline `time`."""
+    import pyarrow as pa
+
+    return [
+        value / 1e9
+        for batch in batches
+        if "time" in batch.schema.names
+        for value in batch.column("time").cast(pa.int64()).to_pylist()
+    ]
+
+
+def count(batches: list[Any]) -> int:
+    return sum(len(points) for points in column(batches, ":positions"))
+
+
+def test_a_run_is_recorded_whole(tmp_path: Path) -> None:
+    data = report_data(scans=1000, points=5000)
+    with RecordingWriter(tmp_path / "r.rrd", "drive", START_NS) as writer:
+        record_run(writer, data, Machine())
+    found = read(tmp_path / "r.rrd")
+    assert data.cloud is not None
+    parts = [batches for entity, batches in found.items() if entity.startswith("map/cloud/")]
+    assert len(parts) == 90
+    assert sum(count(part) for part in parts) == len(data.cloud)
+    assert len(column(found["map/base_link"], ":translation")) == 1000
+    assert {"map/path/final", "map/path/odometry", "map/base_link/rear_link/rear_body"} <= found.keys()
+    assert seconds(found["scan_match/deviation/along"])[-1] == pytest.approx(19.92)
+    assert column(found["motion/slip"], ":scalars")[0][0] == pytest.approx(100 * data.diagnostics.slip[0])  # type: ignore[union-attr]
+    assert column(found["log"], ":text") == [[text] for text in data.warnings]
+
+
+def test_the_machine_moves_along_the_trajectory(tmp_path: Path) -> None:
+    path = drive(200)
+    with RecordingWriter(tmp_path / "r.rrd", "drive", START_NS) as writer:
+        writer.add_motion(path, Machine())
+    found = read(tmp_path / "r.rrd")["map/base_link"]
+    positions = np.array([value[0] for value in column(found, ":translation")])
+    assert np.abs(positions - path.positions_m).max() < 1e-5
+    assert np.abs(np.array(seconds(found)) - 0.02 * np.arange(200)).max() < 1e-9
+
+
+def test_points_appear_when_they_were_first_measured(tmp_path: Path) -> None:
+    stamps = START_NS + np.array([5, 1, 3]) * 1_000_000_000
+    cloud = Cloud(np.array([[5, 0, 0], [1, 0, 0], [3, 0, 0]], np.float32), stamps_ns=stamps)
+    with RecordingWriter(tmp_path / "r.rrd", "drive", START_NS, RecordingSettings(cloud_parts=3)) as writer:
+        writer.add_cloud(cloud)
+    found = read(tmp_path / "r.rrd")
+    for number, second in enumerate((1.0, 3.0, 5.0)):
+        part = found[f"map/cloud/{number:03d}"]
+        assert seconds(part) == [second]
+        assert column(part, ":positions") == [[[second, 0.0, 0.0]]]
+
+
+def test_scans_are_thinned_to_the_interval(tmp_path: Path) -> None:
+    with RecordingWriter(tmp_path / "r.rrd", "drive", START_NS, RecordingSettings(scan_interval_s=0.5)) as writer:
+        for number in range(100):
+            stamp = START_NS + number * 40_000_000
+            assert writer.wants_scan(stamp) == (number % 13 == 0)
+            writer.add_scan(stamp, np.ones((7, 3)))
+    found = read(tmp_path / "r.rrd")["map/scan/front"]
+    assert seconds(found) == pytest.approx([0.52 * i for i in range(8)])
+    assert count(found) == 56
+
+
+def test_an_interrupted_recording_can_be_read(tmp_path: Path) -> None:
+    def interrupted() -> None:
+        with RecordingWriter(tmp_path / "r.rrd", "drive", START_NS) as writer:
+            writer.add_scan(START_NS, np.ones((3, 3)))
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        interrupted()
+    assert count(read(tmp_path / "r.rrd")["map/scan/front"]) == 3
+
+
+def test_a_log_is_recorded_where_its_sensors_are_mounted(tmp_path: Path) -> None:
+    recorder = LogRecorder(tmp_path / "log.rrd", "log")
+    T_base_scanner = np.eye(4)
+    T_base_scanner[:3, 3] = [10.0, 0.0, 2.0]
+    recorder.update("tf_static", Mount(0, "base_link", "laser", T_base_scanner))
+    for number in range(20):
+        stamp = START_NS + number * 50_000_000
+        ranges = np.array([2.0, np.inf, 3.0], np.float32)
+        recorder.update("front", LaserScan(stamp, "laser", 0.0, np.pi / 4, 0.0, 0.1, 30.0, ranges))
+        recorder.update("tachometer", Tachometer(stamp, 1.5))
+        recorder.update("joints", Joints(stamp, {"articulation": np.pi / 6}, {}))
+    recorder.finish(["a remark"])
+    found = read(tmp_path / "log.rrd")
+    assert recorder.scans == 10
+    assert np.array(column(found["map/scan/front"], ":positions")[0]) == pytest.approx(
+        np.array([[12.0, 0.0, 2.0], [10.0, 3.0, 2.0]]), abs=1e-5
+    )
+    assert column(found["motion/speed/tachometer"], ":scalars") == [[1.5]] * 20
+    assert column(found["angles/articulation"], ":scalars")[0] == pytest.approx([30.0])
+    assert column(found["log"], ":text") == [["a remark"]]
+
+
+def test_a_log_without_scans_is_an_error(tmp_path: Path) -> None:
+    recorder = LogRecorder(tmp_path / "log.rrd", "empty.mcap")
+    recorder.update("tachometer", Tachometer(START_NS, 1.0))
+    with pytest.raises(InputError, match=r"empty.mcap: no scan"):
+        recorder.finish()

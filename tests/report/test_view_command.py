@@ -1,0 +1,74 @@
+"""`lhdmap view` through the entry point: what can be shown, and clear errors for what cannot."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from lhdmap.cli.main import main
+from lhdmap.logs.writer import LogWriter
+from lhdmap.messages import LaserScan
+from lhdmap.report.recording import RecordingWriter
+
+from tests.report.synthetic import START_NS
+
+
+@pytest.fixture
+def log(tmp_path: Path) -> Path:
+    path = tmp_path / "drive.mcap"
+    with LogWriter(path) as writer:
+        for number in range(30):
+            stamp = START_NS + number * 40_000_000
+            ranges = np.full(91, 3.0, np.float32)
+            writer.write("/lidar/front/scan", LaserScan(stamp, "laser", -1.57, 0.0349, 0.0, 0.1, 30.0, ranges))
+    return path
+
+
+@pytest.fixture
+def no_display(monkeypatch: pytest.MonkeyPatch) -> None:
+    for name in ("DISPLAY", "WAYLAND_DISPLAY"):
+        monkeypatch.delenv(name, raising=False)
+
+
+def test_no_display_says_what_else_there_is(log: Path, no_display: None, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["view", str(log)]) == 2
+    assert "--web" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("name", "text"), [("none.rrd", "no such file"), ("empty", "unknown format"), ("map", "no recording.rrd")]
+)
+def test_what_cannot_be_shown_is_an_error(
+    tmp_path: Path, name: str, text: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "map").mkdir()
+    (tmp_path / "map" / "map.json").write_text("{}")
+    (tmp_path / "empty").write_text("what is this")
+    assert main(["view", str(tmp_path / name), "--screenshot", str(tmp_path / "s.png")]) == 3
+    assert text in capsys.readouterr().err
+    assert not (tmp_path / "s.png").exists()
+
+
+def test_a_log_becomes_a_picture_or_an_error_that_names_the_driver(
+    tmp_path: Path, log: Path, no_display: None, capsys: pytest.CaptureFixture[str]
+) -> None:
+    picture, recording = tmp_path / "s.png", tmp_path / "kept.rrd"
+    code = main(["view", str(log), "--screenshot", str(picture), "-o", str(recording), "--json"])
+    output = capsys.readouterr()
+    assert recording.stat().st_size > 1000
+    if code == 0:
+        assert json.loads(output.out) == {"recording": str(recording), "screenshot": str(picture)}
+        assert picture.read_bytes().startswith(b"\x89PNG")
+    else:  # a machine without any Vulkan driver
+        assert (code, "mesa-vulkan-drivers" in output.err) == (3, True)
+
+
+def test_a_recording_is_not_overwritten(tmp_path: Path, log: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    with RecordingWriter(tmp_path / "old.rrd", "old", START_NS) as writer:
+        writer.add_text("old")
+    before = (tmp_path / "old.rrd").read_bytes()
+    assert main(["view", str(log), "--screenshot", str(tmp_path / "s.png"), "-o", str(tmp_path / "old.rrd")]) == 2
+    assert (tmp_path / "old.rrd").read_bytes() == before
+    assert "is there already" in capsys.readouterr().err
