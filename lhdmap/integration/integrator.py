@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -13,7 +14,7 @@ from lhdmap.errors import InputError
 from lhdmap.integration.beams import sweep_stamps_ns, table_of
 from lhdmap.integration.cloud import Cloud
 from lhdmap.integration.normals import estimate_normals
-from lhdmap.integration.project import Counts, SweepPoses, project_cloud, project_scan, sensor_pose
+from lhdmap.integration.project import Counts, SweepPoints, SweepPoses, project_cloud, project_scan
 from lhdmap.integration.self_filter import Rig, rig_of
 from lhdmap.integration.voxel_grid import VoxelGrid
 from lhdmap.machine import Machine
@@ -70,18 +71,6 @@ class IntegrationTotals:
     refused_sweeps: int = 0
 
 
-@dataclass(slots=True)
-class _Buffers:
-    """Room for the points of one sweep, reused."""
-
-    points: FloatArray = field(default_factory=lambda: np.empty((0, 3)))
-    shares: FloatArray = field(default_factory=lambda: np.empty(0))
-
-    def make_room(self, points: int) -> None:
-        if len(self.points) < points:
-            self.points, self.shares = np.empty((points, 3)), np.empty(points)
-
-
 class Integrator:
     """Puts sweeps into the map. The work is done without the interpreter's lock: it may run beside the odometry."""
 
@@ -92,7 +81,7 @@ class Integrator:
         self._rigs: dict[str, Rig] = {
             mount.child_frame: rig_of(mount, machine, settings.body_margin_m) for mount in mounts
         }
-        self._buffers = _Buffers()
+        self._room = SweepPoints.of_size(0)
 
     def update(self, message: LaserScan | PointCloud, poses: SweepPoses) -> Integrated:
         """Add one sweep; `poses` are those of the machine at `sweep_stamps_ns(message)`.
@@ -103,13 +92,13 @@ class Integrator:
             InputError: the sensor's frame has no mount.
         """
         rig = self._rig(message.frame_id)
-        if not all(np.isfinite(part).all() for part in poses):
+        poses = _plain(poses)
+        if not _finite(poses):
             self.totals.refused_sweeps += 1
-            return Integrated(self._buffers.points[:0], Counts(0, 0, 0))
+            return Integrated(self._room.points_map[:0], Counts(0, 0, 0))
         counts = self._project(message, poses, rig)
-        points = self._buffers.points[: counts.kept]
-        viewpoint = sensor_pose(poses.T_map_base_start, poses.articulation_start_rad, rig)[:3, 3]
-        self.grid.add(points, self._stamps(message, counts.kept), viewpoint)
+        points = self._room.points_map[: counts.kept]
+        self.grid.add(points, self._room.stamps_ns[: counts.kept], self._room.viewpoint_map)
         self._count(counts)
         return Integrated(points, counts)
 
@@ -134,19 +123,16 @@ class Integrator:
 
     def _project(self, message: LaserScan | PointCloud, poses: SweepPoses, rig: Rig) -> Counts:
         low_m, high_m = self.settings.range_min_m, self.settings.range_max_m
-        buffers = self._buffers
+        span_ns = sweep_stamps_ns(message)
+        size = len(message.ranges_m if isinstance(message, LaserScan) else message.points_m)
+        if len(self._room.stamps_ns) < size:
+            self._room = SweepPoints.of_size(size)
         if isinstance(message, LaserScan):
-            buffers.make_room(len(message.ranges_m))
             limits = (max(low_m, float(message.range_min_m)), min(high_m, float(message.range_max_m)))
             ranges = _readonly(message.ranges_m)
-            return Counts(*project_scan(ranges, table_of(message), limits, poses, rig, buffers.points, buffers.shares))
-        buffers.make_room(len(message.points_m))
+            return Counts(*project_scan(ranges, table_of(message), limits, span_ns, poses, rig, self._room))
         cloud, offsets = _readonly(message.points_m), _readonly(message.time_offsets_s)
-        return Counts(*project_cloud(cloud, offsets, (low_m, high_m), poses, rig, buffers.points, buffers.shares))
-
-    def _stamps(self, message: LaserScan | PointCloud, kept: int) -> npt.NDArray[np.int64]:
-        first_ns, last_ns = sweep_stamps_ns(message)
-        return first_ns + np.rint(self._buffers.shares[:kept] * (last_ns - first_ns)).astype(np.int64)
+        return Counts(*project_cloud(cloud, offsets, (low_m, high_m), span_ns, poses, rig, self._room))
 
     def _count(self, counts: Counts) -> None:
         totals = self.totals
@@ -154,6 +140,17 @@ class Integrator:
         totals.kept += counts.kept
         totals.no_return += counts.no_return
         totals.self_hits += counts.self_hits
+
+
+def _plain(poses: SweepPoses) -> SweepPoses:
+    """Return the poses with the types that the kernels were compiled for."""
+    start, end = (np.ascontiguousarray(T, dtype=np.float64) for T in poses[:2])
+    return SweepPoses(start, end, float(poses.articulation_start_rad), float(poses.articulation_end_rad))
+
+
+def _finite(poses: SweepPoses) -> bool:
+    total = poses.T_map_base_start.sum() + poses.T_map_base_end.sum()
+    return math.isfinite(total + poses.articulation_start_rad + poses.articulation_end_rad)
 
 
 def _readonly(array: npt.NDArray[np.float32]) -> npt.NDArray[np.float32]:

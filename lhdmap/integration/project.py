@@ -12,6 +12,7 @@ from typing import NamedTuple
 
 import numba as nb
 import numpy as np
+import numpy.typing as npt
 
 from lhdmap.integration.beams import BeamTable
 from lhdmap.integration.self_filter import Rig, base_to_rear, body_poses, in_boxes
@@ -25,6 +26,23 @@ class SweepPoses(NamedTuple):
     T_map_base_end: FloatArray
     articulation_start_rad: float
     articulation_end_rad: float
+
+
+class SweepPoints(NamedTuple):
+    """Room for the points of one sweep, filled by the kernels.
+
+    `points_map`: shape (N, 3), metres; `stamps_ns`: shape (N,); `viewpoint_map`: shape (3,), where the sensor was at the
+    start of the sweep.
+    """
+
+    points_map: FloatArray
+    stamps_ns: npt.NDArray[np.int64]
+    viewpoint_map: FloatArray
+
+    @classmethod
+    def of_size(cls, points: int) -> SweepPoints:
+        """Return room for so many points."""
+        return cls(np.empty((points, 3)), np.empty(points, dtype=np.int64), np.empty(3))
 
 
 class Counts(NamedTuple):
@@ -68,8 +86,8 @@ def _arc(poses: SweepPoses, rig: Rig) -> _Arc:
 
 
 @nb.njit(cache=True, nogil=True)
-def _put(out: FloatArray, n: int, arc: _Arc, share: float, point: tuple[float, float, float]) -> None:
-    """Write the sensor-frame `point`, measured at `share` (0-1) of the sweep, to out[n] in map coordinates."""
+def _put(points: FloatArray, n: int, arc: _Arc, share: float, point: tuple[float, float, float]) -> None:
+    """Write the sensor-frame `point`, measured at `share` (0-1) of the sweep, to points[n] in map coordinates."""
     x, y, z = point
     k = arc.axis
     a, b = math.sin(share * arc.angle), 1.0 - math.cos(share * arc.angle)
@@ -79,7 +97,9 @@ def _put(out: FloatArray, n: int, arc: _Arc, share: float, point: tuple[float, f
     uy = y + a * cy + b * (k[2] * cx - k[0] * cz)
     uz = z + a * cz + b * (k[0] * cy - k[1] * cx)
     for row in range(3):
-        out[n, row] = arc.R[row, 0] * ux + arc.R[row, 1] * uy + arc.R[row, 2] * uz + arc.t[row] + share * arc.shift[row]
+        points[n, row] = (
+            arc.R[row, 0] * ux + arc.R[row, 1] * uy + arc.R[row, 2] * uz + arc.t[row] + share * arc.shift[row]
+        )
 
 
 @nb.njit(cache=True, nogil=True)
@@ -87,10 +107,10 @@ def project_scan(
     ranges_m: Float32Array,
     beams: BeamTable,
     limits_m: tuple[float, float],
+    span_ns: tuple[int, int],
     poses: SweepPoses,
     rig: Rig,
-    out_points: FloatArray,
-    out_shares: FloatArray,
+    out: SweepPoints,
 ) -> Counts:
     """Project a scan into the map.
 
@@ -98,12 +118,13 @@ def project_scan(
         ranges_m: shape (N,); NaN, inf and values outside `limits_m` are no returns.
         beams: directions, each of shape (N,).
         limits_m: smallest and largest range.
-        poses: the machine at the first and at the last beam.
+        span_ns: times of the first and of the last beam.
+        poses: the machine at these times.
         rig: mount of the scanner and boxes of the bodies.
-        out_points: shape (>= N, 3), takes the kept points, metres in `map`.
-        out_shares: shape (>= N,), takes each kept point's time as a share (0-1) of the sweep.
+        out: room for at least N points, takes those that are kept.
     """
     arc = _arc(poses, rig)
+    out.viewpoint_map[:] = arc.t
     T_front, T_rear = body_poses(rig, 0.5 * (poses.articulation_start_rad + poses.articulation_end_rad))
     n, no_return, own = 0, 0, 0
     step = 1.0 / max(ranges_m.shape[0] - 1, 1)
@@ -118,8 +139,8 @@ def project_scan(
         ):
             own += 1
             continue
-        _put(out_points, n, arc, i * step, (x, y, 0.0))
-        out_shares[n] = i * step
+        _put(out.points_map, n, arc, i * step, (x, y, 0.0))
+        out.stamps_ns[n] = span_ns[0] + round(i * step * (span_ns[1] - span_ns[0]))
         n += 1
     return Counts(n, no_return, own)
 
@@ -129,13 +150,14 @@ def project_cloud(
     points_m: Float32Array,
     offsets_s: Float32Array,
     limits_m: tuple[float, float],
+    span_ns: tuple[int, int],
     poses: SweepPoses,
     rig: Rig,
-    out_points: FloatArray,
-    out_shares: FloatArray,
+    out: SweepPoints,
 ) -> Counts:
     """Project a 3D scanner's points, shape (N, 3), into the map; `offsets_s` (N,) or empty; else as `project_scan`."""
     arc = _arc(poses, rig)
+    out.viewpoint_map[:] = arc.t
     T_front, T_rear = body_poses(rig, 0.5 * (poses.articulation_start_rad + poses.articulation_end_rad))
     timed = offsets_s.shape[0] == points_m.shape[0] and offsets_s.shape[0] > 0
     first = np.float64(offsets_s.min()) if timed else 0.0
@@ -153,7 +175,7 @@ def project_cloud(
             own += 1
             continue
         share = (offsets_s[i] - first) / span if span > 0.0 else 0.0
-        _put(out_points, n, arc, share, (x, y, z))
-        out_shares[n] = share
+        _put(out.points_map, n, arc, share, (x, y, z))
+        out.stamps_ns[n] = span_ns[0] + round(share * (span_ns[1] - span_ns[0]))
         n += 1
     return Counts(n, no_return, own)

@@ -10,7 +10,7 @@ import pytest
 from lhdmap.errors import InputError
 from lhdmap.geometry import se3
 from lhdmap.integration.beams import beam_table, scan_points, sweep_stamps_ns, table_of
-from lhdmap.integration.project import Counts, SweepPoses, project_cloud, project_scan
+from lhdmap.integration.project import Counts, SweepPoints, SweepPoses, project_cloud, project_scan
 from lhdmap.integration.self_filter import Rig, base_to_rear, rear_to_base, rig_of, self_hits
 from lhdmap.kinematics import T_base_rear
 from lhdmap.machine import BodyBox, Machine
@@ -32,10 +32,10 @@ def no_angle(_: float) -> float:
 
 
 def projected(scan: LaserScan, poses: SweepPoses, rig: Rig) -> tuple[FloatArray, Counts]:
-    out, shares = np.empty((len(scan.ranges_m), 3)), np.empty(len(scan.ranges_m))
+    out = SweepPoints.of_size(len(scan.ranges_m))
     limits = (scan.range_min_m, scan.range_max_m)
-    counts = Counts(*project_scan(scan.ranges_m, table_of(scan), limits, poses, rig, out, shares))
-    return out[: counts.kept], counts
+    counts = Counts(*project_scan(scan.ranges_m, table_of(scan), limits, sweep_stamps_ns(scan), poses, rig, out))
+    return out.points_map[: counts.kept], counts
 
 
 @pytest.mark.parametrize(
@@ -129,12 +129,12 @@ def test_both_bodies_are_filtered_and_nothing_else(articulation: float) -> None:
     inside = in_bodies(machine, points_base, articulation, margin_m=0.1)
     assert 0.05 < inside.mean() < 0.6
     cloud = points_sensor.astype(np.float32)
-    out, shares = np.empty((4000, 3)), np.empty(4000)
+    out = SweepPoints.of_size(4000)
     rig = rig_of(mount, machine, 0.1)
     poses = SweepPoses(np.eye(4), np.eye(4), articulation, articulation)
-    counts = Counts(*project_cloud(cloud, np.zeros(0, np.float32), (0.0, 50.0), poses, rig, out, shares))
+    counts = Counts(*project_cloud(cloud, np.zeros(0, np.float32), (0.0, 50.0), (0, 0), poses, rig, out))
     assert counts.self_hits == int(inside.sum())
-    assert out[: counts.kept] == pytest.approx(points_base[~inside], abs=1e-5)
+    assert out.points_map[: counts.kept] == pytest.approx(points_base[~inside], abs=1e-5)
     assert np.array_equal(self_hits(rig, points_sensor, articulation), inside)
 
 
@@ -174,12 +174,12 @@ def test_a_clouds_points_are_compensated_by_their_own_times() -> None:
     cloud = np.array(seen)[:, :3].astype(np.float32)
     rig = rig_of(Mount(0, "base_link", "s", np.eye(4)), BARE, 0.0)
     poses = rooms.ends(turning, no_angle, 0.5 + first, last - first)
-    out, shares = np.empty((500, 3)), np.empty(500)
-    counts = Counts(*project_cloud(cloud, times, (0.0, 50.0), poses, rig, out, shares))
+    out = SweepPoints.of_size(500)
+    counts = Counts(*project_cloud(cloud, times, (0.0, 50.0), (700, 1_700), poses, rig, out))
     assert counts.kept == 500
-    assert np.abs(out - targets).max() < 2e-3  # roll, pitch and yaw together do not turn about one axis
-    assert shares.min() == 0.0
-    assert shares.max() == pytest.approx(1.0)
+    assert np.abs(out.points_map - targets).max() < 2e-3  # roll, pitch and yaw together do not turn about one axis
+    assert np.array_equal(out.stamps_ns, 700 + np.round((times - first) / (last - first) * 1000))
+    assert out.viewpoint_map == pytest.approx(turning(0.5 + first)[:3, 3], abs=1e-12)
 
 
 @pytest.mark.parametrize(
