@@ -13,7 +13,7 @@ import numpy.typing as npt
 from lhdmap.messages import FloatArray
 from lhdmap.simulation.centre_line import CentreLine
 from lhdmap.simulation.noise_field import Scales, noise_field
-from lhdmap.simulation.scenario import DriftSettings
+from lhdmap.simulation.sections import DriftSettings
 
 _UNDULATION = Scales(3, 4.0, 0.6)  # waves of about 8, 4 and 2 m: what a machine of 3.4 m wheelbase rides up and down
 _ROUGH_FLOOR = Scales(3, 0.4, 0.7)

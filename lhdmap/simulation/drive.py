@@ -15,7 +15,7 @@ from lhdmap.errors import UsageError
 from lhdmap.geometry import se3
 from lhdmap.messages import Float32Array, FloatArray, GroundTruth, LaserScan, Mount, Record
 from lhdmap.simulation import sensors
-from lhdmap.simulation.scanner import Beams, Rig, measured, rays_of
+from lhdmap.simulation.scanner import Beams, Rig, measured, obstructed, rays_of
 from lhdmap.simulation.scenario import DriftScenario, scenario_toml
 from lhdmap.simulation.world import DriftWorld
 from lhdmap.trajectory import Trajectory, write_tum
@@ -60,16 +60,19 @@ def simulate_drift(
     way into the log.
 
     Raises:
-        UsageError: a file to be written exists already.
+        UsageError: a file to be written exists already, or the log's name does not end in .mcap.
         InputError: the scenario's machine file cannot be read.
     """
     from lhdmap.logs.writer import LogWriter
 
+    if path.suffix != ".mcap":
+        raise UsageError(f"{path}: logs are written as MCAP, so a name that ends in .mcap was wanted")
     truth_file, scenario_file = path.with_suffix(".truth.tum"), path.with_suffix(".scenario.toml")
     for file in (path, truth_file, scenario_file, mesh_path):
         if file is not None and file.exists():
             raise UsageError(f"{file} exists already and is never overwritten: give another name with -o")
     world = DriftWorld(scenario)
+    path.parent.mkdir(parents=True, exist_ok=True)
     scenario_file.write_text(scenario_toml(scenario), encoding="utf-8")
     truth = truth_at(world, front_stamps(world))
     write_tum(truth_file, truth)
@@ -144,7 +147,7 @@ def scans(world: DriftWorld, stream: ScannerStream) -> Iterator[Record]:
     for first in range(0, len(stream.stamps_ns), BATCH_SCANS):
         stamps_ns = stream.stamps_ns[first : first + BATCH_SCANS]
         rng = np.random.default_rng([*stream.seed, first])
-        exact = exact_ranges(world, stream, stamps_ns)
+        exact = obstructed(exact_ranges(world, stream, stamps_ns), world.clock.seconds(stamps_ns), settings)
         ranges = measured(exact, settings, world.dust(stamps_ns), rng)
         for stamp, row in zip(stamps_ns.tolist(), ranges, strict=True):
             yield Record(

@@ -16,7 +16,7 @@ from lhdmap.messages import FloatArray
 from lhdmap.simulation.centre_line import STEP_M, CentreLine, beside
 from lhdmap.simulation.drift import Drift
 from lhdmap.simulation.noise_field import Scales, noise_field
-from lhdmap.simulation.scenario import DriveSettings
+from lhdmap.simulation.sections import DriveSettings
 from lhdmap.simulation.timetable import Timetable
 
 TABLE_RATE_HZ = 1000.0

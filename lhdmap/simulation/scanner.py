@@ -10,7 +10,9 @@ import numpy as np
 from lhdmap.machine import Machine, SensorMount
 from lhdmap.messages import Float32Array, FloatArray
 from lhdmap.simulation.ray_kernel import fill_rays
-from lhdmap.simulation.scenario import ScannerSettings
+from lhdmap.simulation.sections import ScannerSettings
+
+_PERSON_M = 1.2  # how near a person stands
 
 
 class Beams(NamedTuple):
@@ -69,6 +71,18 @@ def rays_of(
     parts = (rig.T_parent_sensor, rig.on_rear, rig.joint_m, rig.front_boxes_m, rig.rear_boxes_m)
     fill_rays(table, stamps_s, (beams.angles_rad, beams.times_s), parts, origin_m, rays, blocked)
     return rays, blocked
+
+
+def obstructed(exact_m: Float32Array, time_s: FloatArray, settings: ScannerSettings) -> Float32Array:
+    """Return exact ranges (S, N) as a person near by and blackouts leave them; `time_s` (S,) after the log's start."""
+    ranges = exact_m.copy()
+    for start_s, duration_s, share in settings.person:
+        during = (time_s >= start_s) & (time_s < start_s + duration_s)
+        beams = slice(0, round(share * ranges.shape[1]))
+        ranges[during, beams] = np.minimum(ranges[during, beams], np.float32(_PERSON_M))
+    for start_s, duration_s in settings.blackouts:
+        ranges[(time_s >= start_s) & (time_s < start_s + duration_s)] = np.inf
+    return ranges
 
 
 def measured(

@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from lhdmap.messages import FloatArray, Inclination, Joints, Pressure, Record, Tachometer, Text
 from lhdmap.simulation.driving import TABLE_RATE_HZ, Motion, interpolated
-from lhdmap.simulation.scenario import InclinometerSettings, WheelSettings
+from lhdmap.simulation.sections import InclinometerSettings, WheelSettings
 
 BOOM_LIFT_RAD, BUCKET_TILT_RAD = -0.35, 0.6  # tramming posture: boom down, bucket rolled back
 _PRESSURE_RATE_HZ = 20.0

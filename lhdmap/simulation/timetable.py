@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from lhdmap.messages import FloatArray
-from lhdmap.simulation.scenario import DriveSettings
+from lhdmap.simulation.sections import DriveSettings
 
 _STEP_M = 0.01
 

@@ -5,7 +5,8 @@ from __future__ import annotations
 from dataclasses import replace
 
 import pytest
-from lhdmap.simulation.scenario import DriftScenario, DriftSettings, DriveSettings
+from lhdmap.simulation.scenario import DriftScenario
+from lhdmap.simulation.sections import DriftSettings, DriveSettings
 from lhdmap.simulation.world import DriftWorld
 
 COARSE = DriftSettings(pieces=((18.0, 0.0, -10.0), (10.0, 9.0, 0.0), (10.0, -12.0, 6.0)), mesh_m=0.1)

@@ -15,7 +15,7 @@ from lhdmap.simulation.crossing import Crossing, side_drift
 from lhdmap.simulation.drift import Drift, Mesh
 from lhdmap.simulation.noise_field import Scales, noise_field
 from lhdmap.simulation.raycast import Surface
-from lhdmap.simulation.scenario import DriftSettings
+from lhdmap.simulation.sections import DriftSettings
 
 START = Start(5.0, -3.0, 1.0, 0.7)
 

@@ -12,7 +12,8 @@ from lhdmap.kinematics import T_base_rear
 from lhdmap.messages import FloatArray
 from lhdmap.simulation.driving import TABLE_RATE_HZ
 from lhdmap.simulation.raycast import Surface
-from lhdmap.simulation.scenario import DriftScenario, DriveSettings
+from lhdmap.simulation.scenario import DriftScenario
+from lhdmap.simulation.sections import DriveSettings
 from lhdmap.simulation.timetable import timetable
 from lhdmap.simulation.world import DriftWorld
 

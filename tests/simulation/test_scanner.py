@@ -10,8 +10,9 @@ import numpy.typing as npt
 import pytest
 from lhdmap.machine import Machine
 from lhdmap.simulation.drive import exact_ranges, scanner_stream
-from lhdmap.simulation.scanner import Beams, beams_of, measured, rays_of, rig_of
-from lhdmap.simulation.scenario import DriftScenario, ScannerSettings
+from lhdmap.simulation.scanner import Beams, beams_of, measured, obstructed, rays_of, rig_of
+from lhdmap.simulation.scenario import DriftScenario
+from lhdmap.simulation.sections import ScannerSettings
 from lhdmap.simulation.world import DriftWorld
 
 from tests.simulation.conftest import COARSE, SHORT
@@ -124,6 +125,14 @@ def test_mixed_pixels_lie_between_the_two_surfaces() -> None:
     assert between.min() > 3.0
     assert between.max() < 8.0
     assert between.mean() == pytest.approx(5.5, abs=0.4)
+
+
+def test_a_person_hides_beams_and_a_blackout_all() -> None:
+    settings = ScannerSettings(person=((2.0, 1.0, 0.5),), blackouts=((4.0, 3.0),))
+    ranges = obstructed(np.full((10, 381), 5.0, dtype=np.float32), np.arange(10.0), settings)
+    assert (ranges[2] < 2.0).mean() == pytest.approx(0.5, abs=0.01)
+    assert np.isinf(ranges[4:7]).all()
+    assert (ranges[[0, 1, 3, 7, 8, 9]] == 5.0).all()
 
 
 def blocked_by(machine: Machine, mount: str, bend_rad: float, angle_deg: float) -> float:

@@ -93,6 +93,7 @@ def test_options_go_over_the_scenario_file(tmp_path: Path) -> None:
         ["drift", "--roughness", "hairy"],
         ["drift", "--stop", "1"],
         ["drift", "--beams", "2"],
+        ["drift", "-o", "log.bag"],
         ["drift", "--seed", "-4"],
         ["drift", "--machine", "drift.toml", "--speed-kmh", "0"],
     ],

@@ -10,7 +10,7 @@ import pytest
 from lhdmap.messages import FloatArray, Inclination, Joints, Pressure, Record, Tachometer
 from lhdmap.simulation import sensors
 from lhdmap.simulation.driving import Motion
-from lhdmap.simulation.scenario import InclinometerSettings, WheelSettings
+from lhdmap.simulation.sections import InclinometerSettings, WheelSettings
 from lhdmap.simulation.sensors import Clock
 from lhdmap.simulation.world import DriftWorld
 
