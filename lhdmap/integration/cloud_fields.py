@@ -80,7 +80,7 @@ def _points(path: Path, table: Table) -> npt.NDArray[np.float32]:
 
 
 def _columns(table: Table, names: tuple[str, ...]) -> npt.NDArray[np.float32]:
-    with np.errstate(over="ignore"):
+    with np.errstate(over="ignore", invalid="ignore"):
         return np.stack([table[name].astype(np.float32) for name in names], axis=-1)
 
 
@@ -100,7 +100,8 @@ def text_table(path: Path, body: bytes, dtype: np.dtype[np.void], count: int) ->
     for name in names:
         width, base = _width(dtype, name), dtype[name].base
         try:
-            values = [np.array(words[at + k :: columns]).astype(base) for k in range(width)]
+            with np.errstate(over="ignore", invalid="ignore"):  # becomes inf: no valid point
+                values = [np.array(words[at + k :: columns]).astype(base) for k in range(width)]
         except (ValueError, OverflowError):
             raise InputError(f"{path}: field '{name}' holds something that is no number of type {base}") from None
         table[name] = np.stack(values, axis=-1).reshape(table[name].shape)

@@ -114,8 +114,8 @@ def _dtype(entries: dict[str, list[str]]) -> np.dtype[np.void]:
 def _decompressed(path: Path, body: memoryview, header: _Header) -> Table:
     """Return the table of LZF data, in which each field stands by itself for all points."""
     wanted = header.points * header.dtype.itemsize
-    sizes = np.frombuffer(body[:8], dtype="<u4")
-    if len(sizes) < 2 or len(body) - 8 < int(sizes[0]):
+    sizes = np.frombuffer(body[:8] if len(body) >= 8 else bytes(8), dtype="<u4")
+    if len(body) < 8 or len(body) - 8 < int(sizes[0]):
         raise InputError(f"{path}: cut off: the compressed block is not complete")
     if int(sizes[1]) < wanted or wanted > LZF_GROWTH * int(sizes[0]):
         raise InputError(f"{path}: damaged: {int(sizes[1])} bytes for {header.points} points, {wanted} were wanted")

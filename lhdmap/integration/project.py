@@ -31,8 +31,8 @@ class SweepPoses(NamedTuple):
 class SweepPoints(NamedTuple):
     """Room for the points of one sweep, filled by the kernels.
 
-    `points_map`: shape (N, 3), metres; `stamps_ns`: shape (N,); `viewpoint_map`: shape (3,), where the sensor was at the
-    start of the sweep.
+    `points_map`: shape (N, 3), metres; `stamps_ns`: shape (N,); `viewpoint_map`: shape (3,), where the sensor was at
+    the start of the sweep.
     """
 
     points_map: FloatArray

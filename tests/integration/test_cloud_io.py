@@ -188,6 +188,7 @@ PCD = "FIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nCOUNT 1 1 1\nPOINTS 2\nDATA ascii\n
         ("a.pcd", PCD.replace("POINTS 2", "POINTS -2"), "promises"),
         ("a.pcd", PCD.replace("POINTS 2\n", ""), "damaged"),
         ("a.pcd", PCD.replace("ascii", "binary_compressed"), "cut off"),
+        ("a.pcd", PCD.replace("ascii", "binary_compressed") + "12345", "cut off"),
         ("a.xyz", "1 2 3\n", ".ply, .pcd"),
     ],
 )
