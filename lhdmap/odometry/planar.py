@@ -7,17 +7,19 @@ import math
 import numpy as np
 
 from lhdmap.messages import FloatArray, LaserScan
-from lhdmap.odometry.anchored import Anchored, AnchoredMatcher
+from lhdmap.odometry.anchored import AnchoredMatcher
+from lhdmap.odometry.flow_matcher import FlowMatcher
+from lhdmap.odometry.motion import FORWARD, TURNING, Motion
 from lhdmap.odometry.scan_points import NO_BOXES, planar_points
-from lhdmap.odometry.settings import AnchorSettings, OdometrySettings, SearchSettings
-from lhdmap.odometry.steps import OdometryStep, WheelSpeed, body_information, marginal_information
+from lhdmap.odometry.settings import AnchorSettings, OdometrySettings, RangeFlowSettings, SearchSettings
+from lhdmap.odometry.steps import Matched, OdometryStep, WheelSpeed, body_information, marginal_information
 
-_LONGEST_STEP_S = 1.0
+_FIRST_SCANS = 10
 _NO_WHEELS = WheelSpeed(None, None)
 
 
 class PlanarOdometry:
-    """Anchored odometry with an adaptive frame rate.
+    """Odometry with an adaptive frame rate: motion model, then a matcher (`settings.method`) that corrects it.
 
     `update` takes scans in time order with the pose of the sensor in the machine's level frame, and the wheels' speeds since
     the scan before where there are any.
@@ -28,13 +30,23 @@ class PlanarOdometry:
         settings: OdometrySettings | None = None,
         anchor: AnchorSettings | None = None,
         wide: SearchSettings | None = None,
+        range_flow: RangeFlowSettings | None = None,
     ) -> None:
         self._settings = settings or OdometrySettings()
-        self._matcher = AnchoredMatcher(self._settings, anchor or AnchorSettings(), wide or SearchSettings())
+        self._motion = Motion(self._settings)
+        self._matcher: AnchoredMatcher | FlowMatcher
+        if self._settings.method == "range_flow":
+            self._matcher = FlowMatcher(self._motion, self._settings, range_flow or RangeFlowSettings())
+        else:
+            self._matcher = AnchoredMatcher(
+                self._motion,
+                self._settings,
+                anchor or AnchorSettings(),
+                wide or SearchSettings(),
+                range_flow or RangeFlowSettings(),
+            )
         self._last_ns: int | None = None
-        self._since_s = 0.0
-        self._since = np.zeros(2)  # travel and turn since the last processed scan
-        self._processed = 0
+        self._rate = AdaptiveRate(self._settings)
         self._wheels_used = False
 
     def update(
@@ -42,58 +54,37 @@ class PlanarOdometry:
     ) -> OdometryStep:
         """Process one scan; `T_level_sensor` (4, 4): mount and attitude; `boxes_m` (K, 6): the machine's own bodies."""
         dt_s = self._elapsed(scan.stamp_ns)
-        self._advance(dt_s, wheels)
-        if not self._due():
+        self._fuse(wheels)
+        self._motion.predict(dt_s)
+        if not self._rate.due(dt_s, self._motion.velocity):
             return self._step(scan.stamp_ns, None)
         floor_m = self._settings.min_height_m if T_level_sensor[2, 3] > 2.0 * self._settings.min_height_m else -math.inf
-        points = planar_points(scan, T_level_sensor, self._matcher.velocity, floor_m, boxes_m)
-        result = self._matcher.step(points)
-        self._processed += 1
-        step = self._step(scan.stamp_ns, result)
-        self._since_s, self._since[:] = 0.0, 0.0
-        return step
+        points = planar_points(scan, T_level_sensor, self._motion.velocity, floor_m, boxes_m)
+        return self._step(scan.stamp_ns, self._matcher.step(points, _planar_mount(T_level_sensor)))
 
     def _elapsed(self, stamp_ns: int) -> float:
         """Return the time since the scan before; a stamp that runs backwards counts as no time."""
         previous, self._last_ns = self._last_ns, stamp_ns if self._last_ns is None else max(stamp_ns, self._last_ns)
         return 0.0 if previous is None else max(stamp_ns - previous, 0) * 1e-9
 
-    def _advance(self, dt_s: float, wheels: WheelSpeed) -> None:
-        s = self._settings
-        before = self._matcher.state[:3].copy()
+    def _fuse(self, wheels: WheelSpeed) -> None:
+        self._wheels_used = False
         if wheels.forward_mps is not None:
-            self._wheels_used = self._matcher.fuse_speed(3, wheels.forward_mps, s.wheel_noise_mps, scaled=True)
+            self._wheels_used = self._motion.fuse_speed(FORWARD, wheels.forward_mps, self._settings.wheel_noise_mps, scaled=True)
         if wheels.turning_rps is not None:
-            self._matcher.fuse_speed(5, wheels.turning_rps, s.wheel_turn_noise_rps, scaled=False)
-        # After a long gap the old speed says little: the model runs for a second at most, its uncertainty for the whole gap.
-        self._matcher.predict(min(dt_s, _LONGEST_STEP_S))
-        if dt_s > _LONGEST_STEP_S:
-            self._matcher.P[3:6, 3:6] += np.diag([4.0, 0.1, 0.5])
-        self._since += [np.hypot(*(self._matcher.state[:2] - before[:2])), abs(self._matcher.state[5]) * dt_s]
-        self._since_s += dt_s
+            self._motion.fuse_speed(TURNING, wheels.turning_rps, self._settings.wheel_turn_noise_rps, scaled=False)
 
-    def _due(self) -> bool:
-        """Adaptive rate: process once the machine has moved, turned or waited enough; the first scans always."""
-        s = self._settings
-        return (
-            self._processed < 10
-            or self._since[0] >= s.step_m
-            or self._since[1] >= math.radians(s.step_deg)
-            or self._since_s >= s.step_s
-        )
-
-    def _step(self, stamp_ns: int, result: Anchored | None) -> OdometryStep:
-        pose, velocity = self._matcher.state[:3].copy(), self._matcher.velocity.copy()
-        covariance = self._covariance()
-        if result is None:
-            return OdometryStep(
-                stamp_ns, pose, covariance, velocity, np.zeros(3), math.nan, math.nan, False, "", False, False
-            )
-        information = marginal_information(body_information(result.information, pose[2]))
-        weak = self._weak(information) or result.lost
+    def _step(self, stamp_ns: int, matched: Matched | None) -> OdometryStep:
+        pose, velocity = self._motion.pose, self._motion.velocity
+        covariance = body_information(self._motion.P[:3, :3], pose[2])
+        if matched is None:
+            return OdometryStep(stamp_ns, pose, covariance, velocity, np.zeros(3), math.nan, math.nan, False, "", False, False)
+        information = marginal_information(body_information(matched.information, pose[2]))
+        weak = self._weak(information) or matched.lost
         substitute = ("wheels" if self._wheels_used else "motion") if weak else ""
         return OdometryStep(
-            stamp_ns, pose, covariance, velocity, information, result.residual_m, result.support, weak, substitute, True, result.lost
+            stamp_ns, pose, covariance, velocity, information, matched.residual_m, matched.support, weak, substitute, True,
+            matched.lost,
         )
 
     def _weak(self, information: FloatArray) -> bool:
@@ -101,6 +92,29 @@ class PlanarOdometry:
         limits = np.array([s.weak_sigma_m, s.weak_sigma_m, math.radians(s.weak_sigma_deg)])
         return bool((information * limits**2 < 1.0).any())
 
-    def _covariance(self) -> FloatArray:
-        heading = float(self._matcher.state[2])
-        return body_information(self._matcher.P[:3, :3], heading)
+
+def _planar_mount(T_level_sensor: FloatArray) -> FloatArray:
+    """Return the scanner's planar pose (3,) in the level base frame."""
+    return np.array([T_level_sensor[0, 3], T_level_sensor[1, 3], math.atan2(T_level_sensor[1, 0], T_level_sensor[0, 0])])
+
+
+class AdaptiveRate:
+    """Decides which scans are processed: those after enough travel, turn or time; the first ones always."""
+
+    def __init__(self, settings: OdometrySettings) -> None:
+        self._settings = settings
+        self._travel_m = self._turn_rad = self._wait_s = 0.0
+        self._processed = 0
+
+    def due(self, dt_s: float, velocity: FloatArray) -> bool:
+        """Return whether the scan that comes `dt_s` after the one before is to be processed at this velocity (3,)."""
+        s = self._settings
+        self._travel_m += float(np.hypot(velocity[0], velocity[1])) * dt_s
+        self._turn_rad += abs(float(velocity[2])) * dt_s
+        self._wait_s += dt_s
+        moved = self._travel_m >= s.step_m or self._turn_rad >= math.radians(s.step_deg) or self._wait_s >= s.step_s
+        if not moved and self._processed >= _FIRST_SCANS:
+            return False
+        self._travel_m = self._turn_rad = self._wait_s = 0.0
+        self._processed += 1
+        return True

@@ -77,6 +77,10 @@ class AnchorSettings:
         source="measured in smooth walls",
     )
     rounds: int = setting(4, doc="Times that lines are fitted anew in one match at most.", minimum=1, maximum=20)
+    young_m: float = setting(
+        0.6, unit="m", doc="Travel after a start within which scans are placed by range flow against the first: one scan is no map.",
+        source="measured: heading after the start 0.007 deg, not 0.03", minimum=0.0,
+    )
     min_support: float = setting(
         0.35, doc="Share of hits that must agree with the map; below it the surroundings are searched.", minimum=0.0, maximum=1.0
     )
@@ -98,10 +102,13 @@ class RangeFlowSettings:
     """Range flow between pairs of scans with an adaptive frame rate."""
 
     spacing_m: float = setting(
-        0.9, unit="m", doc="Travel between reference scans.", minimum=0.05, source="measured: 0.75-1 m (docs/odometry.md)"
+        0.7, unit="m", doc="Travel between reference scans.", minimum=0.05, source="measured: 0.75-1 m (docs/odometry.md)"
     )
     spacing_deg: float = setting(15.0, unit="deg", doc="Turn between reference scans.", minimum=1.0, source="measured")
-    references: int = setting(1, doc="Earlier reference scans that a scan is compared with (1: pairs alone).", minimum=1, maximum=5)
+    references: int = setting(
+        2, doc="Earlier reference scans that a scan is compared with (1: pairs alone).", minimum=1, maximum=5, source="measured"
+    )
+    min_support: float = setting(0.25, doc="Share of beams that must agree; below it a new chain begins.", minimum=0.0, maximum=1.0)
     width_m: float = setting(
         0.08, unit="m", doc="Half width of the least squares lines that give ranges and gradients.", minimum=0.01,
         source="measured: 0.03-0.12 m alike (docs/odometry.md)",

@@ -9,12 +9,24 @@ import numpy as np
 
 from lhdmap.messages import FloatArray
 
+BY_DEFINITION = 1e8 * np.eye(3)  # information of the pose that defines a frame
+
 
 class WheelSpeed(NamedTuple):
     """Body speeds by the wheels, mean since the scan before: forward and turning, with `None` for what is not measured."""
 
     forward_mps: float | None
     turning_rps: float | None
+
+
+class Matched(NamedTuple):
+    """What a matcher says of one scan: `information` (3, 3) of the scan alone in `odom` axes, residual, share of hits that
+    agree, and whether the scan could not be placed (the pose is then the prediction)."""
+
+    information: FloatArray
+    residual_m: float
+    support: float
+    lost: bool
 
 
 class OdometryStep(NamedTuple):

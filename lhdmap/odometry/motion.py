@@ -1,0 +1,61 @@
+"""The motion model as an object: prediction, wheel speeds, correction by matched poses."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from lhdmap.messages import FloatArray
+from lhdmap.odometry import motion_filter
+from lhdmap.odometry.settings import OdometrySettings
+
+FORWARD, LATERAL, TURNING = 3, 4, 5
+_GATE_SIGMAS = 4.0
+_LONGEST_STEP_S = 1.0
+_GAP_VARIANCE = np.diag([4.0, 0.1, 0.5])
+
+
+class Motion:
+    """State and covariance of `motion_filter`: shared by the odometry and the matcher that corrects it."""
+
+    def __init__(self, settings: OdometrySettings) -> None:
+        self._accelerations = np.array(
+            [settings.forward_acceleration, settings.lateral_acceleration, settings.turning_acceleration]
+        )
+        self.state, self.P = motion_filter.initial(np.zeros(3))
+
+    @property
+    def pose(self) -> FloatArray:
+        """Pose of `base_link` in `odom`, shape (3,), a copy."""
+        return self.state[:3].copy()
+
+    @property
+    def velocity(self) -> FloatArray:
+        """Forward, lateral, turning speed, shape (3,), a copy."""
+        return self.state[3:6].copy()
+
+    @property
+    def prior_information(self) -> FloatArray:
+        """Inverse of the pose's covariance, shape (3, 3)."""
+        return np.linalg.inv(self.P[:3, :3] + 1e-12 * np.eye(3))
+
+    def predict(self, dt_s: float) -> None:
+        """Move on by `dt_s`. After a long gap the old speed says little: the model runs for a second at most."""
+        motion_filter.predict(self.state, self.P, min(dt_s, _LONGEST_STEP_S), self._accelerations)
+        if dt_s > _LONGEST_STEP_S:
+            self.P[3:6, 3:6] += _GAP_VARIANCE
+
+    def fuse_speed(self, axis: int, measured: float, sigma: float, *, scaled: bool) -> bool:
+        """Fuse a wheel speed; False where it contradicts the motion (slip) and was left out.
+
+        With `scaled` the wheels' scale is part of the state and learned.
+        """
+        nis = motion_filter.update_speed(self.state, self.P, axis, measured, sigma**2, scaled, _GATE_SIGMAS)
+        return bool(nis <= _GATE_SIGMAS**2)
+
+    def correct(self, matched: FloatArray, information: FloatArray) -> None:
+        """Take over the matched pose (3,), found under the prior, with the match's own `information` (3, 3)."""
+        motion_filter.update_pose(self.state, self.P, matched, information)
+
+    def forget(self, share: float) -> None:
+        """Shrink the pose's uncertainty by a share: what it is relative to was renewed."""
+        motion_filter.forget_pose(self.P, share)
