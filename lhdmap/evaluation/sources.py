@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import bz2
 import gzip
+import warnings
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
@@ -11,7 +12,7 @@ from typing import Any, TextIO
 
 import numpy as np
 
-from lhdmap.errors import InputError
+from lhdmap.errors import InputError, LhdmapWarning
 from lhdmap.geometry.se3 import quaternions_from_rpy
 from lhdmap.messages import GroundTruth
 from lhdmap.trajectory import Trajectory, read_tum, seconds_to_ns
@@ -77,9 +78,10 @@ def read_corrected_carmen(path: Path) -> Trajectory:
     Raises:
         InputError: the file is missing, has no such line, or one is broken.
     """
-    stamps, poses = [], []
+    stamps, poses, has_graph = [], [], False
     with _text(path) as file:
         for number, line in enumerate(file, 1):
+            has_graph = has_graph or line.startswith("VERTEX2 ")
             if not line.startswith("ROBOTLASER1 "):
                 continue
             stamp, *pose = _corrected_pose(path, number, line.split())
@@ -87,6 +89,9 @@ def read_corrected_carmen(path: Path) -> Trajectory:
             poses.append(pose)
     if not poses:
         raise InputError(f"{path}: no ROBOTLASER1 line in it; a corrected CARMEN log (poses of key scans) was wanted")
+    if not has_graph:
+        text = f"{path}: no pose graph (VERTEX2) in it; its poses may be those of the wheels, which are no truth"
+        warnings.warn(text, LhdmapWarning, stacklevel=2)
     x, y, heading = np.array(poses).T
     zero = np.zeros(len(x))
     return Trajectory(

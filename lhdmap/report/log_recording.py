@@ -9,6 +9,8 @@ import numpy as np
 
 from lhdmap.errors import InputError
 from lhdmap.integration.beams import scan_points
+from lhdmap.kinematics import T_base_rear
+from lhdmap.machine import Machine
 from lhdmap.messages import FloatArray, Inclination, Joints, LaserScan, Message, Mount, PointCloud, Tachometer
 from lhdmap.report.recording import RecordingSettings, RecordingWriter
 from lhdmap.report.recording_layout import LOG_CURVES
@@ -30,16 +32,19 @@ class LogRecorder:
         self.scans = 0
         self._path, self._title = path, title
         self._writer: RecordingWriter | None = None
-        self._mounts: dict[str, FloatArray] = {}
+        self._mounts: dict[str, Mount] = {}
+        self._machine, self._articulation_rad = Machine(), 0.0
         self._curves: dict[str, list[tuple[int, float]]] = {}
 
     def update(self, role: str, message: Message) -> None:
         """Record a scan, ten a second, or keep what is drawn as a curve."""
         if isinstance(message, Mount):
-            self._mounts[message.child_frame] = message.T_parent_child
+            self._mounts[message.child_frame] = message
         elif isinstance(message, (LaserScan, PointCloud)):
             self._add_scan(role, message)
         else:
+            if isinstance(message, Joints):
+                self._articulation_rad = message.positions_rad.get("articulation", self._articulation_rad)
             for entity, value in _values(message):
                 self._curves.setdefault(entity, []).append((message.stamp_ns, value))
 
@@ -65,12 +70,24 @@ class LogRecorder:
             self._writer = RecordingWriter(self._path, self._title, message.stamp_ns, settings)
             self._writer.curves = LOG_CURVES
         if self._writer.wants_scan(message.stamp_ns, role):
-            T_base_sensor = self._mounts.get(message.frame_id, np.eye(4))
+            T_base_sensor = self._pose(message.frame_id)
             points = _points(message) @ T_base_sensor[:3, :3].T + T_base_sensor[:3, 3]
             self._writer.add_scan(message.stamp_ns, points, role)
             self.scans += 1
             if len(points) and self.scans % 20 == 1:
                 self._writer.widen(np.percentile(points, [10, 90], axis=0))
+
+    def _pose(self, frame: str) -> FloatArray:
+        """Return the pose of a frame in base_link, shape (4, 4): its mounts one after the other, the joint as it is."""
+        T_base_frame = np.eye(4)
+        for _ in range(len(self._mounts)):
+            if frame not in self._mounts:
+                break
+            T_base_frame = self._mounts[frame].T_parent_child @ T_base_frame
+            frame = self._mounts[frame].parent_frame
+        return (
+            T_base_rear(self._articulation_rad, self._machine) @ T_base_frame if frame == "rear_link" else T_base_frame
+        )
 
 
 def _points(message: LaserScan | PointCloud) -> FloatArray:

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from lhdmap.errors import InputError
+from lhdmap.errors import InputError, LhdmapWarning
 from lhdmap.evaluation.sources import load_estimate, load_truth
 from lhdmap.logs.writer import LogWriter
 from lhdmap.messages import GroundTruth, LaserScan
@@ -60,6 +60,12 @@ def test_robot_pose_and_stamp_of_a_corrected_carmen_log(tmp_path: Path, remissio
     assert found.stamps_ns.tolist() == [976053557767360000 + 1000 * i for i in range(3)]
     assert found.positions_m.tolist() == [[0, 2, 0], [1, 2, 0], [2, 2, 0]]
     assert found.quaternions_xyzw[0] == pytest.approx([0, 0, np.sin(0.25), np.cos(0.25)])
+
+
+def test_poses_without_a_graph_may_be_the_wheels(tmp_path: Path) -> None:
+    (tmp_path / "raw.log").write_text(LINE.format(remissions="0", pose="1.0 2.0 0.5", stamp="1.5") * 2)
+    with pytest.warns(LhdmapWarning, match="may be those of the wheels"):
+        assert len(load_truth(tmp_path / "raw.log").stamps_ns) == 2
 
 
 def test_broken_corrected_logs_are_named(tmp_path: Path) -> None:

@@ -136,6 +136,21 @@ def test_a_log_is_recorded_where_its_sensors_are_mounted(tmp_path: Path) -> None
     assert column(found["log"], ":text") == [["a remark"]]
 
 
+def test_a_rear_scanner_follows_the_joint(tmp_path: Path) -> None:
+    recorder = LogRecorder(tmp_path / "log.rrd", "log")
+    T_rear_plate, T_plate_scanner = np.eye(4), np.eye(4)
+    T_rear_plate[0, 3], T_plate_scanner[0, 3] = -2.0, -1.0
+    recorder.update("tf_static", Mount(0, "rear_link", "plate", T_rear_plate))
+    recorder.update("tf_static", Mount(0, "plate", "laser", T_plate_scanner))
+    recorder.update("joints", Joints(START_NS, {"articulation": np.pi / 2}, {}))
+    ranges = np.array([1.0], np.float32)
+    recorder.update("rear", LaserScan(START_NS, "laser", 0.0, 0.1, 0.0, 0.1, 30.0, ranges))
+    recorder.finish()
+    found = column(read(tmp_path / "log.rrd")["map/scan/rear"], ":positions")[0][0]
+    # bent by 90 degrees to the left, the rear body points to the left of the joint: 1.7 m to its axle, 2 m further back
+    assert found == pytest.approx([-1.7, 1.7 + 2.0, 0.0], abs=1e-5)
+
+
 def test_a_log_without_scans_is_an_error(tmp_path: Path) -> None:
     recorder = LogRecorder(tmp_path / "log.rrd", "empty.mcap")
     recorder.update("tachometer", Tachometer(START_NS, 1.0))
