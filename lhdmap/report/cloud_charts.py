@@ -18,6 +18,7 @@ if TYPE_CHECKING:
 
 LONGEST_IMAGE_PX = 1100
 PATH_STEP_M = 0.5
+FLAT_M = 0.05
 
 
 class Raster(NamedTuple):
@@ -27,12 +28,20 @@ class Raster(NamedTuple):
     extent: tuple[float, float, float, float]
 
 
+def is_flat(points_m: Float32Array) -> bool:
+    """Return whether all points are at one height, as those of a level 2D scanner on a level floor are."""
+    return float(np.ptp(points_m[:, 2])) < FLAT_M
+
+
 def above_chart(points_m: Float32Array, path_m: FloatArray) -> Figure:
     """Draw the cloud from above, coloured by the mean height in each cell, with the path."""
     raster = mean_raster(points_m[:, 0], points_m[:, 1], points_m[:, 2], least_cell_m=0.1)
-    figure = charts.new_figure(charts.plan_height_in(points_m, least=2.6), right_in=0.85)
+    flat = is_flat(points_m)
+    figure = charts.new_figure(charts.plan_height_in(points_m, least=2.6), right_in=0.12 if flat else 0.85)
     axes = figure.add_subplot()
     low, high = np.nanpercentile(raster.values, [2, 98])
+    if flat:  # one height takes the middle of the palette, which is seen on any ground
+        low, high = low - 1.0, high + 1.0
     image = axes.imshow(
         raster.values,
         extent=raster.extent,
@@ -46,8 +55,9 @@ def above_chart(points_m: Float32Array, path_m: FloatArray) -> Figure:
     axes.plot(path_m[rows, 0], path_m[rows, 1], color=charts.WHEELS, linewidth=1.0, label="path of base_link")
     plan_axes(axes)
     axes.grid(visible=False)
-    bar = figure.colorbar(image, cax=axes.inset_axes((1.012, 0.0, 0.016, 1.0)), label="height, m")
-    bar.ax.grid(visible=False)
+    if not flat:
+        bar = figure.colorbar(image, cax=axes.inset_axes((1.012, 0.0, 0.016, 1.0)), label="height, m")
+        bar.ax.grid(visible=False)
     charts.legend_above(axes)
     return figure
 

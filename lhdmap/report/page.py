@@ -104,9 +104,11 @@ def _cloud(data: ReportData) -> str:
     if data.cloud is None or not len(data.cloud.points_m):
         return "<p>No cloud was integrated.</p>\n"
     points, path = data.cloud.points_m, data.trajectory.positions_m
-    above = _picture(
-        charts.svg_uri(cloud_charts.above_chart(points, path)), f"{len(points)} points from above, coloured by height."
-    )
+    flat = cloud_charts.is_flat(points)
+    caption = f"{len(points)} points from above" + (", all at one height." if flat else ", coloured by height.")
+    above = _picture(charts.svg_uri(cloud_charts.above_chart(points, path)), caption)
+    if flat:
+        return above
     side = "The same from the side, unrolled along the path; brighter cells hold more points. The scales differ."
     return above + _picture(charts.svg_uri(cloud_charts.side_chart(points, path)), side)
 

@@ -27,7 +27,7 @@ from lhdmap.trajectory import Trajectory
 APPLICATION = "lhdmap"
 TIMELINE = "time"
 Stamps = npt.NDArray[np.int64]
-_VIRIDIS = np.array([[68, 1, 84], [59, 82, 139], [33, 145, 140], [94, 201, 98], [253, 231, 37]], dtype=float)
+_VIRIDIS = np.array([[59, 82, 139], [33, 145, 140], [94, 201, 98], [253, 231, 37]], dtype=float)
 
 
 @dataclass(frozen=True, slots=True)
@@ -186,7 +186,8 @@ class RecordingWriter:
     def _height_colours(self, heights_m: Float32Array, stamps_ns: Stamps) -> npt.NDArray[np.uint32]:
         """Return RGBA of heights (N,) over the floor at the stamps (N,), or over the lowest point."""
         floor = heights_m.min() if self._floor is None else np.interp(stamps_ns, *self._floor)
-        share = np.clip((heights_m - floor) / self._settings.height_window_m, 0.0, 1.0)
+        above = np.asarray(heights_m - floor)
+        share = np.clip(above / self._settings.height_window_m, 0.0, 1.0) if np.ptp(above) > 0.05 else 0.6 + 0.0 * above
         return _palette()[(255 * share).astype(np.int64)]
 
     def widen(self, points_m: npt.NDArray[np.floating[Any]]) -> None:
@@ -196,7 +197,7 @@ class RecordingWriter:
 
 
 def _palette() -> npt.NDArray[np.uint32]:
-    """Return 256 colours from viridis as 0xRRGGBBAA."""
+    """Return 256 colours as 0xRRGGBBAA: viridis without its dark end, which the viewer's ground would swallow."""
     steps = np.linspace(0, len(_VIRIDIS) - 1, 256)
     r, g, b = (np.interp(steps, range(len(_VIRIDIS)), _VIRIDIS[:, i]).astype(np.uint32) for i in range(3))
     return r << 24 | g << 16 | b << 8 | np.uint32(255)

@@ -9,7 +9,7 @@ import numpy as np
 
 from lhdmap.messages import FloatArray
 
-FIELD_OF_VIEW_RAD = 0.9
+FIELD_OF_VIEW_RAD, PLAN_ASPECT = 0.9, 2.5
 Curves = tuple[tuple[str, tuple[str, ...]], ...]
 RUN_CURVES: Curves = (
     ("Speed, m/s", ("motion/speed/**",)),
@@ -52,8 +52,9 @@ def _eye(bounds_m: FloatArray | None, *, oblique: bool) -> Any:
 
     if bounds_m is None:
         return None
-    target = bounds_m.mean(axis=0)
-    away = 0.55 * max(float(np.linalg.norm(bounds_m[1] - bounds_m[0])), 5.0) / math.tan(FIELD_OF_VIEW_RAD / 2)
+    target, span = bounds_m.mean(axis=0), np.maximum(bounds_m[1] - bounds_m[0], 5.0)
+    half_height = 0.48 * float(np.linalg.norm(span)) if oblique else 0.57 * max(span[1], span[0] / PLAN_ASPECT)
+    away = half_height / math.tan(FIELD_OF_VIEW_RAD / 2)
     direction = np.array([-0.35, -0.75, 0.55]) if oblique else np.array([0.0, -1e-3, 1.0])
     position = target + away * direction / np.linalg.norm(direction)
     return rrb.EyeControls3D(position=position, look_target=target, eye_up=(0, 0, 1) if oblique else (0, 1, 0))
