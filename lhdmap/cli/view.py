@@ -121,6 +121,7 @@ def _serve(recording: Path, arguments: argparse.Namespace, console: Console) -> 
     host, data_port = arguments.bind, arguments.port + 1
     url = f"http://{host}:{arguments.port}/?url=rerun%2Bhttp://{host}:{data_port}/proxy"
     console.result({"recording": str(recording), "url": url}, f"open {url}  (Ctrl-C ends)")
+    sys.stdout.flush()
     ports = ("--port", str(data_port), "--web-viewer-port", str(arguments.port))
     done = subprocess.run(_viewer("--bind", host, "--serve-web", *ports, str(recording)), check=False)  # noqa: S603
     if done.returncode != 0:

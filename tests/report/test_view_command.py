@@ -3,6 +3,12 @@
 from __future__ import annotations
 
 import json
+import signal
+import socket
+import subprocess
+import sys
+import time
+import urllib.request
 from pathlib import Path
 
 import numpy as np
@@ -72,3 +78,38 @@ def test_a_recording_is_not_overwritten(tmp_path: Path, log: Path, capsys: pytes
     assert main(["view", str(log), "--screenshot", str(tmp_path / "s.png"), "-o", str(tmp_path / "old.rrd")]) == 2
     assert (tmp_path / "old.rrd").read_bytes() == before
     assert "is there already" in capsys.readouterr().err
+
+
+def test_web_serves_this_machine_only_until_interrupted(tmp_path: Path) -> None:
+    with RecordingWriter(tmp_path / "r.rrd", "r", START_NS) as writer:
+        writer.add_text("hello")
+    port = free_port()
+    code = "from lhdmap.cli.main import entry_point; entry_point()"
+    command = [sys.executable, "-c", code, "view", str(tmp_path / "r.rrd"), "--web", "--port", str(port)]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
+        assert process.stdout is not None
+        line = process.stdout.readline()
+        assert f"http://127.0.0.1:{port}/?url=rerun%2Bhttp://127.0.0.1:{port + 1}/proxy" in line
+        assert b"<!doctype html>" in page_of(port).lower()
+        process.send_signal(signal.SIGINT)
+        assert process.wait(timeout=20) == 4
+    with pytest.raises(OSError, match="refused"):
+        socket.create_connection(("127.0.0.1", port), timeout=1)
+
+
+def free_port() -> int:
+    """Return a port with a free one after it."""
+    with socket.socket() as one:
+        one.bind(("127.0.0.1", 0))
+        return int(one.getsockname()[1])
+
+
+def page_of(port: int) -> bytes:
+    """Return the page once the server answers."""
+    for _ in range(100):
+        try:
+            with urllib.request.urlopen(f"http://127.0.0.1:{port}/", timeout=5) as answer:
+                return bytes(answer.read())
+        except OSError:
+            time.sleep(0.1)
+    raise AssertionError("the server did not answer within 10 s")
