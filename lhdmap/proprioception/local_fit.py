@@ -15,7 +15,7 @@ Stamps = npt.NDArray[np.int64]
 
 @nb.njit(cache=True, nogil=True)
 def fit_at(
-    stamps_ns: Stamps, rows: FloatArray, at_ns: Stamps, half_window_s: float, max_gap_s: float
+    stamps_ns: Stamps, rows: FloatArray, at_ns: Stamps, half_window_s: float, max_gap_s: float, rate_s: float
 ) -> tuple[FloatArray, FloatArray]:
     """Return the values at the times `at_ns` and how much of the samples' noise is left in them.
 
@@ -25,6 +25,7 @@ def fit_at(
         at_ns: shape (M,), in any order.
         half_window_s: samples within this of a time take part, weighted 1 - u^2 (Epanechnikov).
         max_gap_s: largest distance of the samples on both sides of a time, and of a time outside of all samples.
+        rate_s: this many seconds' worth of the derivative is added to the value (0: the value alone).
 
     Returns:
         values, shape (M, K), and noise factors, shape (M,); NaN where there is nothing to go by. The degree is two
@@ -39,7 +40,7 @@ def fit_at(
             continue
         first = np.searchsorted(stamps_ns, at_ns[m] - half_ns)
         last = np.searchsorted(stamps_ns, at_ns[m] + half_ns, side="right")
-        weights = _weights(stamps_ns[first:last], at_ns[m], half_window_s)
+        weights = _weights(stamps_ns[first:last], at_ns[m], half_window_s, rate_s)
         if weights.shape[0] == 0:
             first, weights = _neighbours(stamps_ns, after, at_ns[m])
         values[m] = 0.0
@@ -74,7 +75,7 @@ def _neighbours(stamps_ns: Stamps, after: int, at_ns: int) -> tuple[int, FloatAr
 
 
 @nb.njit(cache=True, nogil=True)
-def _weights(stamps_ns: Stamps, at_ns: int, half_window_s: float) -> FloatArray:
+def _weights(stamps_ns: Stamps, at_ns: int, half_window_s: float, rate_s: float) -> FloatArray:
     """Return the weights with which the samples enter the fitted value, shape (N,); none where no fit is possible."""
     n = stamps_ns.shape[0]
     none = np.empty(0)
@@ -92,21 +93,22 @@ def _weights(stamps_ns: Stamps, at_ns: int, half_window_s: float) -> FloatArray:
         for k in range(5):
             s[k] += power
             power *= u[i]
-    c = _first_column(s, quadratic)
+    c = _coefficients(s, quadratic, rate_s / half_window_s)
     if not np.isfinite(c[0]):
         return none
     return kernel * (c[0] + c[1] * u + c[2] * u * u)
 
 
 @nb.njit(cache=True, nogil=True)
-def _first_column(s: FloatArray, quadratic: bool) -> FloatArray:
-    """Return the first column of the inverse of the moments [[s0 s1 s2] [s1 s2 s3] [s2 s3 s4]]; NaN where singular."""
+def _coefficients(s: FloatArray, quadratic: bool, rate: float) -> FloatArray:
+    """Return the solution c of [[s0 s1 s2] [s1 s2 s3] [s2 s3 s4]] c = (1, rate, 0), shape (3,); NaN where singular."""
     if quadratic:
         a, b, c = s[2] * s[4] - s[3] * s[3], s[2] * s[3] - s[1] * s[4], s[1] * s[3] - s[2] * s[2]
+        d, e = s[0] * s[4] - s[2] * s[2], s[1] * s[2] - s[0] * s[3]
         det = s[0] * a + s[1] * b + s[2] * c
     else:
-        a, b, c = s[2], -s[1], 0.0
+        a, b, c, d, e = s[2], -s[1], 0.0, s[0], 0.0
         det = s[0] * s[2] - s[1] * s[1]
     if det <= 1e-12 * s[0] * s[0]:
         return np.full(3, np.nan)
-    return np.array([a / det, b / det, c / det])
+    return np.array([a + rate * b, b + rate * d, c + rate * e]) / det

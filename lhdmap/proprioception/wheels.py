@@ -35,6 +35,9 @@ class WheelSettings:
     articulation_std_deg: float = setting(
         0.5, unit="deg", minimum=0.0, doc="Error of the articulation angle: its offset, play and side slip in bends."
     )
+    articulation_noise_deg: float = setting(
+        0.1, unit="deg", minimum=0.0, doc="Noise of single articulation angles, which turns the front body."
+    )
     unknown_articulation_deg: float = setting(
         15.0, unit="deg", minimum=0.0, doc="The same where the log has no articulation."
     )
@@ -162,12 +165,10 @@ class WheelOdometry:
         )
         settings = self.settings
         error_deg = settings.articulation_std_deg if source == "articulated" else settings.unknown_articulation_deg
+        noise_rad = math.sqrt(2.0) * math.radians(settings.articulation_noise_deg) * L_r / (L_f + L_r)
+        heading = math.hypot(lever * math.radians(error_deg), noise_rad)
         along = math.hypot(self.scale_std * path_m, settings.speed_std_mps * (end_ns - start_ns) / 1e9)
-        return Motion(
-            delta,
-            motion_covariance(along, settings.side_slip_std * path_m, lever * math.radians(error_deg), delta),
-            source,
-        )
+        return Motion(delta, motion_covariance(along, settings.side_slip_std * path_m, heading, delta), source)
 
     def _reckoned(self, start_ns: int, end_ns: int) -> Motion | None:
         """Return the difference of two wheel poses, or None across a jump."""

@@ -12,6 +12,7 @@ from lhdmap.geometry import se3
 from lhdmap.messages import FloatArray, Inclination
 from lhdmap.proprioception.attitude import AttitudeFilter, AttitudeSettings
 from lhdmap.proprioception.local_fit import fit_at
+from scipy.signal import lfilter
 
 LAG_S = 0.1
 
@@ -55,6 +56,22 @@ def test_noise_is_smoothed_and_the_lag_undone(speed_kmh: float, rate_hz: float) 
     assert np.rad2deg(np.std(found.roll_rad + 0.5 * truth)) < 0.05
 
 
+def test_a_first_order_lag_is_undone() -> None:
+    t = np.arange(0.0, 30.0, 0.01)
+    truth = ramp_and_waves(t)
+    keep = math.exp(-0.01 / LAG_S)
+    shown = lfilter([1.0 - keep], [1.0, -keep], truth) + np.deg2rad(np.random.default_rng(1).normal(0, 0.1, len(t)))
+    errors = {}
+    for kind in ("delay", "first_order"):
+        attitude = AttitudeFilter(AttitudeSettings(lag_s=LAG_S, lag_kind=kind))
+        for at, pitch in zip(t, shown, strict=True):
+            attitude.update(inclination(float(at), 0.0, float(pitch)))
+        found = attitude.attitudes_at(np.array([ns(x) for x in t[300:2800]]))
+        errors[kind] = np.rad2deg(np.std(found.pitch_rad - truth[300:2800]))
+    assert errors["first_order"] < 0.05
+    assert errors["first_order"] < errors["delay"]
+
+
 @pytest.mark.parametrize("speed_kmh", [6.0, 12.0, 24.0])
 def test_there_is_no_delay(speed_kmh: float) -> None:
     attitude = filled(noise_deg=0.01, speed_kmh=speed_kmh)
@@ -92,9 +109,10 @@ def test_a_parabola_is_reproduced_exactly_at_any_spacing(
 ) -> None:
     t = np.sort(np.random.default_rng(jitter).uniform(0.0, 4.0, 200))
     rows = np.polyval(coefficients, t).astype(np.float64)[:, None]
-    values, factors = fit_at((t * 1e9).astype(np.int64), rows, np.array([ns(at)]), 0.4, 2.0)
-    assert values[0, 0] == pytest.approx(np.polyval(coefficients, at), abs=1e-6)
-    assert 0.0 < factors[0] < 1.5
+    values, factors = fit_at((t * 1e9).astype(np.int64), rows, np.array([ns(at)]), 0.4, 2.0, 0.1)
+    expected = np.polyval(coefficients, at) + 0.1 * np.polyval(np.polyder(coefficients), at)
+    assert values[0, 0] == pytest.approx(expected, abs=1e-6)
+    assert 0.0 < factors[0] < 2.0
 
 
 def test_ready_until_is_the_promise_that_nothing_changes_any_more() -> None:

@@ -110,7 +110,9 @@ def test_motions_chain() -> None:
 
 
 def test_covariance_matches_a_scatter_of_drives() -> None:
-    settings = WheelSettings(scale_std=0.03, speed_std_mps=0.0, side_slip_std=0.0, articulation_std_deg=1.0)
+    settings = WheelSettings(
+        scale_std=0.03, speed_std_mps=0.0, side_slip_std=0.0, articulation_std_deg=1.0, articulation_noise_deg=0.0
+    )
     told = odometry(lambda _: 2.0, lambda _: 0.2, settings=settings).motion_between(ns(1.0), ns(3.0))
     assert told is not None
     rng = np.random.default_rng(3)
@@ -126,6 +128,20 @@ def test_covariance_matches_a_scatter_of_drives() -> None:
         ends.append(motion.delta)
     seen = np.cov(np.array(ends).T)
     assert np.sqrt(np.diag(told.covariance)) == pytest.approx(np.sqrt(np.diag(seen)), rel=0.2)
+
+
+def test_a_noisy_encoder_shows_in_the_covariance() -> None:
+    rng, errors, told = np.random.default_rng(8), [], 0.0
+    wheels = WheelOdometry(WheelSettings(articulation_noise_deg=0.1), MACHINE)
+    for t in np.arange(0.0, 8.0, 0.02):
+        wheels.update(Tachometer(ns(t), 0.0))
+        wheels.update(joints(ns(t), 0.1 + math.radians(rng.normal(0.0, 0.1))))
+    for k in range(390):
+        motion = wheels.motion_between(ns(0.02 * k), ns(0.02 * (k + 1)))
+        assert motion is not None
+        errors.append(motion.delta[2])
+        told = math.sqrt(motion.covariance[2, 2])
+    assert told == pytest.approx(np.std(errors), rel=0.15)
 
 
 def test_calibration_scales_the_distance_and_its_error() -> None:
