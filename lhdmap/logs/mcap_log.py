@@ -87,7 +87,7 @@ class McapFile:
         tail = self._file.read()
         opcode, length = rec.HEAD.unpack_from(tail) if len(tail) >= rec.HEAD.size else (0, 0)
         if opcode != rec.FOOTER or length != 20 or not tail.endswith(rec.MAGIC):
-            raise InputError("no footer")
+            raise InputError("cut off: the end of the file is not an MCAP file's")
         start, _, crc = rec.footer(tail[rec.HEAD.size : rec.HEAD.size + 20])
         if start == 0:
             return None

@@ -18,6 +18,8 @@ from lhdmap.logs.sqlite_salvage import Salvage
 MAGIC = b"SQLite format 3\0"
 _ZSTD_MAGIC = b"\x28\xb5\x2f\xfd"
 _MAX_MESSAGE_BYTES = 256 << 20
+# What the sqlite3 module raises for a damaged file (names in the schema that are no text among it).
+_DAMAGED = (sqlite3.Error, UnicodeDecodeError, OverflowError)
 _PAGE_SIZE, _PAGE_COUNT, _CHANGE_COUNTER, _VALID_FOR = slice(16, 18), slice(28, 32), slice(24, 28), slice(92, 96)
 _TOPICS = "SELECT id, name, type, serialization_format FROM topics"
 _COUNTS = "SELECT topic_id, COUNT(*), MIN(timestamp), MAX(timestamp) FROM messages GROUP BY topic_id"
@@ -49,7 +51,7 @@ class SqliteFile:
         if self._contents is None and self._database is not None:
             try:
                 self._contents = _stated(self._database)
-            except (sqlite3.Error, InputError) as error:
+            except (*_DAMAGED, InputError) as error:
                 self._damage.add(f"the database is damaged ({error}): its pages are searched for messages")
                 self._start_salvage()
         if self._contents is None:
@@ -67,7 +69,7 @@ class SqliteFile:
                     last = (time_ns, rowid)
                     if topic in keep and _valid(time_ns, data):
                         yield time_ns, topic, self._inflated(data)
-            except sqlite3.Error as error:
+            except _DAMAGED as error:
                 self._damage.add(f"the database is damaged ({error}): its pages are searched for messages")
             else:
                 return
