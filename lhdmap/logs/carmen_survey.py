@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from lhdmap.errors import InputError
-from lhdmap.geometry import se2, se3
+from lhdmap.geometry import se3
 from lhdmap.logs import carmen_lines as lines
 from lhdmap.logs.findings import Findings
 from lhdmap.logs.text_lines import text_lines
@@ -128,7 +128,14 @@ def _mount(scan: lines.LaserLine, name: str, offsets_m: dict[str, float]) -> Flo
     """Return T_base_laser, 4 x 4: from the two poses of a scan, else from the offset parameter, at floor height."""
     x, y, yaw = offsets_m.get(FRAMES[name], 0.0), 0.0, math.pi if FRAMES[name] == "rear_laser" else 0.0
     if scan.laser_pose is not None and scan.robot_pose is not None:
-        T_base_laser = se2.between(np.array(scan.robot_pose), np.array(scan.laser_pose))
-        if float(np.abs(T_base_laser).max()) > 1e-6 and float(np.abs(T_base_laser[:2]).max()) < _MAX_MOUNT_M:
-            x, y, yaw = (float(value) for value in T_base_laser)
+        offset = _between(scan.robot_pose, scan.laser_pose)
+        if max(map(abs, offset)) > 1e-6 and math.hypot(offset[0], offset[1]) < _MAX_MOUNT_M:
+            x, y, yaw = offset
     return se3.from_rpy(0.0, 0.0, yaw, (x, y, 0.0))
+
+
+def _between(robot: lines.Pose, laser: lines.Pose) -> lines.Pose:
+    """Return T_robot_laser (m, m, rad) from two planar poses in one frame (se2.between without loading numba)."""
+    dx, dy, c, s = laser[0] - robot[0], laser[1] - robot[1], math.cos(robot[2]), math.sin(robot[2])
+    yaw = math.remainder(laser[2] - robot[2], 2.0 * math.pi)
+    return c * dx + s * dy, c * dy - s * dx, yaw
