@@ -14,7 +14,7 @@ from lhdmap.errors import InputError
 from lhdmap.integration.beams import sweep_stamps_ns, table_of
 from lhdmap.integration.cloud import Cloud
 from lhdmap.integration.normals import estimate_normals
-from lhdmap.integration.project import Counts, SweepPoints, SweepPoses, project_cloud, project_scan
+from lhdmap.integration.project import Counts, Limits, SweepPoints, SweepPoses, project_cloud, project_scan
 from lhdmap.integration.self_filter import Rig, rig_of
 from lhdmap.integration.voxel_grid import VoxelGrid
 from lhdmap.machine import Machine
@@ -36,6 +36,14 @@ class IntegrationSettings:
     body_margin_m: float = setting(
         0.1, unit="m", minimum=0.0, maximum=2.0, doc="The boxes of both bodies are grown by this for the self-filter."
     )
+    stray_m: float = setting(
+        0.1, unit="m", source="measured: docs/integration.md", minimum=0.0,
+        doc="A return that is nearer than all of the four beams around it by more than this is dust; inf keeps all.",
+    )  # fmt: skip
+    stray_share: float = setting(
+        0.02, unit="m/m", source="measured: docs/integration.md", minimum=0.0,
+        doc="The same, for each metre of its range; both add up.",
+    )  # fmt: skip
     min_hits: int = setting(
         2,
         unit="hits",
@@ -43,7 +51,7 @@ class IntegrationSettings:
         doc="Voxels with fewer hits stay only if their neighbours have hits: dust, mixed pixels.",
     )
     min_neighbour_hits: int = setting(
-        2, unit="hits", minimum=0, doc="Hits that the 26 neighbours of such a voxel must hold together; 0: keep all."
+        3, unit="hits", minimum=0, doc="Hits that the 26 neighbours of such a voxel must hold together; 0: keep all."
     )
     normal_radius_m: float = setting(
         0.75, unit="m", source="paper, Fig. 9", minimum=0.02, maximum=20.0, doc="Radius for normals and curvature."
@@ -68,6 +76,7 @@ class IntegrationTotals:
     kept: int = 0
     no_return: int = 0
     self_hits: int = 0
+    strays: int = 0
     refused_sweeps: int = 0
 
 
@@ -78,10 +87,19 @@ class Integrator:
         self.settings = settings
         self.grid = VoxelGrid(settings.voxel_size_m)
         self.totals = IntegrationTotals()
-        self._rigs: dict[str, Rig] = {
-            mount.child_frame: rig_of(mount, machine, settings.body_margin_m) for mount in mounts
-        }
+        self._machine = machine
+        self._rigs: dict[str, Rig] = {}
         self._room = SweepPoints.of_size(0)
+        for mount in mounts:
+            self.add_mount(mount)
+
+    def add_mount(self, mount: Mount) -> None:
+        """Tell where a sensor sits; raises InputError where that is on neither body or no rigid motion."""
+        self._rigs[mount.child_frame] = rig_of(mount, self._machine, self.settings.body_margin_m)
+
+    def knows(self, frame_id: str) -> bool:
+        """Return whether the mount of this sensor frame is known."""
+        return frame_id in self._rigs
 
     def update(self, message: LaserScan | PointCloud, poses: SweepPoses) -> Integrated:
         """Add one sweep; `poses` are those of the machine at `sweep_stamps_ns(message)`.
@@ -95,7 +113,7 @@ class Integrator:
         poses = _plain(poses)
         if not _finite(poses):
             self.totals.refused_sweeps += 1
-            return Integrated(self._room.points_map[:0], Counts(0, 0, 0))
+            return Integrated(self._room.points_map[:0], Counts(0, 0, 0, 0))
         counts = self._project(message, poses, rig)
         points = self._room.points_map[: counts.kept]
         self.grid.add(points, self._room.stamps_ns[: counts.kept], self._room.viewpoint_map)
@@ -128,11 +146,12 @@ class Integrator:
         if len(self._room.stamps_ns) < size:
             self._room = SweepPoints.of_size(size)
         if isinstance(message, LaserScan):
-            limits = (max(low_m, float(message.range_min_m)), min(high_m, float(message.range_max_m)))
+            low_m, high_m = max(low_m, float(message.range_min_m)), min(high_m, float(message.range_max_m))
+            limits = Limits(low_m, high_m, self.settings.stray_m, self.settings.stray_share)
             ranges = _readonly(message.ranges_m)
             return Counts(*project_scan(ranges, table_of(message), limits, span_ns, poses, rig, self._room))
         cloud, offsets = _readonly(message.points_m), _readonly(message.time_offsets_s)
-        return Counts(*project_cloud(cloud, offsets, (low_m, high_m), span_ns, poses, rig, self._room))
+        return Counts(*project_cloud(cloud, offsets, Limits(low_m, high_m), span_ns, poses, rig, self._room))
 
     def _count(self, counts: Counts) -> None:
         totals = self.totals
@@ -140,6 +159,7 @@ class Integrator:
         totals.kept += counts.kept
         totals.no_return += counts.no_return
         totals.self_hits += counts.self_hits
+        totals.strays += counts.strays
 
 
 def _plain(poses: SweepPoses) -> SweepPoses:

@@ -1,0 +1,101 @@
+"""All settings of the pipeline: one typed section a stage, read from TOML over the defaults, single values overridden."""
+
+from __future__ import annotations
+
+import dataclasses
+import tomllib
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from lhdmap.errors import ConfigError
+from lhdmap.integration.integrator import IntegrationSettings
+from lhdmap.odometry.settings import AnchorSettings, OdometrySettings, RangeFlowSettings, SearchSettings
+from lhdmap.proprioception.attitude import AttitudeSettings
+from lhdmap.proprioception.slip import SlipSettings
+from lhdmap.proprioception.wheels import WheelSettings
+from lhdmap.report.recording import RecordingSettings
+from lhdmap.settings import load_section, nearest, section_toml
+
+_HEADER = """\
+# Settings of the lhdmap pipeline: the defaults. Copy this file, change what you need and pass it with --config; keys that
+# are left out keep their defaults, unknown keys are refused. `lhdmap config` prints it.
+"""
+
+
+@dataclass(frozen=True, slots=True)
+class Settings:
+    """One section for each stage."""
+
+    odometry: OdometrySettings = field(default_factory=OdometrySettings)
+    anchor: AnchorSettings = field(default_factory=AnchorSettings)
+    search: SearchSettings = field(default_factory=SearchSettings)
+    range_flow: RangeFlowSettings = field(default_factory=RangeFlowSettings)
+    attitude: AttitudeSettings = field(default_factory=AttitudeSettings)
+    wheels: WheelSettings = field(default_factory=WheelSettings)
+    slip: SlipSettings = field(default_factory=SlipSettings)
+    integration: IntegrationSettings = field(default_factory=IntegrationSettings)
+    recording: RecordingSettings = field(default_factory=RecordingSettings)
+
+
+SECTIONS: dict[str, Any] = {section.name: section.default_factory for section in dataclasses.fields(Settings)}
+
+
+def load_settings(path: Path | None = None, assignments: Iterable[str] = ()) -> Settings:
+    """Return the defaults with the values of a TOML file and of `section.key=value` assignments over them.
+
+    Raises:
+        ConfigError: the file cannot be read, or a section, key or value is wrong.
+    """
+    table = _read(path) if path is not None else {}
+    for assignment in assignments:
+        section, key, value = _parsed(assignment)
+        table.setdefault(section, {})[key] = value
+    sections = {}
+    for name, values in table.items():
+        if name not in SECTIONS:
+            raise ConfigError(f"{_origin(path)}unknown section '{name}'{nearest(name, SECTIONS)}")
+        if not isinstance(values, dict):
+            raise ConfigError(f"{_origin(path)}'{name}' is a section: [{name}] with its settings below was wanted")
+        sections[name] = load_section(SECTIONS[name], name, values)
+    return Settings(**sections)
+
+
+def settings_toml(settings: Settings | None = None) -> str:
+    """Print settings as TOML, each with meaning, unit and source."""
+    chosen = settings or Settings()
+    return "\n".join([_HEADER, *(section_toml(name, getattr(chosen, name)) for name in SECTIONS)])
+
+
+def settings_table(settings: Settings) -> dict[str, dict[str, Any]]:
+    """Return the settings as plain values, for `map.json`."""
+    return {
+        name: {f.name: getattr(getattr(settings, name), f.name) for f in dataclasses.fields(getattr(settings, name))}
+        for name in SECTIONS
+    }
+
+
+def _read(path: Path) -> dict[str, Any]:
+    try:
+        return tomllib.loads(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise ConfigError(f"{path}: {error.strerror or error}") from error
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise ConfigError(f"{path}: no valid TOML: {error}") from error
+
+
+def _parsed(assignment: str) -> tuple[str, str, Any]:
+    """Return section, key and value of `section.key=value`; a value that is no TOML is taken as text."""
+    name, equals, text = assignment.partition("=")
+    section, dot, key = name.strip().partition(".")
+    if not (equals and dot and section and key):
+        raise ConfigError(f"--set {assignment}: section.key=value was wanted, e.g. odometry.method=range_flow")
+    try:
+        return section, key, tomllib.loads(f"value = {text}")["value"]
+    except tomllib.TOMLDecodeError:
+        return section, key, text.strip()
+
+
+def _origin(path: Path | None) -> str:
+    return f"{path}: " if path is not None else ""

@@ -1,0 +1,205 @@
+"""`build-map` as a function: logs in, map folder out. Reads once, keeps what is finished when interrupted."""
+
+from __future__ import annotations
+
+import resource as process_resource
+import sys
+import time
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from lhdmap.config import Settings, settings_table, settings_toml
+from lhdmap.errors import InputError
+from lhdmap.integration.cloud import Cloud
+from lhdmap.integration.cloud_io import write_cloud
+from lhdmap.logs.source import LogSource
+from lhdmap.machine import Machine
+from lhdmap.mapfolder import MapFolderWriter, MapInfo
+from lhdmap.messages import Message
+from lhdmap.pipeline.mapping import MappingPipeline
+from lhdmap.pipeline.track import Rows, resample, trajectory_of
+from lhdmap.provenance import source_entry
+from lhdmap.report.data import ReportData, Summary, TopicRow
+from lhdmap.report.page import write_report
+from lhdmap.report.recording import RecordingWriter, record_run
+from lhdmap.trajectory import Trajectory
+
+ROLES_READ = ("front", "rear", "inclinometer", "joints", "tachometer", "wheel_odometry", "tf_static")
+Progress = Callable[[Iterable[tuple[str, Message]], float], Iterable[tuple[str, Message]]]
+
+
+@dataclass(frozen=True, slots=True)
+class BuildRequest:
+    """What is to be built: logs, the folder to make, settings, topics by role, the machine, how to show progress."""
+
+    logs: Sequence[Path]
+    target: Path
+    settings: Settings = field(default_factory=Settings)
+    topics: Mapping[str, str] = field(default_factory=dict)
+    machine: Machine | None = None
+    progress: Progress | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class BuildResult:
+    """What came of it: the folder, the figures of `build-map --json`, the final trajectory."""
+
+    folder: Path
+    summary: dict[str, Any]
+    warnings: list[str]
+    trajectory: Trajectory
+
+
+def build_map(request: BuildRequest) -> BuildResult:
+    """Read the logs, run the pipeline, write the map folder.
+
+    Raises:
+        InputError: a log cannot be used, or holds no scan.
+    """
+    started = time.monotonic()
+    with LogSource(list(request.logs), request.topics) as source, MapFolderWriter(request.target) as folder:
+        hashes, pool = _hash_in_background(request.logs)
+        with pool, RecordingWriter(folder.path / "recording.rrd", request.target.name, source.start_ns or 0) as recording:
+            pipeline = MappingPipeline(request.settings, _machine(request, source), _sweep_sink(recording))
+            _run(pipeline, source, request.progress)
+            outcome = _Outcome(request, source, pipeline, started)
+            _write(folder, outcome, recording)
+        info = MapInfo(
+            request.logs, settings_table(request.settings), outcome.summary, outcome.warnings
+        )
+        final = folder.complete(info, {path: future.result() for path, future in hashes.items()})
+    summary = outcome.summary | {"map": str(final)} | _cost(started, outcome.duration_s)
+    return BuildResult(final, summary, outcome.warnings, outcome.final)
+
+
+def _run(pipeline: MappingPipeline, source: LogSource, progress: Progress | None) -> None:
+    """Send all messages through the stages. After Ctrl-C the stages finish with what they have."""
+    messages: Iterable[tuple[str, Message]] = source.messages([role for role in ROLES_READ if role in source.roles])
+    if progress is not None:
+        messages = progress(messages, source.duration_s)
+    for role, message in messages:
+        pipeline.update(role, message)
+    pipeline.finish()
+    if not len(pipeline.track):
+        damage = f" ({source.damage[0]})" if source.damage else ""
+        raise InputError(f"{source.paths[0]}: no usable scan in it{damage}; lhdmap doctor tells what is wrong")
+
+
+class _Outcome:
+    """Everything that the files of the map folder are made from."""
+
+    def __init__(self, request: BuildRequest, source: LogSource, pipeline: MappingPipeline, started: float) -> None:
+        self.request, self.source, self.pipeline = request, source, pipeline
+        records = pipeline.records
+        stamps, times = np.array(records.stamps_ns, dtype=np.int64), np.array(records.times_ns, dtype=np.int64)
+        self.rows: Rows = pipeline.track.rows()
+        self.odometry = trajectory_of(resample(self.rows, times), stamps)
+        self.final = self.odometry
+        self.cloud: Cloud = pipeline.sweeps.cloud()
+        self.duration_s = float(times[-1] - times[0]) * 1e-9 if len(times) else 0.0
+        self.warnings = [*source.warnings, *source.damage, *pipeline.warnings, *_remarks(pipeline)]
+        steps = np.diff(self.rows.poses[:, :3], axis=0)
+        self.summary: dict[str, Any] = {
+            "scans": len(stamps),
+            "scans_processed": records.processed,
+            "duration_s": self.duration_s,
+            "distance_m": float(np.linalg.norm(steps, axis=1).sum()),
+            **_cost(started, self.duration_s),
+            "degenerate_share": records.degenerate_share,
+            "lost_stretches": records.lost_stretches,
+            "closures": 0,
+            "pile": None,
+        }
+
+    def report(self) -> ReportData:
+        """Return the data of the HTML page and of the recording."""
+        records = self.pipeline.records
+        return ReportData(
+            title=self.request.target.name,
+            summary=Summary(**{key: value for key, value in self.summary.items() if key != "pile"}),
+            topics=_topic_rows(self.source),
+            trajectory=self.final,
+            odometry=self.odometry,
+            cloud=self.cloud,
+            diagnostics=records.diagnostics(),
+            odometry_speed=records.speed(),
+            tachometer_speed=records.tachometer(),
+            articulation=records.articulation(),
+            has_inclinometer=self.pipeline.has_inclinometer,
+            warnings=self.warnings,
+            settings_text=settings_toml(self.request.settings),
+            provenance={"log": ", ".join(path.name for path in self.request.logs)},
+        )
+
+
+def _write(folder: MapFolderWriter, outcome: _Outcome, recording: RecordingWriter) -> None:
+    folder.write_trajectory(outcome.final)
+    folder.write_odometry(outcome.odometry)
+    folder.write_diagnostics(outcome.pipeline.records.diagnostics())
+    write_cloud(folder.path / "cloud.ply", outcome.cloud)
+    data = outcome.report()
+    record_run(recording, data, outcome.pipeline.machine or Machine(bodies={}))
+    write_report(data, folder.path / "report.html")
+
+
+def _machine(request: BuildRequest, source: LogSource) -> Machine | None:
+    """Return the machine given, else the default loader where the log is one's (it has the joints of an LHD), else none."""
+    if request.machine is not None:
+        return request.machine
+    if "joints" in source.roles or "rear" in source.roles and "tf_static" in source.roles:
+        return Machine()
+    return None
+
+
+def _sweep_sink(recording: RecordingWriter) -> Callable[[str, int, Any], None]:
+    def take(role: str, stamp_ns: int, points_map: Any) -> None:
+        if recording.wants_scan(stamp_ns, role):
+            recording.add_scan(stamp_ns, points_map.copy(), role)
+
+    return take
+
+
+def _hash_in_background(logs: Sequence[Path]) -> tuple[dict[Path, Any], ThreadPoolExecutor]:
+    pool = ThreadPoolExecutor(max_workers=1, thread_name_prefix="hash")
+    return {path: pool.submit(source_entry, path) for path in logs}, pool
+
+
+def _topic_rows(source: LogSource) -> list[TopicRow]:
+    used = {topic: role for role, topic in source.roles.items()}
+    rows = []
+    for inventory in source.inventory():
+        for topic in inventory.topics.values():
+            role = used.get(topic.name)
+            remark = f"used as {role}" if role in ROLES_READ else "not an input"
+            rows.append(TopicRow(topic.name, topic.type_name, topic.count, topic.rate_hz, remark))
+    return rows
+
+
+def _remarks(pipeline: MappingPipeline) -> list[str]:
+    """Return warnings about the run as a whole."""
+    remarks = []
+    lost = pipeline.records.lost_stretches
+    if lost:
+        remarks.append(f"odometry: {lost} stretch(es) where the scan did not fit; the pose there is the motion model's")
+    share = pipeline.records.degenerate_share
+    if share > 0.2:
+        remarks.append(f"odometry: in {100 * share:.0f} % of the scans a direction is weakly observed (smooth walls?)")
+    if not pipeline.has_inclinometer:
+        remarks.append("no inclinometer in the log: the drive is treated as planar, heights are not observed")
+    if pipeline.sweeps.integrator.totals.refused_sweeps:
+        remarks.append(f"integration: {pipeline.sweeps.integrator.totals.refused_sweeps} sweeps without a finite pose left out")
+    return remarks
+
+
+def _cost(started: float, duration_s: float) -> dict[str, float]:
+    wall_s = max(time.monotonic() - started, 1e-6)
+    unit = 1024.0**2 if sys.platform == "darwin" else 1024.0
+    peak = process_resource.getrusage(process_resource.RUSAGE_SELF).ru_maxrss / unit
+    return {"wall_s": wall_s, "realtime_factor": duration_s / wall_s, "peak_memory_mib": peak}
+
+

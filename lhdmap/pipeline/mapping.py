@@ -1,0 +1,151 @@
+"""The mapping pipeline: attitude, wheels, planar odometry and integration as stages of one stream of messages.
+
+Scans wait until the inclinometer's filter has seen beyond them (a fixed delay), then go through the odometry; a sweep is
+integrated once a later pose is known, so that its motion is interpolated and not guessed. Nothing here knows files.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+
+from lhdmap.config import Settings
+from lhdmap.machine import Machine
+from lhdmap.messages import (
+    FloatArray,
+    Inclination,
+    Joints,
+    LaserScan,
+    Message,
+    Mount,
+    Tachometer,
+    WheelPose,
+)
+from lhdmap.odometry.planar import PlanarOdometry
+from lhdmap.odometry.scan_points import NO_BOXES
+from lhdmap.odometry.steps import OdometryStep, WheelSpeed
+from lhdmap.pipeline.mounts import Mounts, level_sensor
+from lhdmap.pipeline.records import ScanRecords
+from lhdmap.pipeline.sweeps import ScanSink, SweepIntegration
+from lhdmap.pipeline.track import Track
+from lhdmap.proprioception.attitude import AttitudeFilter
+from lhdmap.proprioception.slip import SlipEstimator
+from lhdmap.proprioception.wheels import WheelOdometry
+
+_LARGEST_TURN_SIGMA_RPS = 0.3
+_SHORTEST_NS = 1_000_000
+_DEFAULT_MACHINE = Machine()
+_QUEUE_SCANS = 2000  # a sensor that stops must not hold back scans without bound
+
+
+class MappingPipeline:
+    """Takes messages by role in time order; `finish` ends the stream. Trajectory and cloud are there at any time."""
+
+    def __init__(self, settings: Settings, machine: Machine | None = None, on_sweep: ScanSink | None = None) -> None:
+        self.settings = settings
+        self.machine = machine
+        self.mounts = Mounts(machine)
+        self.attitude = AttitudeFilter(settings.attitude)
+        self.wheels = WheelOdometry(settings.wheels, machine or _DEFAULT_MACHINE)
+        self.slip = SlipEstimator(settings.slip, settings.wheels.scale_std)
+        self.odometry = PlanarOdometry(settings.odometry, settings.anchor, settings.search, settings.range_flow)
+        self.sweeps = SweepIntegration(settings, machine, self.mounts, on_sweep)
+        self.track = Track()
+        self.records = ScanRecords()
+        self.has_inclinometer = False
+        self._newest_ns = self._time_ns = -(2**62)
+        self._travel_m = 0.0
+        self._waiting: deque[LaserScan] = deque()
+        self._boxes = own_boxes(machine, settings.integration.body_margin_m)
+
+    def update(self, role: str, message: Message) -> None:
+        """Take one message of the log."""
+        match message:
+            case LaserScan() if role == "front":
+                self._newest_ns = max(self._newest_ns, message.stamp_ns)
+                self._waiting.append(message)
+                self._process_ready()
+            case LaserScan():
+                self.sweeps.hold(role, message.stamp_ns, message)
+            case Inclination():
+                self._take_inclination(message)
+            case Tachometer() | Joints() | WheelPose():
+                self.wheels.update(message)
+            case Mount():
+                self.mounts.update(message)
+            case _:
+                pass
+
+    def finish(self) -> None:
+        """Say that the log has ended: what waits is processed with what there is."""
+        self.attitude.finish()
+        while self._waiting:
+            self._process(self._waiting.popleft())
+        self.sweeps.finish(self.track, self.wheels)
+
+    @property
+    def warnings(self) -> list[str]:
+        """What the stages found odd, in words."""
+        return [*self.mounts.warnings, *self.attitude.warnings.texts(), *self.wheels.warnings.texts()]
+
+    def _take_inclination(self, message: Inclination) -> None:
+        if not self.has_inclinometer:
+            self.has_inclinometer = True
+            if self.mounts.known(message.frame_id):
+                R_base_sensor = self.mounts.of(message.frame_id, "inclinometer").T_parent_child[:3, :3]
+                self.attitude = AttitudeFilter(self.settings.attitude, R_base_sensor)
+        self.attitude.update(message)
+
+    def _process_ready(self) -> None:
+        """Process the scans whose attitude later messages will not change."""
+        ready_ns = self.attitude.ready_until_ns(self._newest_ns) if self.has_inclinometer else self._newest_ns
+        while self._waiting and (self._waiting[0].stamp_ns <= ready_ns or len(self._waiting) > _QUEUE_SCANS):
+            self._process(self._waiting.popleft())
+
+    def _process(self, scan: LaserScan) -> None:
+        """Run one scan of the front scanner through all stages."""
+        time_ns, before_ns = max(scan.stamp_ns, self._time_ns + 1), self._time_ns
+        self._time_ns = time_ns
+        roll, pitch = self._attitude_at(time_ns)
+        T_level_sensor = level_sensor(self.mounts.of(scan.frame_id, "front"), roll, pitch)
+        step = self.odometry.update(scan._replace(stamp_ns=time_ns), T_level_sensor, self._wheel_speed(before_ns, time_ns), self._boxes)
+        self.records.add_scan(scan.stamp_ns, time_ns)
+        self.sweeps.hold("front", time_ns, scan)
+        if step.processed:
+            self.track.append(time_ns, step.T_odom_base, roll, pitch)
+            self._record(scan.stamp_ns, time_ns, step)
+            self.sweeps.advance(self.track, self.wheels)
+
+    def _attitude_at(self, time_ns: int) -> tuple[float, float]:
+        """Return roll and pitch; a log without inclinometer, or a gap of it, counts as level."""
+        found = self.attitude.attitude_at(time_ns) if self.has_inclinometer else None
+        return (0.0, 0.0) if found is None else (found.roll_rad, found.pitch_rad)
+
+    def _wheel_speed(self, before_ns: int, time_ns: int) -> WheelSpeed:
+        """Return the wheels' mean speeds since the scan before, as far as the sensors tell."""
+        motion = self.wheels.motion_between(before_ns, time_ns) if before_ns > 0 else None
+        if motion is None or time_ns - before_ns < _SHORTEST_NS:
+            return WheelSpeed(None, None)
+        dt_s = (time_ns - before_ns) * 1e-9
+        turning_known = math.sqrt(motion.covariance[2, 2]) / dt_s < _LARGEST_TURN_SIGMA_RPS
+        return WheelSpeed(float(motion.delta[0]) / dt_s, float(motion.delta[2]) / dt_s if turning_known else None)
+
+    def _record(self, stamp_ns: int, time_ns: int, step: OdometryStep) -> None:
+        wheel_mps = self.wheels.speed_at(time_ns)
+        speed_mps = float(step.velocity[0])
+        slip = math.nan
+        if wheel_mps is not None:
+            slip = self.slip.update(time_ns, wheel_mps, speed_mps)
+        match_ = (step.residual_m, step.support)
+        self.records.add_processed(stamp_ns, match_, step.information, step.substitute, (step.degenerate, step.lost), slip)
+        self.records.add_motion(time_ns, speed_mps, wheel_mps, self.wheels.articulation_at(time_ns))
+
+
+def own_boxes(machine: Machine | None, margin_m: float) -> FloatArray:
+    """Return the boxes of the front body with a margin, shape (K, 6), for scans of the front scanner."""
+    if machine is None:
+        return NO_BOXES
+    boxes = machine.boxes("base_link").reshape(-1, 6).copy()
+    boxes[:, :3] -= margin_m
+    boxes[:, 3:] += margin_m
+    return boxes

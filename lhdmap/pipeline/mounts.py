@@ -1,0 +1,65 @@
+"""Where the sensors sit: mounts of the log (`/tf_static`), else of the machine file, else level at `base_link`."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from lhdmap.geometry import se3
+from lhdmap.integration.self_filter import BODY_FRAMES
+from lhdmap.machine import Machine
+from lhdmap.messages import FloatArray, Mount
+
+_BY_ROLE = {"front": "lidar_front", "rear": "lidar_rear", "inclinometer": "inclinometer", "points": "lidar_points"}
+
+
+class Mounts:
+    """Mounts by sensor frame, found out once per frame; what had to be assumed is said in `warnings`."""
+
+    def __init__(self, machine: Machine | None) -> None:
+        self._machine = machine
+        self._edges: dict[str, Mount] = {}
+        self._found: dict[str, Mount] = {}
+        self.warnings: list[str] = []
+
+    def update(self, mount: Mount) -> None:
+        """Take one static transform of the log."""
+        if np.isfinite(mount.T_parent_child).all():
+            self._edges[mount.child_frame] = mount
+
+    def of(self, frame: str, role: str) -> Mount:
+        """Return the mount of a sensor frame on `base_link` or `rear_link`."""
+        if frame not in self._found:
+            self._found[frame] = self._chain(frame) or self._assumed(frame, role)
+        return self._found[frame]
+
+    def known(self, frame: str) -> bool:
+        """Return whether the log itself says where this frame sits."""
+        return self._chain(frame) is not None
+
+    def _chain(self, frame: str) -> Mount | None:
+        """Follow the transforms from the sensor up to a body; None where they do not lead to one."""
+        T = np.eye(4)
+        child, seen = frame, set()
+        while child not in BODY_FRAMES:
+            edge = self._edges.get(child)
+            if edge is None or child in seen:
+                return None
+            seen.add(child)
+            T = edge.T_parent_child @ T
+            child = edge.parent_frame
+        return Mount(0, child, frame, T)
+
+    def _assumed(self, frame: str, role: str) -> Mount:
+        if self._machine is not None and (found := self._machine.mounts.get(_BY_ROLE.get(role, role))):
+            self.warnings.append(f"no mount of '{frame}' in the log: that of the machine file '{self._machine.name}' is taken")
+            return Mount(0, found.parent, frame, found.T_parent_sensor)
+        if role == "rear":
+            self.warnings.append(f"no mount of '{frame}' in the log: a level scanner at base_link that looks back is assumed")
+            return Mount(0, "base_link", frame, se3.from_rpy(0.0, 0.0, np.pi))
+        self.warnings.append(f"no mount of '{frame}' in the log: a level sensor at base_link is assumed")
+        return Mount(0, "base_link", frame, np.eye(4))
+
+
+def level_sensor(mount: Mount, roll_rad: float, pitch_rad: float) -> FloatArray:
+    """Return the pose (4, 4) of a sensor of the front body in the machine's level frame: attitude applied, heading kept."""
+    return se3.from_rpy(roll_rad, pitch_rad, 0.0) @ mount.T_parent_child
