@@ -45,12 +45,26 @@ class SweepPoints(NamedTuple):
         return cls(np.empty((points, 3)), np.empty(points, dtype=np.int64), np.empty(3))
 
 
+class Limits(NamedTuple):
+    """Which returns are taken: ranges in [`low_m`, `high_m`] that do not stick out of the sweep.
+
+    A return is a stray one (dust, a drop of water) where it is nearer than the two beams on each side of it by more than
+    `stray_m + stray_share * range`. Infinite: none is.
+    """
+
+    low_m: float
+    high_m: float
+    stray_m: float = math.inf
+    stray_share: float = 0.0
+
+
 class Counts(NamedTuple):
-    """What became of a sweep's beams: kept points, beams without a return, returns from the machine itself."""
+    """What became of a sweep's beams: kept points, no returns, returns from the machine itself, stray returns."""
 
     kept: int
     no_return: int
     self_hits: int
+    strays: int
 
 
 class _Arc(NamedTuple):
@@ -106,7 +120,7 @@ def _put(points: FloatArray, n: int, arc: _Arc, share: float, point: tuple[float
 def project_scan(
     ranges_m: Float32Array,
     beams: BeamTable,
-    limits_m: tuple[float, float],
+    limits: Limits,
     span_ns: tuple[int, int],
     poses: SweepPoses,
     rig: Rig,
@@ -115,9 +129,9 @@ def project_scan(
     """Project a scan into the map.
 
     Args:
-        ranges_m: shape (N,); NaN, inf and values outside `limits_m` are no returns.
+        ranges_m: shape (N,); NaN, inf and values outside the limits are no returns.
         beams: directions, each of shape (N,).
-        limits_m: smallest and largest range.
+        limits: which returns are taken.
         span_ns: times of the first and of the last beam.
         poses: the machine at these times.
         rig: mount of the scanner and boxes of the bodies.
@@ -126,12 +140,15 @@ def project_scan(
     arc = _arc(poses, rig)
     out.viewpoint_map[:] = arc.t
     T_front, T_rear = body_poses(rig, 0.5 * (poses.articulation_start_rad + poses.articulation_end_rad))
-    n, no_return, own = 0, 0, 0
+    n, no_return, own, strays = 0, 0, 0, 0
     step = 1.0 / max(ranges_m.shape[0] - 1, 1)
     for i in range(ranges_m.shape[0]):
         r = np.float64(ranges_m[i])
-        if not (limits_m[0] <= r <= limits_m[1]):  # also true for NaN
+        if not (limits.low_m <= r <= limits.high_m):  # also true for NaN
             no_return += 1
+            continue
+        if _is_stray(ranges_m, i, limits):
+            strays += 1
             continue
         x, y = r * beams.cos[i], r * beams.sin[i]
         if r < rig.reach_m and (
@@ -142,14 +159,26 @@ def project_scan(
         _put(out.points_map, n, arc, i * step, (x, y, 0.0))
         out.stamps_ns[n] = span_ns[0] + round(i * step * (span_ns[1] - span_ns[0]))
         n += 1
-    return Counts(n, no_return, own)
+    return Counts(n, no_return, own, strays)
+
+
+@nb.njit(cache=True, nogil=True)
+def _is_stray(ranges_m: Float32Array, i: int, limits: Limits) -> bool:
+    """Return whether beam i is nearer than all of the four beams around it; a beam without a return counts as far."""
+    if ranges_m.shape[0] < 5 or math.isinf(limits.stray_m):
+        return False
+    farthest = ranges_m[i] + limits.stray_m + limits.stray_share * ranges_m[i]
+    for j in range(max(i - 2, 0), min(i + 3, ranges_m.shape[0])):
+        if j != i and limits.low_m <= ranges_m[j] <= farthest:
+            return False
+    return True
 
 
 @nb.njit(cache=True, nogil=True)
 def project_cloud(
     points_m: Float32Array,
     offsets_s: Float32Array,
-    limits_m: tuple[float, float],
+    limits: Limits,
     span_ns: tuple[int, int],
     poses: SweepPoses,
     rig: Rig,
@@ -166,7 +195,7 @@ def project_cloud(
     for i in range(points_m.shape[0]):
         x, y, z = np.float64(points_m[i, 0]), np.float64(points_m[i, 1]), np.float64(points_m[i, 2])
         r = math.sqrt(x * x + y * y + z * z)
-        if not (limits_m[0] <= r <= limits_m[1]):
+        if not (limits.low_m <= r <= limits.high_m):
             no_return += 1
             continue
         if r < rig.reach_m and (
@@ -178,4 +207,4 @@ def project_cloud(
         _put(out.points_map, n, arc, share, (x, y, z))
         out.stamps_ns[n] = span_ns[0] + round(share * (span_ns[1] - span_ns[0]))
         n += 1
-    return Counts(n, no_return, own)
+    return Counts(n, no_return, own, 0)

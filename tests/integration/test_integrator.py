@@ -63,7 +63,7 @@ def test_the_cloud_lies_on_the_wall(integrated: tuple[Integrator, Cloud]) -> Non
     assert np.quantile(distances, 0.95) < 0.04
     assert np.quantile(cloud.points_m[:, 0], [0.01, 0.99]) == pytest.approx([-40, 40], abs=20)
     totals = integrator.totals
-    assert totals.kept + totals.no_return + totals.self_hits == 60 * rooms.BEAMS
+    assert totals.kept + totals.no_return + totals.self_hits + totals.strays == 60 * rooms.BEAMS
     assert integrator.grid.hits == totals.kept
 
 
@@ -108,12 +108,41 @@ def test_it_runs_in_a_thread_beside_another() -> None:
 
 
 def test_range_limits_are_the_tighter_of_scanner_and_settings() -> None:
-    settings = IntegrationSettings(range_min_m=1.0, range_max_m=10.0)
+    settings = IntegrationSettings(range_min_m=1.0, range_max_m=10.0, stray_m=math.inf)
     ranges = np.array([0.5, 5.0, 9.9, 10.1, 30.0], dtype=np.float32)
     scan = LaserScan(0, "lidar_front", 0.0, 0.01, 0.0, 0.1, 9.95, ranges)
     integrator = Integrator(settings, MOUNTS, MACHINE)
-    assert integrator.update(scan, STILL).counts == (2, 3, 0)
-    assert integrator.update(scan._replace(range_max_m=80.0, range_min_m=7.0), STILL).counts == (1, 4, 0)
+    assert integrator.update(scan, STILL).counts == (2, 3, 0, 0)
+    assert integrator.update(scan._replace(range_max_m=80.0, range_min_m=7.0), STILL).counts == (1, 4, 0, 0)
+
+
+def test_dust_is_left_out_and_what_stands_in_front_of_a_wall_is_kept() -> None:
+    ranges = np.full(60, 8.0, dtype=np.float32)
+    ranges[[5, 20, 59]] = [2.0, 7.0, 3.0]  # single returns in front of the wall
+    ranges[[30, 31]] = 4.0  # a pole two beams wide
+    ranges[40:] += 3.0  # a step of the wall
+    ranges[50] = 8.9
+    ranges[53:56] = [np.inf, 1.5, np.nan]
+    scan = LaserScan(0, "lidar_front", -0.1, 0.005, 0.0, 0.1, 80.0, ranges)
+    integrator = Integrator(IntegrationSettings(), MOUNTS, MACHINE)
+    counts = integrator.update(scan, STILL).counts
+    assert counts == (60 - 2 - 5, 2, 0, 5)
+    assert Integrator(IntegrationSettings(stray_m=math.inf), MOUNTS, MACHINE).update(scan, STILL).counts[0] == 58
+
+
+def test_dust_in_a_drift_stays_out_of_the_cloud() -> None:
+    rng = np.random.default_rng(1)
+    integrator = Integrator(IntegrationSettings(), MOUNTS, MACHINE)
+    for t in np.arange(0.0, 0.8, 0.04):
+        scan = rooms.sweep(
+            rooms.tube_range, lambda s: driving(s) @ MOUNTS[0].T_parent_child, float(t), 0.02, SENSORS[0]
+        )
+        dusty = rng.random(rooms.BEAMS) < 0.03
+        ranges = np.where(dusty, scan.ranges_m * rng.uniform(0.1, 1.0, rooms.BEAMS), scan.ranges_m).astype(np.float32)
+        integrator.update(scan._replace(ranges_m=ranges), rooms.ends(driving, bending, float(t), 0.02))
+    distances = rooms.tube_distance(integrator.cloud().points_m.astype(float))
+    assert np.quantile(distances, 0.95) < 0.05
+    assert integrator.totals.strays > 100
 
 
 def test_a_cloud_message_is_taken_like_a_scan() -> None:
@@ -148,7 +177,7 @@ def test_a_sweep_without_a_pose_is_refused_and_counted() -> None:
 def test_an_empty_scan_and_an_empty_map_are_fine() -> None:
     integrator = Integrator(IntegrationSettings(), MOUNTS, MACHINE)
     scan = LaserScan(0, "lidar_front", 0.0, 0.1, 0.0, 0.1, 9.0, np.zeros(0, dtype=np.float32))
-    assert integrator.update(scan, STILL).counts == (0, 0, 0)
+    assert integrator.update(scan, STILL).counts == (0, 0, 0, 0)
     assert len(integrator.cloud()) == 0
 
 
