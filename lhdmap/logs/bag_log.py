@@ -61,7 +61,7 @@ class BagFile:
         entries, broken = rec.messages(data, self._channels)
         problem = problem or broken
         if problem is not None:
-            self._damage.add(f"block at byte {block.offset}: {problem}")
+            self._damage.add_once(f"block at byte {block.offset}: {problem}")
         return Loaded(data, entries)
 
     def _indexed(self, scan: Scan) -> Contents | None:

@@ -30,6 +30,7 @@ class DecodedLog:
         self._open = open_container
         self._container: Container | None = None
         self._findings = Findings()
+        self._skipped = Findings()
         self._keeper = StampKeeper()
 
     def __enter__(self) -> Self:
@@ -48,7 +49,7 @@ class DecodedLog:
     @property
     def damage(self) -> list[str]:
         """What was cut off, broken or skipped, one line each."""
-        return self._findings.lines()
+        return self._findings.lines() + self._skipped.lines()
 
     @property
     def remarks(self) -> list[str]:
@@ -107,6 +108,7 @@ class DecodedLog:
         plans = {number: self._plan(channel) for number, channel in self._chosen(topics).items()}
         known = {number: plan for number, plan in plans.items() if plan is not None}
         self._keeper = keeper = StampKeeper()
+        self._skipped = Findings()
         for log_ns, number, data in self._need().messages(known):
             plan = known[number]
             for message in self._decoded(plan, data):
@@ -117,7 +119,7 @@ class DecodedLog:
         try:
             return plan.decoder(Cursor(data, plan.encoding))
         except InputError as error:
-            self._findings.add(f"{plan.topic}: a message was skipped: {error}")
+            self._skipped.add(f"{plan.topic}: a message was skipped: {error}")
             return ()
 
     def _plan(self, channel: Channel) -> _Plan | None:

@@ -16,6 +16,10 @@ class Findings:
         """Note `text` once more."""
         self._counts[text] = self._counts.get(text, 0) + 1
 
+    def add_once(self, text: str) -> None:
+        """Note `text` unless it is noted already: for what is met again whenever the same place is read."""
+        self._counts.setdefault(text, 1)
+
     def lines(self) -> list[str]:
         """Return the texts, each with how often it was noted where that is more than once."""
         return [text if count == 1 else f"{text} ({count} times)" for text, count in self._counts.items()]

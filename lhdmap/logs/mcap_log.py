@@ -68,7 +68,7 @@ class McapFile:
         if problem is None and block.crc and zlib.crc32(data) != block.crc:
             problem = "its checksum does not fit; its messages are used as they are"
         if problem is not None:
-            self._damage.add(f"block at byte {block.offset}: {problem}")
+            self._damage.add_once(f"block at byte {block.offset}: {problem}")
         return Loaded(data, entries)
 
     def _summary(self) -> Contents | None:

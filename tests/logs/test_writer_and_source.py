@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import hashlib
 import shutil
+import sqlite3
+import struct
 from pathlib import Path
 
 import numpy as np
@@ -14,6 +16,7 @@ from lhdmap.logs import LogSource, open_log
 from lhdmap.logs.ros_messages import serialized
 from lhdmap.logs.writer import LogWriter
 from lhdmap.messages import GroundTruth, LaserScan, Mount, Tachometer, Text
+from mcap.writer import Writer
 from rosbags.rosbag2 import StoragePlugin
 from rosbags.rosbag2 import Writer as Bag2Writer
 from rosbags.typesys import Stores, get_typestore
@@ -220,3 +223,76 @@ def test_a_log_is_known_by_its_first_bytes_where_the_suffix_says_nothing(tmp_pat
 def test_a_log_can_be_read_twice(tmp_path: Path) -> None:
     with open_log(_write(tmp_path / "log.mcap", [START, START + 1])) as reader:
         assert [sum(1 for _ in reader.records()) for _ in range(2)] == [2, 2]
+
+
+@pytest.mark.parametrize(
+    ("encoding", "schema_encoding", "name"),
+    [
+        ("cdr", "ros2msg", "sensor_msgs/msg/LaserScan"),
+        ("cdr", "ros2idl", "sensor_msgs/msg/LaserScan"),
+        ("ros1", "ros1msg", "sensor_msgs/LaserScan"),
+    ],
+)
+def test_mcap_of_either_ros(tmp_path: Path, encoding: str, schema_encoding: str, name: str) -> None:
+    scan = _scan(START)
+    data = serialized(scan)[1]
+    if encoding == "ros1":  # a sequence number before the stamp, no alignment, no zero at the end of the frame
+        head = struct.pack("<IIII", 1, *divmod(START, SECOND), 5) + b"front"
+        data = head + struct.pack("<7f", -1.0, -0.51, 0.01, 0.0, 0.0, 0.1, 80.0)
+        data += struct.pack("<I", 50) + scan.ranges_m.tobytes() + struct.pack("<I", 0)
+    path = tmp_path / "log.mcap"
+    with path.open("wb") as file:
+        writer = Writer(file)
+        writer.start(profile=encoding)
+        schema = writer.register_schema(name, schema_encoding, b"")
+        writer.add_message(writer.register_channel("/scan", encoding, schema), START, data, START)
+        writer.finish()  # type: ignore[no-untyped-call]
+    with LogSource(path) as source:
+        ((role, got),) = source.messages()
+    assert role == "front"
+    assert isinstance(got, LaserScan)
+    assert (got.stamp_ns, got.frame_id, got.ranges_m.tolist()) == (START, "front", scan.ranges_m.tolist())
+
+
+def test_unknown_types_are_listed_and_skipped(tmp_path: Path) -> None:
+    path = tmp_path / "log.mcap"
+    with path.open("wb") as file:
+        writer = Writer(file)
+        writer.start(profile="")
+        schema = writer.register_schema("acme.Thing", "protobuf", b"xx")
+        writer.add_message(writer.register_channel("/thing", "protobuf", schema), START, b"yy", START)
+        writer.finish()  # type: ignore[no-untyped-call]
+    with open_log(path) as reader:
+        assert reader.topics()["/thing"].type_name == "acme.Thing"
+        assert list(reader.records()) == []
+        assert reader.damage == []
+
+
+def test_database_of_a_crashed_recorder_with_its_write_ahead_log(tmp_path: Path) -> None:
+    database = write_db3(tmp_path / "bag", 5)
+    with open_log(database) as reader:
+        whole = sum(1 for _ in reader.records())
+    connection = sqlite3.connect(database)
+    connection.execute("PRAGMA journal_mode=WAL")
+    connection.execute("PRAGMA wal_autocheckpoint=0")
+    connection.execute("INSERT INTO messages SELECT NULL, topic_id, timestamp + 1, data FROM messages")
+    connection.commit()
+    crashed = tmp_path / "crashed"
+    shutil.copytree(database.parent, crashed)  # while the recorder has it open
+    connection.close()
+    assert (crashed / (database.name + "-wal")).stat().st_size
+    with open_log(crashed / database.name) as reader:
+        assert sum(1 for _ in reader.records()) == 2 * whole
+
+
+def test_damage_is_told_once_however_often_it_is_read(tmp_path: Path) -> None:
+    path = _write(tmp_path / "log.mcap", [START + i for i in range(100)])
+    data = bytearray(path.read_bytes())
+    at = data.find(b"zstd") + 40
+    data[at : at + 8] = bytes(8)
+    path.write_bytes(data[:-40])
+    with open_log(path) as reader:
+        counts = [sum(1 for _ in reader.records()) for _ in range(3)]
+        assert counts[0] == counts[1] == counts[2]
+        assert len(reader.damage) == len(set(reader.damage))
+        assert not any("times)" in line for line in reader.damage)
