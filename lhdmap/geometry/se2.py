@@ -44,9 +44,9 @@ def between(T_w_a: FloatArray, T_w_b: FloatArray) -> FloatArray:
 
 @nb.njit(cache=True)
 def transform(T_a_b: FloatArray, points_b: FloatArray) -> FloatArray:
-    """Return points given in b, shape (N, 2), in frame a."""
+    """Return points given in b, shape (N, 2) or (N, 3), in frame a; heights stay."""
     c, s = math.cos(T_a_b[2]), math.sin(T_a_b[2])
-    out = np.empty((points_b.shape[0], 2))
+    out = points_b.copy()
     for i in range(points_b.shape[0]):
         out[i, 0] = T_a_b[0] + c * points_b[i, 0] - s * points_b[i, 1]
         out[i, 1] = T_a_b[1] + s * points_b[i, 0] + c * points_b[i, 1]

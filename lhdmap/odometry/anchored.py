@@ -22,6 +22,7 @@ _LOST_BEFORE_RESTART = 5
 _FEWEST_HITS = 10
 _HEADING_AXIS = np.diag([0.0, 0.0, 1.0])
 _JUMP_PRIOR = 0.01
+_FLAT_M = 0.02  # a scan whose heights differ by less is planar
 
 
 class AnchoredMatcher:
@@ -46,9 +47,11 @@ class AnchoredMatcher:
         self._inserted: FloatArray | None = None
         self._origin = np.zeros(3)
         self._lost_in_a_row = 0
+        self._layered = False
 
     def step(self, points: FloatArray, T_base_scanner: FloatArray) -> Matched:
-        """Match points (N, 2), level base frame, at the predicted pose; then correct the motion and grow the map."""
+        """Match points (N, 3), level base frame with absolute heights, at the predicted pose; correct the motion, grow the map."""
+        self._layered = self._layered or np.ptp(points[:, 2]) > _FLAT_M if len(points) else self._layered
         if len(points) < _FEWEST_HITS:
             return Matched(np.zeros((3, 3)), math.nan, 0.0, lost=True)
         if self._inserted is None:
@@ -71,7 +74,7 @@ class AnchoredMatcher:
         prior = motion + heading[1] * _HEADING_AXIS
         error = np.array([0.0, 0.0, heading[1] * se2.wrap(heading[0] - predicted[2])])
         predicted += np.linalg.solve(prior, error)
-        result = match(self._map, points, predicted, prior, predicted, self._model)
+        result = match(self._map, points, self._layered, predicted, prior, predicted, self._model)
         if self._trusted(result):
             return result
         thin = points[:: max(len(points) // self._wide.beams, 1)]
@@ -80,7 +83,7 @@ class AnchoredMatcher:
         )
         # A jump contradicts the prior by definition: it must not hold the match back, so it is weakened here.
         for start in starts[(np.abs(starts) < 1e29).all(axis=1)]:
-            found = match(self._map, points, predicted, _JUMP_PRIOR * prior, start, self._model)
+            found = match(self._map, points, self._layered, predicted, _JUMP_PRIOR * prior, start, self._model)
             if found.support > result.support + 0.02:
                 result = found
         return result

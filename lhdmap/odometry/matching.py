@@ -9,7 +9,7 @@ import numba as nb
 import numpy as np
 
 from lhdmap.messages import FloatArray
-from lhdmap.odometry.surface_map import SurfaceMap, fit_line
+from lhdmap.odometry.surface_map import fit_line
 
 
 class MatchModel(NamedTuple):
@@ -34,10 +34,10 @@ class Match(NamedTuple):
 
 
 @nb.njit(cache=True, nogil=True)
-def lines_at(map_: SurfaceMap, pose: FloatArray, points: FloatArray, min_cells: float, lines: FloatArray) -> int:
+def lines_at(map_, pose, points, layered, min_cells, lines):  # type: ignore[no-untyped-def]
     """Fit the wall's line at each scan point; return how many have one.
 
-    `points` (N, 2) in base frame; `lines` (N, 7): as `fit_line`, then the cell size of the level that served (0: none).
+    `points` (N, 3) in the level base frame, heights absolute; `lines` (N, 7): as `fit_line`, then the cell size of the level that served (0: none).
     """
     c, s = math.cos(pose[2]), math.sin(pose[2])
     found = 0
@@ -45,11 +45,11 @@ def lines_at(map_: SurfaceMap, pose: FloatArray, points: FloatArray, min_cells: 
         x = pose[0] + c * points[i, 0] - s * points[i, 1]
         y = pose[1] + s * points[i, 0] + c * points[i, 1]
         lines[i, 6] = 0.0
-        if fit_line(map_.fine, x, y, min_cells, lines[i]):
+        if fit_line(map_.fine, x, y, points[i, 2], layered, min_cells, lines[i]):
             lines[i, 6] = map_.fine.cell_m
-        elif fit_line(map_.middle, x, y, min_cells, lines[i]):
+        elif fit_line(map_.middle, x, y, points[i, 2], layered, min_cells, lines[i]):
             lines[i, 6] = map_.middle.cell_m
-        elif fit_line(map_.coarse, x, y, min_cells, lines[i]):
+        elif fit_line(map_.coarse, x, y, points[i, 2], layered, min_cells, lines[i]):
             lines[i, 6] = map_.coarse.cell_m
         found += lines[i, 6] > 0.0
     return found
@@ -123,10 +123,10 @@ def solve3(A: FloatArray, b: FloatArray) -> FloatArray:
 
 
 @nb.njit(cache=True, nogil=True)
-def match(map_, points, predicted, prior_information, start, model):  # type: ignore[no-untyped-def]
-    """Return the `Match` of `points` (N, 2), base frame: maximum a posteriori from `start` under the prior.
+def match(map_, points, layered, predicted, prior_information, start, model):  # type: ignore[no-untyped-def]
+    """Return the `Match` of `points` (N, 3), level base frame with absolute heights: maximum a posteriori from `start` under the prior.
 
-    The prior has mean `predicted` (3,) and weight `prior_information` (3, 3); lines are fitted anew when the pose has moved.
+    `layered`: the scanner tilts, heights matter. The prior has mean `predicted` (3,) and weight `prior_information` (3, 3); lines are fitted anew when the pose has moved.
     """
     pose = start.copy()
     lines = np.zeros((points.shape[0], 7))
@@ -134,7 +134,7 @@ def match(map_, points, predicted, prior_information, start, model):  # type: ig
     fine_m = map_.fine.cell_m
     found = 0
     for _ in range(model.rounds):
-        found = lines_at(map_, pose, points, model.min_cells, lines)
+        found = lines_at(map_, pose, points, layered, model.min_cells, lines)
         moved = 0.0
         for _ in range(3):
             normal_equations(pose, points, lines, fine_m, model, H, b)

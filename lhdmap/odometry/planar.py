@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
@@ -16,6 +17,16 @@ from lhdmap.odometry.steps import Matched, OdometryStep, WheelSpeed, body_inform
 
 _FIRST_SCANS = 10
 _NO_WHEELS = WheelSpeed(None, None)
+
+
+class View(NamedTuple):
+    """What else is known of a scan's surroundings: `height_m` of `base_link` in `odom`; `boxes_m` (K, 6): own bodies."""
+
+    height_m: float = 0.0
+    boxes_m: FloatArray = NO_BOXES
+
+
+_PLAIN = View()
 
 
 class PlanarOdometry:
@@ -50,16 +61,17 @@ class PlanarOdometry:
         self._wheels_used = False
 
     def update(
-        self, scan: LaserScan, T_level_sensor: FloatArray, wheels: WheelSpeed = _NO_WHEELS, boxes_m: FloatArray = NO_BOXES
+        self, scan: LaserScan, T_level_sensor: FloatArray, wheels: WheelSpeed = _NO_WHEELS, view: View = _PLAIN
     ) -> OdometryStep:
-        """Process one scan; `T_level_sensor` (4, 4): mount and attitude; `boxes_m` (K, 6): the machine's own bodies."""
+        """Process one scan; `T_level_sensor` (4, 4): mount and attitude."""
         dt_s = self._elapsed(scan.stamp_ns)
         self._fuse(wheels)
         self._motion.predict(dt_s)
         if not self._rate.due(dt_s, self._motion.velocity):
             return self._step(scan.stamp_ns, None)
         floor_m = self._settings.min_height_m if T_level_sensor[2, 3] > 2.0 * self._settings.min_height_m else -math.inf
-        points = planar_points(scan, T_level_sensor, self._motion.velocity, floor_m, boxes_m)
+        points = planar_points(scan, T_level_sensor, self._motion.velocity, floor_m, view.boxes_m)
+        points[:, 2] += view.height_m
         return self._step(scan.stamp_ns, self._matcher.step(points, _planar_mount(T_level_sensor)))
 
     def _elapsed(self, stamp_ns: int) -> float:

@@ -19,7 +19,7 @@ def planar_points(
     min_height_m: float = -math.inf,
     boxes_m: FloatArray = NO_BOXES,
 ) -> FloatArray:
-    """Return the hits as points, shape (N, 2), metres, in the level frame of `base_link` at the scan's stamp.
+    """Return the hits as points, shape (N, 3), metres, in the level frame of `base_link` at the scan's stamp.
 
     Args:
         scan: the scan; beams without a valid return are left out.
@@ -28,7 +28,7 @@ def planar_points(
         min_height_m: hits below this height in the level frame are floor and left out.
         boxes_m: shape (K, 6), x y z minimum and maximum of the machine's bodies in the level frame: own hits are left out.
     """
-    out = np.empty((scan.ranges_m.size, 2))
+    out = np.empty((scan.ranges_m.size, 3))
     count = _points(
         scan.ranges_m,
         (scan.angle_min_rad, scan.angle_increment_rad, scan.time_increment_s),
@@ -63,6 +63,7 @@ def _points(ranges, sweep, limits, T, velocity, min_height, boxes, out):  # type
         ch, sh = math.cos(0.5 * turn), math.sin(0.5 * turn)
         out[count, 0] = c * x - s * y + (ch * velocity[0] - sh * velocity[1]) * after
         out[count, 1] = s * x + c * y + (sh * velocity[0] + ch * velocity[1]) * after
+        out[count, 2] = z
         count += 1
     return count
 

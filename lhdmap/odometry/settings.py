@@ -46,6 +46,11 @@ class OdometrySettings:
     min_height_m: float = setting(
         0.35, unit="m", doc="Hits lower than this above the floor are not walls (scanner mounted above it).", source="lhdmap"
     )
+    height_lever_m: float = setting(
+        0.85, unit="m", minimum=0.0, maximum=10.0, source="half of half the wheelbase: docs/odometry.md",
+        doc="How far base_link is ahead of the point whose path slopes as the inclinometer says: half the wheelbase on stiff "
+        "bodies, 0 where the front body follows the floor under its own axle.",
+    )
 
 
 @dataclass(frozen=True, slots=True)

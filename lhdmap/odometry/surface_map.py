@@ -1,7 +1,9 @@
 """The local map that scans are matched against: hits averaged in cells of three sizes, walls as moving-least-squares lines.
 
-Each level is a grid that wraps around (its cell's key tells which place of the world it holds), so memory is fixed and the
-oldest places are replaced as the machine drives on. Coarse levels serve sparse, distant walls and starts.
+Each level is a grid that wraps around (a cell's tag tells which place of the world it holds), so memory is fixed and the
+oldest places are replaced as the machine drives on. Coarse levels serve sparse, distant walls and starts. A tilted scanner
+sees a wall at another height from each distance, and rock is rough in height, too: cells are layered in height, and the line
+at a point is the wall's at the height of that point.
 """
 
 from __future__ import annotations
@@ -17,13 +19,18 @@ from lhdmap.messages import FloatArray, Float32Array
 
 KERNEL_CELLS = 3  # a line is fitted to the cells within this many cells of a point
 KERNEL_SIGMA_CELLS = 2.0
+LAYERS = 8
+LAYER_M = 0.12
+_HEIGHT_SIGMA_M = 0.06
+_HEIGHT_FLOOR_M2 = 0.02**2  # spread in height below which no slope is fitted to it
 
 
 class Level(NamedTuple):
-    """One grid: `keys` (n * n,) int64, `hits` (n * n, 3) float32 as count and mean offset x, y from the cell's corner, metres."""
+    """One grid: `tags` (n, n, LAYERS) int32 (0: empty), `hits` (n, n, LAYERS, 4) float32 as count and mean offset x, y, z from
+    the cell's corner, metres."""
 
     cell_m: float
-    keys: npt.NDArray[np.int64]
+    tags: npt.NDArray[np.int32]
     hits: Float32Array
 
 
@@ -35,90 +42,120 @@ class SurfaceMap(NamedTuple):
     coarse: Level
 
 
-def empty_map(cell_m: float, cells: int = 2048) -> SurfaceMap:
+def empty_map(cell_m: float, cells: int = 1024) -> SurfaceMap:
     """Return an empty map with cells of `cell_m`, 3 x and 9 x that; the fine window is `cells * cell_m` wide."""
     return SurfaceMap(_level(cell_m, cells), _level(3 * cell_m, cells // 2), _level(9 * cell_m, cells // 4))
 
 
 def _level(cell_m: float, cells: int) -> Level:
-    # zeros are mapped lazily by the operating system: only pages that walls touch take memory; a key of 0 marks an empty cell
-    return Level(cell_m, np.zeros(cells * cells, dtype=np.int64), np.zeros((cells * cells, 3), dtype=np.float32))
+    # zeros are mapped lazily by the operating system: only pages that walls touch take memory
+    return Level(cell_m, np.zeros((cells, cells, LAYERS), np.int32), np.zeros((cells, cells, LAYERS, 4), np.float32))
 
 
 @nb.njit(cache=True, nogil=True, inline="always")
-def _key(ix: int, iy: int) -> int:
-    """Return a key, never 0, that tells the cell (ix, iy) from all others."""
-    return (ix + (1 << 30)) * (1 << 31) + (iy + (1 << 30)) + 1
+def _tag(ix: int, iy: int, iz: int, shift: int) -> int:
+    """Return a tag, never 0, that tells the cell (ix, iy, iz) from those that share its place in the window."""
+    return (((ix >> shift) & 0x7FF) << 20 | ((iy >> shift) & 0xFFF) << 8 | ((iz >> 3) & 0xFF)) + 1
 
 
 @nb.njit(cache=True, nogil=True)
 def insert(level: Level, points_m: FloatArray, count_limit: float) -> None:
-    """Average points, shape (N, 2), map frame, into their cells; beyond `count_limit` hits the mean forgets the oldest."""
-    size = int(math.sqrt(level.keys.size))
-    mask = size - 1
+    """Average points, shape (N, 3), map frame, into their cells; beyond `count_limit` hits the mean forgets the oldest."""
+    size = level.tags.shape[0]
+    mask, shift = size - 1, int(round(math.log2(size)))
     inverse = 1.0 / level.cell_m
     for i in range(points_m.shape[0]):
-        fx, fy = points_m[i, 0] * inverse, points_m[i, 1] * inverse
-        if not (abs(fx) < 1e8 and abs(fy) < 1e8):
+        fx, fy, fz = points_m[i, 0] * inverse, points_m[i, 1] * inverse, points_m[i, 2] / LAYER_M
+        if not (abs(fx) < 1e8 and abs(fy) < 1e8 and abs(fz) < 1e6):
             continue
-        ix, iy = int(math.floor(fx)), int(math.floor(fy))
-        slot = (ix & mask) * size + (iy & mask)
-        key = _key(ix, iy)
-        if level.keys[slot] != key:
-            level.keys[slot] = key
-            level.hits[slot, 0] = 0.0
-            level.hits[slot, 1] = 0.0
-            level.hits[slot, 2] = 0.0
-        n = min(level.hits[slot, 0] + 1.0, count_limit)
-        level.hits[slot, 0] = n
-        level.hits[slot, 1] += (points_m[i, 0] - ix * level.cell_m - level.hits[slot, 1]) / n
-        level.hits[slot, 2] += (points_m[i, 1] - iy * level.cell_m - level.hits[slot, 2]) / n
+        ix, iy, iz = int(math.floor(fx)), int(math.floor(fy)), int(math.floor(fz))
+        jx, jy, jz = ix & mask, iy & mask, iz & (LAYERS - 1)
+        tag = _tag(ix, iy, iz, shift)
+        cell = level.hits[jx, jy, jz]
+        if level.tags[jx, jy, jz] != tag:
+            level.tags[jx, jy, jz] = tag
+            cell[:] = 0.0
+        n = min(cell[0] + 1.0, count_limit)
+        cell[0] = n
+        cell[1] += (points_m[i, 0] - ix * level.cell_m - cell[1]) / n
+        cell[2] += (points_m[i, 1] - iy * level.cell_m - cell[2]) / n
+        cell[3] += (points_m[i, 2] - iz * LAYER_M - cell[3]) / n
 
 
 @nb.njit(cache=True, nogil=True)
-def fit_line(level: Level, x: float, y: float, min_cells: float, line: FloatArray) -> bool:
-    """Fit the wall near (x, y) by a line with Gaussian weights; return whether the cells there support one.
+def insert_all(map_: SurfaceMap, points_m: FloatArray, count_limit: float) -> None:
+    """Insert points, shape (N, 3), map frame, into all levels."""
+    insert(map_.fine, points_m, count_limit)
+    insert(map_.middle, points_m, count_limit)
+    insert(map_.coarse, points_m, count_limit)
 
-    `line`, shape (6,), receives: centre x, y, normal x, y, scatter across the line (variance, m²), effective number of cells.
+
+@nb.njit(cache=True, nogil=True)
+def fit_line(level: Level, x: float, y: float, z: float, layered: bool, min_cells: float, line: FloatArray) -> bool:
+    """Fit the wall near (x, y) at height z by a line with Gaussian weights; return whether the cells there support one.
+
+    `layered`: look at the layers above and below, too (a planar scan has one). `line`, shape (6,), receives: centre x, y at
+    that height, normal x, y, scatter across the line (variance, m²), effective number of cells.
     """
-    size = int(math.sqrt(level.keys.size))
-    mask = size - 1
+    size = level.tags.shape[0]
+    mask, shift = size - 1, int(round(math.log2(size)))
     cell = level.cell_m
-    cx, cy = int(math.floor(x / cell)), int(math.floor(y / cell))
-    scale = -0.5 / (KERNEL_SIGMA_CELLS * cell) ** 2
+    cx, cy, cz = int(math.floor(x / cell)), int(math.floor(y / cell)), int(math.floor(z / LAYER_M))
+    z_low = z_high = cz
+    if layered:  # the nearer neighbour: what is more than a layer away has no weight
+        if z / LAYER_M - cz < 0.5:
+            z_low = cz - 1
+        else:
+            z_high = cz + 1
+    scale, z_scale = -0.5 / (KERNEL_SIGMA_CELLS * cell) ** 2, -0.5 / _HEIGHT_SIGMA_M**2
     reach = (KERNEL_CELLS * cell) ** 2
-    s0 = s1 = sx = sy = sxx = sxy = syy = 0.0
+    s0 = s1 = sx = sy = sz = sxx = sxy = syy = sxz = syz = szz = 0.0
     for ix in range(cx - KERNEL_CELLS, cx + KERNEL_CELLS + 1):
-        row = (ix & mask) * size
+        jx = ix & mask
         for iy in range(cy - KERNEL_CELLS, cy + KERNEL_CELLS + 1):
-            slot = row + (iy & mask)
-            if level.keys[slot] != _key(ix, iy):
-                continue
-            dx = ix * cell + level.hits[slot, 1] - x
-            dy = iy * cell + level.hits[slot, 2] - y
-            d2 = dx * dx + dy * dy
-            if d2 > reach:
-                continue
-            n = level.hits[slot, 0]
-            w = math.exp(scale * d2) * n / (n + 1.0)
-            s0 += w
-            s1 += w * w
-            sx += w * dx
-            sy += w * dy
-            sxx += w * dx * dx
-            sxy += w * dx * dy
-            syy += w * dy * dy
-    if s0 <= 0.0:
+            jy = iy & mask
+            for iz in range(z_low, z_high + 1):
+                jz = iz & (LAYERS - 1)
+                if level.tags[jx, jy, jz] != _tag(ix, iy, iz, shift):
+                    continue
+                dx = ix * cell + level.hits[jx, jy, jz, 1] - x
+                dy = iy * cell + level.hits[jx, jy, jz, 2] - y
+                dz = iz * LAYER_M + level.hits[jx, jy, jz, 3] - z
+                d2 = dx * dx + dy * dy
+                if d2 > reach:
+                    continue
+                n = level.hits[jx, jy, jz, 0]
+                w = math.exp(scale * d2 + z_scale * dz * dz) * n / (n + 1.0)
+                s0 += w
+                s1 += w * w
+                sx += w * dx
+                sy += w * dy
+                sz += w * dz
+                sxx += w * dx * dx
+                sxy += w * dx * dy
+                syy += w * dy * dy
+                sxz += w * dx * dz
+                syz += w * dy * dz
+                szz += w * dz * dz
+    if s0 <= 1e-9:
         return False
     effective = s0 * s0 / s1
-    mx, my = sx / s0, sy / s0
+    # A line wants cells spread along it, and little beside it. Chords between a few sparse hits fit best where those beams
+    # hit before: they pull the estimate towards standing still.
+    if effective < min_cells:
+        return False
+    mx, my, mz = sx / s0, sy / s0, sz / s0
     cxx, cxy, cyy = sxx / s0 - mx * mx, sxy / s0 - mx * my, syy / s0 - my * my
+    if layered:  # the wall leans: take it at the point's own height
+        cxz, cyz = sxz / s0 - mx * mz, syz / s0 - my * mz
+        czz = szz / s0 - mz * mz + _HEIGHT_FLOOR_M2
+        lean_x, lean_y = cxz / czz, cyz / czz
+        mx, my = mx - lean_x * mz, my - lean_y * mz
+        cxx, cxy, cyy = cxx - lean_x * cxz, cxy - lean_x * cyz, cyy - lean_y * cyz
     half_trace, half_difference = 0.5 * (cxx + cyy), 0.5 * (cxx - cyy)
     root = math.sqrt(half_difference * half_difference + cxy * cxy)
     small, large = max(half_trace - root, 0.0), half_trace + root
-    # A line wants cells spread along it over about a kernel's width, and little beside it. Chords between a few sparse hits
-    # fit best where those beams hit before: they pull the estimate towards standing still.
-    if effective < min_cells or large < (0.7 * cell) ** 2 or small > 0.3 * large:
+    if large < (0.7 * cell) ** 2 or small > 0.3 * large:
         return False
     angle = 0.5 * math.atan2(2.0 * cxy, cxx - cyy)
     line[0] = x + mx
@@ -128,11 +165,3 @@ def fit_line(level: Level, x: float, y: float, min_cells: float, line: FloatArra
     line[4] = small
     line[5] = effective
     return True
-
-
-@nb.njit(cache=True, nogil=True)
-def insert_all(map_: SurfaceMap, points_m: FloatArray, count_limit: float) -> None:
-    """Insert points, shape (N, 2), map frame, into all levels."""
-    insert(map_.fine, points_m, count_limit)
-    insert(map_.middle, points_m, count_limit)
-    insert(map_.coarse, points_m, count_limit)

@@ -21,7 +21,7 @@ from lhdmap.messages import (
     Tachometer,
     WheelPose,
 )
-from lhdmap.odometry.planar import PlanarOdometry
+from lhdmap.odometry.planar import PlanarOdometry, View
 from lhdmap.odometry.scan_points import NO_BOXES
 from lhdmap.odometry.steps import OdometryStep, WheelSpeed
 from lhdmap.pipeline.mounts import Mounts, level_sensor
@@ -50,7 +50,7 @@ class MappingPipeline:
         self.slip = SlipEstimator(settings.slip, settings.wheels.scale_std)
         self.odometry = PlanarOdometry(settings.odometry, settings.anchor, settings.search, settings.range_flow)
         self.sweeps = SweepIntegration(settings, machine, self.mounts, on_sweep)
-        self.track = Track()
+        self.track = Track(settings.odometry.height_lever_m)
         self.records = ScanRecords()
         self.has_inclinometer = False
         self._newest_ns = self._time_ns = -(2**62)
@@ -108,7 +108,9 @@ class MappingPipeline:
         self._time_ns = time_ns
         roll, pitch = self._attitude_at(time_ns)
         T_level_sensor = level_sensor(self.mounts.of(scan.frame_id, "front"), roll, pitch)
-        step = self.odometry.update(scan._replace(stamp_ns=time_ns), T_level_sensor, self._wheel_speed(before_ns, time_ns), self._boxes)
+        view = View(self.track.height_m, self._boxes)
+        wheels = self._wheel_speed(before_ns, time_ns)
+        step = self.odometry.update(scan._replace(stamp_ns=time_ns), T_level_sensor, wheels, view)
         self.records.add_scan(scan.stamp_ns, time_ns)
         self.sweeps.hold("front", time_ns, scan)
         if step.processed:

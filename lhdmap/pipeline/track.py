@@ -29,7 +29,8 @@ class Track:
     (REP 103: positive pitch points down, positive roll lifts the left side).
     """
 
-    def __init__(self) -> None:
+    def __init__(self, height_lever_m: float = 0.0) -> None:
+        self._lever_m = height_lever_m
         self._times: list[int] = []
         self._poses: list[tuple[float, ...]] = []
 
@@ -40,6 +41,11 @@ class Track:
     def last_ns(self) -> int | None:
         """Time of the newest pose."""
         return self._times[-1] if self._times else None
+
+    @property
+    def height_m(self) -> float:
+        """Height of the newest pose, 0 at the start."""
+        return self._poses[-1][2] if self._poses else 0.0
 
     def append(self, time_ns: int, T_odom_base: FloatArray, roll_rad: float, pitch_rad: float) -> None:
         """Add a planar pose (3,) with its attitude; `time_ns` must rise."""
@@ -53,6 +59,8 @@ class Track:
             left = -math.sin(middle) * (x - x0) + math.cos(middle) * (y - y0)
             roll, pitch = 0.5 * (roll_rad + roll0), 0.5 * (pitch_rad + pitch0)
             z += -forward * math.tan(pitch) + left * math.tan(roll) / math.cos(pitch)
+            # The slope is that of the floor between the axles: base_link, at the front, is already further up or down it.
+            z -= self._lever_m * (math.tan(pitch_rad) - math.tan(pitch0))
         self._times.append(time_ns)
         self._poses.append((x, y, z, roll_rad, pitch_rad, heading))
 

@@ -1,0 +1,107 @@
+"""Planes of a voxel map: what a cloud's points are measured against, in metres, and what they can tell of the pose.
+
+VGICP's cost holds a pull along the surface towards the voxels' means, that is towards standing still; in a smooth tunnel
+it outweighs the walls. Here only distances to planes count, so that an axis without information shows as such and the
+motion's prior decides it.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from lhdmap.geometry import se3
+from lhdmap.messages import FloatArray
+from lhdmap.odometry.cloud_motion import exp, log, orthonormal
+
+_SHIFT, _BITS = 1 << 20, 21
+_CUTOFF = 3.0  # sigmas beyond which a point has no weight
+_ROUNDS = 5
+_SMALL_STEP = 1e-4
+_LEAST_POINTS = 12
+
+
+class PlaneFit(NamedTuple):
+    """A pose (4, 4) with the information (6, 6) of the cloud alone about it in body axes, the residual (m, rms of inliers),
+    the share of points that agree with the map (`support`) and that it covers (`covered`)."""
+
+    pose: FloatArray
+    information: FloatArray
+    residual_m: float
+    support: float
+    covered: float
+
+
+class PlaneMap:
+    """Planes of a `small_gicp.GaussianVoxelMap`, fitted when they are first asked for."""
+
+    def __init__(self, voxels: Any, voxel_m: float, noise_m: float) -> None:
+        """`voxels`: the map; `voxel_m`: its cell; `noise_m`: range noise of the scanner."""
+        self._voxel_m, self._noise_m = voxel_m, noise_m
+        self._means: FloatArray = voxels.voxel_points()[:, :3]
+        self._covariances = voxels.voxel_covs().reshape(-1, 4, 4)
+        keys = _keys(self._means, voxel_m)
+        self._order = np.argsort(keys)
+        self._keys = keys[self._order]
+        self._normals = np.zeros((len(keys), 3))
+        self._variances = np.full(len(keys), np.nan)
+
+    def fit(self, points: FloatArray, start: FloatArray, predicted: FloatArray, prior: FloatArray) -> PlaneFit:
+        """Return the pose of maximal posterior near `start` (4, 4): distances to planes and the prediction.
+
+        `points`: (N, 3) in `base_link`; `prior`: information (6, 6) of the `predicted` pose (4, 4).
+        """
+        pose = start
+        for _ in range(_ROUNDS):
+            H, g, _ = self._normal_equations(points, pose)
+            error = log(se3.inverse(predicted) @ pose)
+            step = -np.linalg.solve(H + prior, g + prior @ error)
+            pose = orthonormal(pose @ exp(step))
+            if np.abs(step).max() < _SMALL_STEP:
+                break
+        return self.judge(points, pose)
+
+    def judge(self, points: FloatArray, pose: FloatArray) -> PlaneFit:
+        """Return what the map says of a pose (4, 4) for `points` (N, 3) in `base_link`."""
+        H, _, distances = self._normal_equations(points, pose)
+        inside = distances[0] < _CUTOFF
+        residual = float(np.sqrt(np.mean(distances[1][inside] ** 2))) if inside.any() else float("nan")
+        return PlaneFit(pose, H, residual, float(inside.sum()) / len(points), len(inside) / len(points))
+
+    def _normal_equations(
+        self, points: FloatArray, pose: FloatArray
+    ) -> tuple[FloatArray, FloatArray, tuple[FloatArray, FloatArray]]:
+        """Return H (6, 6), gradient (6,), and the distances of the covered points in sigmas and in metres."""
+        seen, voxel = self._associate(points @ pose[:3, :3].T + pose[:3, 3])
+        p, normals = points[seen], self._normals[voxel]
+        distance = np.einsum("ij,ij->i", p @ pose[:3, :3].T + pose[:3, 3] - self._means[voxel], normals)
+        sigmas = np.abs(distance) / np.sqrt(self._variances[voxel])
+        weight = np.square(np.clip(1.0 - (sigmas / _CUTOFF) ** 2, 0.0, None)) / self._variances[voxel]
+        body = normals @ pose[:3, :3]
+        J = np.concatenate([np.cross(p, body), body], axis=1)
+        JW = J.T * weight
+        return JW @ J, JW @ distance, (sigmas, distance)
+
+    def _associate(self, points: FloatArray) -> tuple[npt.NDArray[np.intp], npt.NDArray[np.intp]]:
+        """Return indices of the points that lie in a voxel of the map, and of those voxels."""
+        keys = _keys(points, self._voxel_m)
+        place = np.minimum(np.searchsorted(self._keys, keys), len(self._keys) - 1)
+        seen = np.flatnonzero(self._keys[place] == keys)
+        voxel = self._order[place[seen]]
+        missing = np.unique(voxel[np.isnan(self._variances[voxel])])
+        if missing.size:
+            self._fit_planes(missing)
+        return seen, voxel
+
+    def _fit_planes(self, voxel: npt.NDArray[np.intp]) -> None:
+        """Fit normals and variances: in a voxel whose points' normals differ, distances to the one plane scatter more."""
+        spread, axes = np.linalg.eigh(self._covariances[voxel, :3, :3])
+        self._normals[voxel] = axes[:, :, 0]
+        self._variances[voxel] = self._noise_m**2 + np.clip(spread[:, 0], 0.0, 1.0) * self._voxel_m**2 / 12.0
+
+
+def _keys(points: FloatArray, voxel_m: float) -> npt.NDArray[np.int64]:
+    cells = np.clip(np.floor(points / voxel_m), -_SHIFT, _SHIFT - 1).astype(np.int64) + _SHIFT
+    return (cells[:, 0] << 2 * _BITS) | (cells[:, 1] << _BITS) | cells[:, 2]
