@@ -48,8 +48,8 @@ class SweepPoints(NamedTuple):
 class Limits(NamedTuple):
     """Which returns are taken: ranges in [`low_m`, `high_m`] that do not stick out of the sweep.
 
-    A return is a stray one (dust, a drop of water) where it is nearer than the two beams on each side of it by more than
-    `stray_m + stray_share * range`. Infinite: none is.
+    A return is a stray one (dust, a drop of water) where it is nearer than the two beams on each side of it by more
+    than `stray_m + stray_share * range`. Infinite: none is.
     """
 
     low_m: float

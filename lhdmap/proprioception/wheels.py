@@ -13,10 +13,10 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
-from lhdmap.geometry import se2
 from lhdmap.machine import Machine
 from lhdmap.messages import FloatArray, Joints, Tachometer, WheelPose
 from lhdmap.proprioception.articulated import covered, integrate_motion, interpolate, motion_covariance
+from lhdmap.proprioception.reckoning import DeadReckoning, ReckoningLimits
 from lhdmap.proprioception.samples import SampleBuffer, Warnings
 from lhdmap.settings import setting
 
@@ -48,11 +48,17 @@ class WheelSettings:
     pose_drift_deg: float = setting(
         1.0, unit="deg/m", minimum=0.0, doc="Dead reckoning: heading error for each metre driven."
     )
-    max_gap_s: float = setting(0.5, unit="s", minimum=0.01, doc="Across a longer gap there is no motion.")
+    max_gap_s: float = setting(0.5, unit="s", minimum=0.01, doc="Tachometer, joints: across a longer gap no motion.")
     max_hold_s: float = setting(0.2, unit="s", minimum=0.0, doc="The last samples stand for this long after them.")
     max_speed_mps: float = setting(15.0, unit="m/s", minimum=0.1, doc="A faster machine is an error of the sensor.")
     max_jump_m: float = setting(1.0, unit="m", minimum=0.0, doc="Dead reckoning may jump by this whatever the speed.")
+    max_pose_gap_s: float = setting(
+        1.5, unit="s", minimum=0.01, doc="Dead reckoning is interpolated between poses that are not farther apart."
+    )
     keep_s: float = setting(60.0, unit="s", minimum=1.0, doc="Samples are kept for this long.")
+
+
+RESOLUTION = 1e-3  # of poses in logs, m and rad
 
 
 class Motion(NamedTuple):
@@ -76,9 +82,11 @@ class WheelOdometry:
         keep_s = settings.keep_s
         self._speeds = SampleBuffer("tachometer", 1, keep_s, self.warnings)
         self._angles = SampleBuffer("articulation", 1, keep_s, self.warnings)
-        self._poses = SampleBuffer("wheel odometry", 4, keep_s, self.warnings)  # x, y, heading, number of the stretch
-        self._stretch = 0
         self._gap_ns, self._hold_ns = round(settings.max_gap_s * 1e9), round(settings.max_hold_s * 1e9)
+        limits = ReckoningLimits(
+            settings.max_speed_mps, settings.max_jump_m, round(settings.max_pose_gap_s * 1e9), self._hold_ns
+        )
+        self._poses = DeadReckoning(limits, keep_s, self.warnings)
 
     def update(self, message: Tachometer | Joints | WheelPose) -> None:
         """Take one message; values that cannot be are left out, with a warning."""
@@ -87,11 +95,19 @@ class WheelOdometry:
         elif isinstance(message, Joints):
             self._take_joints(message)
         else:
-            self._take_pose(message)
+            self._poses.update(message)
 
     def calibrate(self, scale: float, scale_std: float) -> None:
         """Set the factor from the tachometer's speed to the machine's, as `SlipEstimator` learns it."""
         self.scale, self.scale_std = scale, scale_std
+
+    def ready_until_ns(self, now_ns: int) -> int:
+        """Return the latest time up to which later messages will not change a motion any more.
+
+        `now_ns` is the newest stamp of the log. A sensor that has been silent for `max_gap_s` is not waited for.
+        """
+        newest = (samples.latest_ns for samples in (self._speeds, self._angles, self._poses.samples))
+        return min((ns for ns in newest if ns is not None and now_ns - ns <= self._gap_ns), default=now_ns)
 
     def speed_at(self, stamp_ns: int) -> float | None:
         """Return the tachometer's speed as it was measured (m/s, not calibrated), or None where there is none."""
@@ -106,17 +122,16 @@ class WheelOdometry:
         return float(interpolate(self._angles.stamps_ns, self._angles.rows[:, 0], stamp_ns))
 
     def motion_between(self, start_ns: int, end_ns: int) -> Motion | None:
-        """Return the motion between two times, or None where no sensor covers them or `end_ns` is earlier."""
-        if end_ns < start_ns:
-            return None
-        speeds = self._covers(self._speeds, start_ns, end_ns)
-        angles = self._covers(self._angles, start_ns, end_ns)
-        if speeds and angles:
+        """Return the motion between two times, or None where no sensor covers them.
+
+        Where `end_ns` is earlier there is none either, but for dead reckoning with poses of just these stamps.
+        """
+        speeds = end_ns >= start_ns and self._covers(self._speeds, start_ns, end_ns)
+        if speeds and self._covers(self._angles, start_ns, end_ns):
             return self._driven(start_ns, end_ns, "articulated")
-        if self._covers(self._poses, start_ns, end_ns):
-            motion = self._reckoned(start_ns, end_ns)
-            if motion is not None:
-                return motion
+        motion = self._reckoned(start_ns, end_ns)
+        if motion is not None:
+            return motion
         return self._driven(start_ns, end_ns, "tachometer") if speeds else None
 
     def _take_speed(self, message: Tachometer) -> None:
@@ -135,16 +150,6 @@ class WheelOdometry:
             )
             return
         self._angles.append(message.stamp_ns, (angle,))
-
-    def _take_pose(self, message: WheelPose) -> None:
-        last_ns, last = self._poses.latest_ns, self._poses.latest_row
-        if last_ns is not None and message.stamp_ns > last_ns:
-            moved_m = math.hypot(message.x_m - last[0], message.y_m - last[1])
-            allowed_m = self.settings.max_jump_m + self.settings.max_speed_mps * (message.stamp_ns - last_ns) / 1e9
-            if moved_m > allowed_m:
-                self._stretch += 1
-                self.warnings.add("wheel odometry: it jumps; no motion is taken across the jump")
-        self._poses.append(message.stamp_ns, (message.x_m, message.y_m, message.heading_rad, float(self._stretch)))
 
     def _covers(self, samples: SampleBuffer, start_ns: int, end_ns: int) -> bool:
         """Return whether samples go from start to end without a long gap (the last one may be held for a while)."""
@@ -171,32 +176,11 @@ class WheelOdometry:
         return Motion(delta, motion_covariance(along, settings.side_slip_std * path_m, heading, delta), source)
 
     def _reckoned(self, start_ns: int, end_ns: int) -> Motion | None:
-        """Return the difference of two wheel poses, or None across a jump."""
         settings = self.settings
-        start, end = self._pose_at(start_ns), self._pose_at(end_ns)
-        if start is None or end is None or start[3] != end[3]:
+        delta = self._poses.delta_between(start_ns, end_ns)
+        if delta is None:
             return None
-        delta = se2.between(start[:3], end[:3])
         path_m = math.hypot(delta[0], delta[1])
-        heading = math.hypot(settings.pose_turn_std * delta[2], math.radians(settings.pose_drift_deg) * path_m)
-        floor_m = 1e-3  # resolution of the poses in logs
-        along = math.hypot(settings.pose_distance_std * path_m, floor_m)
-        return Motion(delta, motion_covariance(along, along, math.hypot(heading, 1e-3), delta), "wheel_pose")
-
-    def _pose_at(self, stamp_ns: int) -> FloatArray | None:
-        """Return x, y, heading and stretch at a time, carried on from the last two where it is later; shape (4,)."""
-        stamps, rows = self._poses.stamps_ns, self._poses.rows
-        after = min(max(int(np.searchsorted(stamps, stamp_ns)), 1), len(stamps) - 1)
-        if len(stamps) == 1:
-            return rows[0].copy()
-        before, following = rows[after - 1], rows[after]
-        if stamp_ns == stamps[after]:
-            return following.copy()
-        if stamp_ns == stamps[after - 1]:
-            return before.copy()
-        if before[3] != following[3]:
-            return None
-        share = (stamp_ns - stamps[after - 1]) / (stamps[after] - stamps[after - 1])
-        step = following - before
-        step[2] = se2.wrap(step[2])
-        return before + share * step
+        turn = math.hypot(settings.pose_turn_std * delta[2], math.radians(settings.pose_drift_deg) * path_m)
+        along = math.hypot(settings.pose_distance_std * path_m, RESOLUTION)
+        return Motion(delta, motion_covariance(along, along, math.hypot(turn, RESOLUTION), delta), "wheel_pose")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -189,6 +190,36 @@ def test_wheel_poses_are_differenced_in_the_frame_of_the_start() -> None:
     assert motion is not None
     assert motion.source == "wheel_pose"
     assert motion.delta == pytest.approx([1.95, 0.0, 0.0], abs=1e-9)
+
+
+def test_dead_reckoning_goes_on_unseen_between_its_poses() -> None:
+    wheels = WheelOdometry(WheelSettings(), MACHINE)
+    for k in range(5):
+        wheels.update(WheelPose(ns(4.0 * k), 2.0 * k, 0.0, 0.0))
+    across = wheels.motion_between(ns(4.0), ns(12.0))
+    assert across is not None
+    assert across.delta == pytest.approx([4.0, 0.0, 0.0], abs=1e-12)
+    assert wheels.motion_between(ns(4.0), ns(10.0)) is None  # 10 s lies in a gap that is too long to interpolate
+
+
+def test_poses_that_share_the_scans_stamps_serve_also_where_these_run_backwards() -> None:
+    stamps = [ns(t) for t in (0.0, 0.4, 0.8, 0.5, 0.9, 1.3, 1.0, 1.4)]
+    wheels = WheelOdometry(WheelSettings(), MACHINE)
+    for k, stamp in enumerate(stamps):
+        wheels.update(WheelPose(stamp, 0.1 * k, 0.0, 0.0))
+    for before, after in pairwise(stamps):
+        motion = wheels.motion_between(before, after)
+        assert motion is not None
+        assert motion.delta[0] == pytest.approx(0.1, abs=1e-12)
+
+
+def test_ready_until_waits_for_the_slowest_sensor_but_not_for_a_dead_one() -> None:
+    wheels = WheelOdometry(WheelSettings(), MACHINE)
+    assert wheels.ready_until_ns(ns(9.0)) == ns(9.0)
+    wheels.update(Tachometer(ns(1.0), 1.0))
+    wheels.update(joints(ns(0.9), 0.0))
+    assert wheels.ready_until_ns(ns(1.1)) == ns(0.9)
+    assert wheels.ready_until_ns(ns(5.0)) == ns(5.0)
 
 
 def test_headings_are_interpolated_the_short_way_round() -> None:
