@@ -22,6 +22,10 @@ _LOST_BEFORE_RESTART = 5
 _FEWEST_HITS = 10
 _HEADING_AXIS = np.diag([0.0, 0.0, 1.0])
 _JUMP_PRIOR = 0.01
+_SURPRISE = 3.5  # sigmas from the prediction
+_USUAL_RESIDUAL = 0.75  # weighted rms in sigmas that matches have whose noise is stated rightly
+_NOISE_GAIN = 0.05
+_NOISE_SCALES = (0.8, 6.0)
 _FLAT_M = 0.02  # a scan whose heights differ by less is planar
 
 
@@ -48,6 +52,7 @@ class AnchoredMatcher:
         self._origin = np.zeros(3)
         self._lost_in_a_row = 0
         self._layered = False
+        self._noise_scale = 1.0
 
     def step(self, points: FloatArray, T_base_scanner: FloatArray) -> Matched:
         """Match points (N, 3), level base frame with absolute heights, at the predicted pose; correct the motion, grow the map."""
@@ -62,6 +67,7 @@ class AnchoredMatcher:
         if result.support < self._anchor.min_support:
             return self._lose(points, T_base_scanner, result.support)
         self._lost_in_a_row = 0
+        self._learn_noise(result.residual_sigmas)
         self._motion.correct(result.pose, result.information + heading[1] * _HEADING_AXIS)
         travelled = float(np.hypot(*(self._motion.pose[:2] - before[:2])))
         self._motion.forget(1.0 - math.exp(-travelled / self._anchor.memory_m))
@@ -76,7 +82,7 @@ class AnchoredMatcher:
         predicted += np.linalg.solve(prior, error)
         result = match(self._map, points, self._layered, predicted, prior, predicted, self._model)
         if self._trusted(result):
-            return result
+            return self._freed(points, result, predicted, prior)
         thin = points[:: max(len(points) // self._wide.beams, 1)]
         starts = search(
             np.concatenate(self._recent), thin, predicted, prior, self._reach(), self._wide.cell_m, math.radians(self._wide.step_deg)
@@ -87,6 +93,14 @@ class AnchoredMatcher:
             if found.support > result.support + 0.02:
                 result = found
         return result
+
+    def _freed(self, points: FloatArray, result: Match, predicted: FloatArray, prior: FloatArray) -> Match:
+        """Match again with a weak prior where the scan contradicts it: motion that no model of the past foretells."""
+        error = result.pose - predicted
+        if error @ prior @ error < _SURPRISE**2:
+            return result
+        again = match(self._map, points, self._layered, predicted, _JUMP_PRIOR * prior, result.pose, self._model)
+        return again if again.support >= result.support else result
 
     def _reach(self) -> FloatArray:
         """Return how far to search: three sigmas of the prediction within the settings' limits, metres and radians."""
@@ -130,6 +144,12 @@ class AnchoredMatcher:
             self._lost_in_a_row = 0
             self._begin(points, T_base_scanner)
         return Matched(np.zeros((3, 3)), math.nan, support, lost=True)
+
+    def _learn_noise(self, residual_sigmas: float) -> None:
+        """Follow the scanner's real noise (rounding to centimetres, dust) from the size of the residuals."""
+        self._noise_scale *= min(max(residual_sigmas / _USUAL_RESIDUAL, 0.5), 2.0) ** _NOISE_GAIN
+        self._noise_scale = min(max(self._noise_scale, _NOISE_SCALES[0]), _NOISE_SCALES[1])
+        self._model = self._model._replace(noise_m=self._noise_m * self._noise_scale)
 
     def _grow(self, points: FloatArray) -> None:
         """Insert the scan where the machine has moved on since the last one that was; the first scans always."""

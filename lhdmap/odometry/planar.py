@@ -9,14 +9,15 @@ import numpy as np
 
 from lhdmap.messages import FloatArray, LaserScan
 from lhdmap.odometry.anchored import AnchoredMatcher
+from lhdmap.odometry.clock import ScanClock
 from lhdmap.odometry.flow_matcher import FlowMatcher
 from lhdmap.odometry.motion import FORWARD, TURNING, Motion
 from lhdmap.odometry.scan_points import NO_BOXES, planar_points
 from lhdmap.odometry.settings import AnchorSettings, OdometrySettings, RangeFlowSettings, SearchSettings
-from lhdmap.odometry.steps import Matched, OdometryStep, WheelSpeed, body_information, marginal_information
+from lhdmap.odometry.steps import Matched, OdometryStep, WheelStep, body_information, marginal_information
 
 _FIRST_SCANS = 10
-_NO_WHEELS = WheelSpeed(None, None)
+_SHORTEST_STEP_S = 1e-3
 
 
 class View(NamedTuple):
@@ -32,8 +33,8 @@ _PLAIN = View()
 class PlanarOdometry:
     """Odometry with an adaptive frame rate: motion model, then a matcher (`settings.method`) that corrects it.
 
-    `update` takes scans in time order with the pose of the sensor in the machine's level frame, and the wheels' speeds since
-    the scan before where there are any.
+    `update` takes scans in time order with the pose of the sensor in the machine's level frame, and the wheels' motion since
+    the scan before where there is any.
     """
 
     def __init__(
@@ -56,16 +57,16 @@ class PlanarOdometry:
                 wide or SearchSettings(),
                 range_flow or RangeFlowSettings(),
             )
-        self._last_ns: int | None = None
+        self._clock = ScanClock()
         self._rate = AdaptiveRate(self._settings)
         self._wheels_used = False
 
     def update(
-        self, scan: LaserScan, T_level_sensor: FloatArray, wheels: WheelSpeed = _NO_WHEELS, view: View = _PLAIN
+        self, scan: LaserScan, T_level_sensor: FloatArray, wheels: WheelStep | None = None, view: View = _PLAIN
     ) -> OdometryStep:
         """Process one scan; `T_level_sensor` (4, 4): mount and attitude."""
-        dt_s = self._elapsed(scan.stamp_ns)
-        self._fuse(wheels)
+        dt_s = self._clock.step(scan.stamp_ns)
+        self._fuse(wheels, dt_s)
         self._motion.predict(dt_s)
         if not self._rate.due(dt_s, self._motion.velocity):
             return self._step(scan.stamp_ns, None)
@@ -74,17 +75,22 @@ class PlanarOdometry:
         points[:, 2] += view.height_m
         return self._step(scan.stamp_ns, self._matcher.step(points, _planar_mount(T_level_sensor)))
 
-    def _elapsed(self, stamp_ns: int) -> float:
-        """Return the time since the scan before; a stamp that runs backwards counts as no time."""
-        previous, self._last_ns = self._last_ns, stamp_ns if self._last_ns is None else max(stamp_ns, self._last_ns)
-        return 0.0 if previous is None else max(stamp_ns - previous, 0) * 1e-9
+    @property
+    def clock(self) -> ScanClock:
+        """What the motion model believes of the stamps."""
+        return self._clock
 
-    def _fuse(self, wheels: WheelSpeed) -> None:
+    def _fuse(self, wheels: WheelStep | None, dt_s: float) -> None:
+        """Tell the motion model the wheels' mean speeds; slipping wheels contradict it and stay out."""
         self._wheels_used = False
-        if wheels.forward_mps is not None:
-            self._wheels_used = self._motion.fuse_speed(FORWARD, wheels.forward_mps, self._settings.wheel_noise_mps, scaled=True)
-        if wheels.turning_rps is not None:
-            self._motion.fuse_speed(TURNING, wheels.turning_rps, self._settings.wheel_turn_noise_rps, scaled=False)
+        if wheels is None or dt_s < _SHORTEST_STEP_S:
+            return
+        s = self._settings
+        sigma_mps = math.hypot(wheels.forward_sigma_m / dt_s, s.wheel_noise_mps)
+        self._wheels_used = self._motion.fuse_speed(FORWARD, wheels.forward_m / dt_s, sigma_mps, scaled=True)
+        if wheels.turn_rad is not None:
+            sigma_rps = math.hypot(wheels.turn_sigma_rad / dt_s, s.wheel_turn_noise_rps)
+            self._motion.fuse_speed(TURNING, wheels.turn_rad / dt_s, sigma_rps, scaled=False)
 
     def _step(self, stamp_ns: int, matched: Matched | None) -> OdometryStep:
         pose, velocity = self._motion.pose, self._motion.velocity

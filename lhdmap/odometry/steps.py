@@ -12,11 +12,16 @@ from lhdmap.messages import FloatArray
 BY_DEFINITION = 1e8 * np.eye(3)  # information of the pose that defines a frame
 
 
-class WheelSpeed(NamedTuple):
-    """Body speeds by the wheels, mean since the scan before: forward and turning, with `None` for what is not measured."""
+class WheelStep(NamedTuple):
+    """Motion of the body by the wheels since the scan before: forward (m) and turn (rad) with standard deviations.
 
-    forward_mps: float | None
-    turning_rps: float | None
+    `None` for what is not measured.
+    """
+
+    forward_m: float
+    forward_sigma_m: float
+    turn_rad: float | None
+    turn_sigma_rad: float
 
 
 class Matched(NamedTuple):

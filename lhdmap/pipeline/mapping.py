@@ -23,7 +23,7 @@ from lhdmap.messages import (
 )
 from lhdmap.odometry.planar import PlanarOdometry, View
 from lhdmap.odometry.scan_points import NO_BOXES
-from lhdmap.odometry.steps import OdometryStep, WheelSpeed
+from lhdmap.odometry.steps import OdometryStep, WheelStep
 from lhdmap.pipeline.mounts import Mounts, level_sensor
 from lhdmap.pipeline.records import ScanRecords
 from lhdmap.pipeline.sweeps import ScanSink, SweepIntegration
@@ -32,8 +32,6 @@ from lhdmap.proprioception.attitude import AttitudeFilter
 from lhdmap.proprioception.slip import SlipEstimator
 from lhdmap.proprioception.wheels import WheelOdometry
 
-_LARGEST_TURN_SIGMA_RPS = 0.3
-_SHORTEST_NS = 1_000_000
 _DEFAULT_MACHINE = Machine()
 _QUEUE_SCANS = 2000  # a sensor that stops must not hold back scans without bound
 
@@ -54,23 +52,27 @@ class MappingPipeline:
         self.records = ScanRecords()
         self.has_inclinometer = False
         self._newest_ns = self._time_ns = -(2**62)
-        self._travel_m = 0.0
-        self._waiting: deque[LaserScan] = deque()
+        self._clock_ns = -(2**62)
+        self._disordered = False
+        self._waiting: deque[tuple[LaserScan, int]] = deque()
         self._boxes = own_boxes(machine, settings.integration.body_margin_m)
 
     def update(self, role: str, message: Message) -> None:
         """Take one message of the log."""
         match message:
             case LaserScan() if role == "front":
+                self._disordered |= message.stamp_ns < self._newest_ns
                 self._newest_ns = max(self._newest_ns, message.stamp_ns)
-                self._waiting.append(message)
+                self._waiting.append((message, self._rising(message.stamp_ns)))
                 self._process_ready()
             case LaserScan():
                 self.sweeps.hold(role, message.stamp_ns, message)
             case Inclination():
                 self._take_inclination(message)
-            case Tachometer() | Joints() | WheelPose():
+            case Tachometer() | Joints():
                 self.wheels.update(message)
+            case WheelPose():
+                self.wheels.update(message._replace(stamp_ns=self._rising(message.stamp_ns)))
             case Mount():
                 self.mounts.update(message)
             case _:
@@ -80,7 +82,7 @@ class MappingPipeline:
         """Say that the log has ended: what waits is processed with what there is."""
         self.attitude.finish()
         while self._waiting:
-            self._process(self._waiting.popleft())
+            self._process(*self._waiting.popleft())
         self.sweeps.finish(self.track, self.wheels)
 
     @property
@@ -99,18 +101,25 @@ class MappingPipeline:
     def _process_ready(self) -> None:
         """Process the scans whose attitude later messages will not change."""
         ready_ns = self.attitude.ready_until_ns(self._newest_ns) if self.has_inclinometer else self._newest_ns
-        while self._waiting and (self._waiting[0].stamp_ns <= ready_ns or len(self._waiting) > _QUEUE_SCANS):
-            self._process(self._waiting.popleft())
+        while self._waiting and (self._waiting[0][1] <= ready_ns or len(self._waiting) > _QUEUE_SCANS):
+            self._process(*self._waiting.popleft())
 
-    def _process(self, scan: LaserScan) -> None:
-        """Run one scan of the front scanner through all stages."""
-        time_ns, before_ns = max(scan.stamp_ns, self._time_ns + 1), self._time_ns
+    def _rising(self, stamp_ns: int) -> int:
+        """Return a stamp that never runs backwards once stamps of scans did: the order of the log then tells more."""
+        if self._disordered:
+            stamp_ns = max(stamp_ns, self._clock_ns + 1)
+        self._clock_ns = max(self._clock_ns, stamp_ns)
+        return stamp_ns
+
+    def _process(self, scan: LaserScan, stamp_ns: int) -> None:
+        """Run one scan of the front scanner through all stages; `stamp_ns` is its stamp made rising."""
+        time_ns, before_ns = max(stamp_ns, self._time_ns + 1), self._time_ns
         self._time_ns = time_ns
         roll, pitch = self._attitude_at(time_ns)
         T_level_sensor = level_sensor(self.mounts.of(scan.frame_id, "front"), roll, pitch)
         view = View(self.track.height_m, self._boxes)
-        wheels = self._wheel_speed(before_ns, time_ns)
-        step = self.odometry.update(scan._replace(stamp_ns=time_ns), T_level_sensor, wheels, view)
+        wheels = self._wheel_step(before_ns, time_ns)
+        step = self.odometry.update(scan, T_level_sensor, wheels, view)
         self.records.add_scan(scan.stamp_ns, time_ns)
         self.sweeps.hold("front", time_ns, scan)
         if step.processed:
@@ -123,14 +132,14 @@ class MappingPipeline:
         found = self.attitude.attitude_at(time_ns) if self.has_inclinometer else None
         return (0.0, 0.0) if found is None else (found.roll_rad, found.pitch_rad)
 
-    def _wheel_speed(self, before_ns: int, time_ns: int) -> WheelSpeed:
-        """Return the wheels' mean speeds since the scan before, as far as the sensors tell."""
+    def _wheel_step(self, before_ns: int, time_ns: int) -> WheelStep | None:
+        """Return the wheels' motion since the scan before, as far as the sensors tell."""
         motion = self.wheels.motion_between(before_ns, time_ns) if before_ns > 0 else None
-        if motion is None or time_ns - before_ns < _SHORTEST_NS:
-            return WheelSpeed(None, None)
-        dt_s = (time_ns - before_ns) * 1e-9
-        turning_known = math.sqrt(motion.covariance[2, 2]) / dt_s < _LARGEST_TURN_SIGMA_RPS
-        return WheelSpeed(float(motion.delta[0]) / dt_s, float(motion.delta[2]) / dt_s if turning_known else None)
+        if motion is None:
+            return None
+        forward_sigma, turn_sigma = math.sqrt(motion.covariance[0, 0]), math.sqrt(motion.covariance[2, 2])
+        turn = None if motion.source == "tachometer" else float(motion.delta[2])
+        return WheelStep(float(motion.delta[0]), forward_sigma, turn, turn_sigma)
 
     def _record(self, stamp_ns: int, time_ns: int, step: OdometryStep) -> None:
         wheel_mps = self.wheels.speed_at(time_ns)

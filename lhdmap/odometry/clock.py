@@ -1,0 +1,61 @@
+"""The time between scans for the motion model: the stamps', unless those bunch or run backwards."""
+
+from __future__ import annotations
+
+_SHARE_OF_PERIOD = 0.3  # a scan sooner than this part of the period came in a bunch
+_BUNCHED_SHARE = 0.08  # share of such scans beyond which the stamps are those of delivery, not of measurement
+_FORGET = 0.01
+_PULL = 0.1
+_LONGEST_PERIODS = 12.0
+_LEARN_SCANS = 30
+
+
+class ScanClock:
+    """Gives the time since the scan before.
+
+    Stamps are taken as they are while they are regular. Where many scans come at once, or stamps run backwards, they tell
+    when a message was delivered: the period is then steady and a slow loop keeps it in step with the stamps.
+    """
+
+    def __init__(self) -> None:
+        self._last_s: float | None = None
+        self._smooth_s = 0.0
+        self._period_s = 0.0
+        self._bunched = 0.0
+        self._scans = 0
+
+    @property
+    def bunched(self) -> bool:
+        """Whether the stamps are not believed."""
+        return self._scans > _LEARN_SCANS and self._bunched > _BUNCHED_SHARE
+
+    def step(self, stamp_ns: int) -> float:
+        """Return the time (s) since the scan before; 0 for the first."""
+        now_s = stamp_ns * 1e-9
+        if self._last_s is None:
+            self._last_s = self._smooth_s = now_s
+            return 0.0
+        dt_s = now_s - self._last_s
+        self._last_s = now_s
+        self._learn(dt_s)
+        if not self.bunched:
+            self._smooth_s = now_s
+            return max(dt_s, 0.0) if dt_s > 0.0 else self._period_s
+        return self._steady(now_s)
+
+    def _learn(self, dt_s: float) -> None:
+        self._scans += 1
+        forget = max(_FORGET, 1.0 / self._scans)
+        if abs(dt_s) < _LONGEST_PERIODS * self._period_s or self._scans < _LEARN_SCANS:
+            self._period_s += forget * (dt_s - self._period_s)
+        early = dt_s < _SHARE_OF_PERIOD * self._period_s
+        self._bunched += forget * (float(early) - self._bunched)
+
+    def _steady(self, now_s: float) -> float:
+        ahead_s = now_s - self._smooth_s - self._period_s
+        if abs(ahead_s) > _LONGEST_PERIODS * self._period_s:
+            step_s = max(now_s - self._smooth_s, self._period_s)
+        else:
+            step_s = min(max(self._period_s + _PULL * ahead_s, 0.5 * self._period_s), 3.0 * self._period_s)
+        self._smooth_s += step_s
+        return step_s
