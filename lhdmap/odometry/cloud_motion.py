@@ -96,7 +96,9 @@ class CloudMotion:
 
     def __init__(self, settings: CloudOdometrySettings) -> None:
         s = settings
-        density = [s.tilting_acceleration] * 2 + [s.turning_acceleration, s.forward_acceleration] + [s.side_acceleration] * 2
+        density = (
+            [s.tilting_acceleration] * 2 + [s.turning_acceleration, s.forward_acceleration] + [s.side_acceleration] * 2
+        )
         self._noise = np.diag(np.square(density))
         self._tilt_variance = math.radians(s.tilt_sigma_deg) ** 2
         self.pose: FloatArray = np.eye(4)
@@ -176,7 +178,9 @@ class CloudMotion:
         self.P = 0.5 * (P + P.T) + 1e-14 * np.eye(12)
 
 
-def _measured(prior: CloudPrior, dt_s: float) -> tuple[np.ndarray[tuple[int], np.dtype[np.intp]], FloatArray, FloatArray] | None:
+def _measured(
+    prior: CloudPrior, dt_s: float
+) -> tuple[np.ndarray[tuple[int], np.dtype[np.intp]], FloatArray, FloatArray] | None:
     """Return the axes of the twist that the prior knows, their speeds and covariance; None where it says nothing."""
     T, covariance = prior
     planar = covariance.shape == (3, 3)

@@ -18,30 +18,47 @@ class CloudOdometrySettings:
         source="comparison in a simulated drift (docs/odometry.md)",
     )
     voxel_m: float = setting(
-        0.5, unit="m", doc="Cell of the map in which hits are averaged to a plane.", minimum=0.05, maximum=5.0,
+        0.5,
+        unit="m",
+        doc="Cell of the map in which hits are averaged to a plane.",
+        minimum=0.05,
+        maximum=5.0,
         source="measured: 0.3 m halves the noise of a step, at twice the time",
     )
     sample_m: float = setting(
         0.25, unit="m", doc="A cloud is thinned to one point per cell of this size.", minimum=0.02, maximum=5.0
     )
     kiss_voxel_m: float = setting(
-        0.3, unit="m", doc="Voxel of kiss-icp's map; its own default of 1 m is too coarse for a drift.", minimum=0.05,
-        maximum=5.0, source="0.2-0.4 m measured alike",
+        0.3,
+        unit="m",
+        doc="Voxel of kiss-icp's map; its own default of 1 m is too coarse for a drift.",
+        minimum=0.05,
+        maximum=5.0,
+        source="0.2-0.4 m measured alike",
     )
     min_range_m: float = setting(0.5, unit="m", doc="Nearer hits are left out.", minimum=0.0)
     max_range_m: float = setting(60.0, unit="m", doc="Farther hits are left out.", minimum=1.0)
     range_noise_m: float = setting(
-        0.015, unit="m", doc="Range noise of the scanner, one sigma.", minimum=0.001, maximum=1.0,
+        0.015,
+        unit="m",
+        doc="Range noise of the scanner, one sigma.",
+        minimum=0.001,
+        maximum=1.0,
         source="data sheets of spinning scanners: 0.01-0.03 m",
     )
     insert_m: float = setting(0.2, unit="m", doc="Travel between clouds that enter the map.", minimum=0.0)
     insert_deg: float = setting(3.0, unit="deg", doc="Turn between clouds that enter the map.", minimum=0.0)
     window_m: float = setting(
-        60.0, unit="m", doc="The map forgets what was not seen again while the machine drove this far: its memory is bounded.",
+        60.0,
+        unit="m",
+        doc="The map forgets what was not seen again while the machine drove this far: its memory is bounded.",
         minimum=5.0,
     )
     memory_m: float = setting(
-        1.0, unit="m", doc="Travel over which the pose's uncertainty against the map is renewed with the map.", minimum=0.05,
+        1.0,
+        unit="m",
+        doc="Travel over which the pose's uncertainty against the map is renewed with the map.",
+        minimum=0.05,
         source="as in the planar odometry",
     )
     step_m: float = setting(
@@ -50,7 +67,10 @@ class CloudOdometrySettings:
     step_deg: float = setting(0.5, unit="deg", doc="... or has turned this far.", minimum=0.0)
     step_s: float = setting(0.25, unit="s", doc="... or this time has passed.", minimum=0.0)
     forward_acceleration: float = setting(
-        0.7, unit="m/s^2/sqrt(Hz)", doc="Spectral density of forward acceleration that the motion model allows.", minimum=0.001,
+        0.7,
+        unit="m/s^2/sqrt(Hz)",
+        doc="Spectral density of forward acceleration that the motion model allows.",
+        minimum=0.001,
         source="1 m/s^2 over 0.5 s: an LHD's braking",
     )
     side_acceleration: float = setting(
@@ -63,15 +83,25 @@ class CloudOdometrySettings:
         0.4, unit="rad/s^2/sqrt(Hz)", doc="The same in roll and pitch.", minimum=0.001, source="waves of the floor"
     )
     tilt_sigma_deg: float = setting(
-        0.5, unit="deg", doc="Trust in a given roll and pitch: shaking and lag included.", minimum=0.01, source="inclinometer"
+        0.5,
+        unit="deg",
+        doc="Trust in a given roll and pitch: shaking and lag included.",
+        minimum=0.01,
+        source="inclinometer",
     )
     weak_sigma_m: float = setting(
         0.02, unit="m", doc="A cloud that fixes a direction worse than this is flagged degenerate.", minimum=0.0
     )
     weak_sigma_deg: float = setting(0.2, unit="deg", doc="The same for the heading.", minimum=0.0)
     min_support: float = setting(
-        0.4, doc="Share of hits that must agree with the map; below it the cloud counts as lost.", minimum=0.0, maximum=1.0
+        0.4,
+        doc="Share of hits that must agree with the map; below it the cloud counts as lost.",
+        minimum=0.0,
+        maximum=1.0,
     )
     reach_m: float = setting(
-        2.0, unit="m", doc="How far along the machine's axis starts are tried when the prediction is unsure.", minimum=0.0
+        2.0,
+        unit="m",
+        doc="How far along the machine's axis starts are tried when the prediction is unsure.",
+        minimum=0.0,
     )
