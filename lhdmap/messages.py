@@ -128,7 +128,17 @@ class Mount(NamedTuple):
 
 
 Message = (
-    LaserScan | PointCloud | Inclination | Joints | Tachometer | WheelPose | GroundTruth | Pressure | Command | Text | Mount
+    LaserScan
+    | PointCloud
+    | Inclination
+    | Joints
+    | Tachometer
+    | WheelPose
+    | GroundTruth
+    | Pressure
+    | Command
+    | Text
+    | Mount
 )
 
 

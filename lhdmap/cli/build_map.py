@@ -13,12 +13,22 @@ from lhdmap.errors import UsageError
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options of `lhdmap build-map`."""
-    parser.add_argument("logs", nargs="+", type=Path, metavar="LOG", help="log file or bag folder; several are one drive")
+    parser.add_argument(
+        "logs", nargs="+", type=Path, metavar="LOG", help="log file or bag folder; several are one drive"
+    )
     parser.add_argument("-o", "--output", type=Path, metavar="DIR", help="map folder to make (default: beside the log)")
-    parser.add_argument("--config", type=Path, metavar="FILE.toml", help="settings over the defaults (lhdmap config prints them)")
-    parser.add_argument("--set", action="append", default=[], metavar="section.key=value", help="one setting; repeatable")
-    parser.add_argument("--topic", action="append", default=[], metavar="role=/topic", help="topic of a role, e.g. front=/scan")
-    parser.add_argument("--machine", type=Path, metavar="FILE.toml", help="machine description (dimensions, bodies, mounts)")
+    parser.add_argument(
+        "--config", type=Path, metavar="FILE.toml", help="settings over the defaults (lhdmap config prints them)"
+    )
+    parser.add_argument(
+        "--set", action="append", default=[], metavar="section.key=value", help="one setting; repeatable"
+    )
+    parser.add_argument(
+        "--topic", action="append", default=[], metavar="role=/topic", help="topic of a role, e.g. front=/scan"
+    )
+    parser.add_argument(
+        "--machine", type=Path, metavar="FILE.toml", help="machine description (dimensions, bodies, mounts)"
+    )
 
 
 def run(arguments: argparse.Namespace, console: Console) -> int:

@@ -11,7 +11,9 @@ from lhdmap.cli.console import Console
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options of `lhdmap config`."""
     parser.add_argument("--config", type=Path, metavar="FILE.toml", help="settings over the defaults")
-    parser.add_argument("--set", action="append", default=[], metavar="section.key=value", help="one setting; repeatable")
+    parser.add_argument(
+        "--set", action="append", default=[], metavar="section.key=value", help="one setting; repeatable"
+    )
 
 
 def run(arguments: argparse.Namespace, console: Console) -> int:

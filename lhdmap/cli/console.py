@@ -76,7 +76,9 @@ class _Meter:
         left = elapsed_s * (1.0 - share) / share if share > 0 else math.inf
         rate = share * self._total / elapsed_s if elapsed_s > 0 else 0.0
         text = f"{self._label}: {100 * share:3.0f} %, {rate:.1f} x real time, {left:.0f} s left"
-        print(f"\r{text}   " if self._terminal else text, end="" if self._terminal else "\n", file=sys.stderr, flush=True)
+        print(
+            f"\r{text}   " if self._terminal else text, end="" if self._terminal else "\n", file=sys.stderr, flush=True
+        )
 
     def close(self) -> None:
         if self._terminal and self._shown > self._start:

@@ -49,7 +49,9 @@ def entry_point() -> None:
 
 
 def _parser(chosen: str) -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(prog="lhdmap", description="From a scanner log of a load-haul-dump machine to a map.")
+    parser = argparse.ArgumentParser(
+        prog="lhdmap", description="From a scanner log of a load-haul-dump machine to a map."
+    )
     parser.add_argument("--version", action="version", version=f"lhdmap {__version__}")
     commands = parser.add_subparsers(dest="command", metavar="COMMAND", title="commands")
     for name, summary in COMMANDS.items():
@@ -66,7 +68,9 @@ def _module(name: str):  # type: ignore[no-untyped-def]  # a module has no type 
 
 def _add_common(parser: argparse.ArgumentParser) -> None:
     group = parser.add_argument_group("common options")
-    group.add_argument("--json", action="store_true", help="one JSON object on standard output, all else on standard error")
+    group.add_argument(
+        "--json", action="store_true", help="one JSON object on standard output, all else on standard error"
+    )
     group.add_argument("--quiet", action="store_true", help="no progress and no notes; warnings and errors stay")
     group.add_argument("--debug", action="store_true", help="show the traceback of an error")
 

@@ -117,6 +117,8 @@ def _pose_topics(found: CarmenSurvey, lasers: list[str]) -> dict[str, str]:
     posed = next((name for name in lasers if found.first[name].robot_pose is not None), None)
     if found.corrected and posed is not None:
         topics[posed] = _TRUTH + posed
+    elif posed in found.posed:  # the pose at the scan itself: better than ODOM lines, whose stamps are others
+        topics[posed] = f"{posed}/odom"
     elif not found.corrected and "ODOM" in found.counts:
         topics["ODOM"] = "ODOM"
     elif not found.corrected and posed is not None:

@@ -48,6 +48,7 @@ class CarmenSurvey:
     no_return_m: dict[str, float] = field(default_factory=dict)
     mounts: dict[str, FloatArray] = field(default_factory=dict)
     first: dict[str, lines.LaserLine] = field(default_factory=dict)
+    posed: set[str] = field(default_factory=set)  # lasers whose lines carry a robot pose that changes
 
 
 def survey(path: Path) -> CarmenSurvey:
@@ -76,7 +77,9 @@ def _count(found: CarmenSurvey, name: str, line: bytes, samples: dict[str, list[
         stamp = lines.stamp_of(words[-3]) if len(words) > 3 else 0
         if name in PARSERS and _sampled(count):
             scan = PARSERS[name](words)
-            found.first.setdefault(name, scan)
+            first = found.first.setdefault(name, scan)
+            if scan.robot_pose is not None and scan.robot_pose != first.robot_pose:
+                found.posed.add(name)
             samples.setdefault(name, []).append(scan.ranges_m)
     except InputError:
         return

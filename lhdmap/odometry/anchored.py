@@ -85,7 +85,13 @@ class AnchoredMatcher:
             return self._freed(points, result, predicted, prior)
         thin = points[:: max(len(points) // self._wide.beams, 1)]
         starts = search(
-            np.concatenate(self._recent), thin, predicted, prior, self._reach(), self._wide.cell_m, math.radians(self._wide.step_deg)
+            np.concatenate(self._recent),
+            thin,
+            predicted,
+            prior,
+            self._reach(),
+            self._wide.cell_m,
+            math.radians(self._wide.step_deg),
         )
         # A jump contradicts the prior by definition: it must not hold the match back, so it is weakened here.
         for start in starts[(np.abs(starts) < 1e29).all(axis=1)]:
@@ -110,7 +116,9 @@ class AnchoredMatcher:
 
     def _trusted(self, result: Match) -> bool:
         """Return whether most of the hits that the map covers agree with it."""
-        return result.support > 0.6 or (result.support > 0.8 * result.covered and result.support > self._anchor.min_support)
+        return result.support > 0.6 or (
+            result.support > 0.8 * result.covered and result.support > self._anchor.min_support
+        )
 
     def _begin(self, points: FloatArray, T_base_scanner: FloatArray) -> Matched:
         """Start the map with one scan; it is the reference for those that follow closely."""
@@ -155,7 +163,9 @@ class AnchoredMatcher:
         """Insert the scan where the machine has moved on since the last one that was; the first scans always."""
         assert self._inserted is not None
         step = self._motion.pose - self._inserted
-        still = np.hypot(*step[:2]) < self._anchor.insert_m and abs(se2.wrap(step[2])) < math.radians(self._anchor.insert_deg)
+        still = np.hypot(*step[:2]) < self._anchor.insert_m and abs(se2.wrap(step[2])) < math.radians(
+            self._anchor.insert_deg
+        )
         if not still or len(self._recent) < _YOUNG_SCANS:
             self._insert(points)
 

@@ -16,8 +16,6 @@ from lhdmap.odometry.cloud_planes import PlaneFit
 from lhdmap.odometry.cloud_settings import CloudOdometrySettings
 from lhdmap.odometry.scan_points import NO_BOXES
 
-__all__ = ["CloudOdometry", "CloudPrior", "CloudStep", "undistorted"]
-
 _FIRST_CLOUDS = 10
 _LEAST_POINTS = 100
 _LOST_BEFORE_RESTART = 10

@@ -18,6 +18,7 @@ from lhdmap.odometry.cloud_motion import exp, log, orthonormal
 
 _SHIFT, _BITS = 1 << 20, 21
 _CUTOFF = 3.0  # sigmas beyond which a point has no weight
+_MEDIAN = 0.6745  # median of |x| in sigmas for a normal distribution
 _ROUNDS = 5
 _SMALL_STEP = 1e-4
 _LEAST_POINTS = 12
@@ -78,7 +79,9 @@ class PlaneMap:
         p, normals = points[seen], self._normals[voxel]
         distance = np.einsum("ij,ij->i", p @ pose[:3, :3].T + pose[:3, 3] - self._means[voxel], normals)
         sigmas = np.abs(distance) / np.sqrt(self._variances[voxel])
-        weight = np.square(np.clip(1.0 - (sigmas / _CUTOFF) ** 2, 0.0, None)) / self._variances[voxel]
+        scale = max(float(np.median(sigmas)) / _MEDIAN, 1.0) if seen.size else 1.0
+        kernel = np.square(np.clip(1.0 - (sigmas / (_CUTOFF * scale)) ** 2, 0.0, None))
+        weight = kernel / (scale**2 * self._variances[voxel])
         body = normals @ pose[:3, :3]
         J = np.concatenate([np.cross(p, body), body], axis=1)
         JW = J.T * weight

@@ -37,7 +37,10 @@ class FlowMatcher:
         if not self._references:
             self._refer(levels, T_base_scanner)
             return Matched(BY_DEFINITION, 0.0, 1.0, lost=False)
-        found = [compare(one, levels, T_base_scanner, self._motion, self._noise_m, self._settings) for one in self._references]
+        found = [
+            compare(one, levels, T_base_scanner, self._motion, self._noise_m, self._settings)
+            for one in self._references
+        ]
         best = max(found, key=lambda one: one.support)
         agreeing = [one for one in found if one.support >= self._settings.min_support]
         if not agreeing:

@@ -59,7 +59,9 @@ def predict(state: FloatArray, P: FloatArray, dt_s: float, acceleration: FloatAr
 
 
 @nb.njit(cache=True, nogil=True)
-def update_speed(state: FloatArray, P: FloatArray, axis: int, measured: float, variance: float, scaled: bool, gate: float) -> float:
+def update_speed(
+    state: FloatArray, P: FloatArray, axis: int, measured: float, variance: float, scaled: bool, gate: float
+) -> float:
     """Fuse one measured body speed (axis 3 forward, 4 lateral, 5 turning), in place; return its squared normalised innovation.
 
     With `scaled` the measurement is `state[6]` times the speed. Beyond `gate` (sigmas) the measurement is left out.

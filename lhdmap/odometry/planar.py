@@ -68,7 +68,7 @@ class PlanarOdometry:
         dt_s = self._clock.step(scan.stamp_ns)
         self._fuse(wheels, dt_s)
         self._motion.predict(dt_s)
-        if not self._rate.due(dt_s, self._motion.velocity):
+        if not self._rate.due(dt_s, self._motion.velocity) and not self._clock.bunched:
             return self._step(scan.stamp_ns, None)
         floor_m = self._settings.min_height_m if T_level_sensor[2, 3] > 2.0 * self._settings.min_height_m else -math.inf
         points = planar_points(scan, T_level_sensor, self._motion.velocity, floor_m, view.boxes_m)
@@ -96,12 +96,23 @@ class PlanarOdometry:
         pose, velocity = self._motion.pose, self._motion.velocity
         covariance = body_information(self._motion.P[:3, :3], pose[2])
         if matched is None:
-            return OdometryStep(stamp_ns, pose, covariance, velocity, np.zeros(3), math.nan, math.nan, False, "", False, False)
+            return OdometryStep(
+                stamp_ns, pose, covariance, velocity, np.zeros(3), math.nan, math.nan, False, "", False, False
+            )
         information = marginal_information(body_information(matched.information, pose[2]))
         weak = self._weak(information) or matched.lost
         substitute = ("wheels" if self._wheels_used else "motion") if weak else ""
         return OdometryStep(
-            stamp_ns, pose, covariance, velocity, information, matched.residual_m, matched.support, weak, substitute, True,
+            stamp_ns,
+            pose,
+            covariance,
+            velocity,
+            information,
+            matched.residual_m,
+            matched.support,
+            weak,
+            substitute,
+            True,
             matched.lost,
         )
 
@@ -113,7 +124,9 @@ class PlanarOdometry:
 
 def _planar_mount(T_level_sensor: FloatArray) -> FloatArray:
     """Return the scanner's planar pose (3,) in the level base frame."""
-    return np.array([T_level_sensor[0, 3], T_level_sensor[1, 3], math.atan2(T_level_sensor[1, 0], T_level_sensor[0, 0])])
+    return np.array(
+        [T_level_sensor[0, 3], T_level_sensor[1, 3], math.atan2(T_level_sensor[1, 0], T_level_sensor[0, 0])]
+    )
 
 
 class AdaptiveRate:

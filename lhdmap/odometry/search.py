@@ -113,7 +113,9 @@ def _climb(field, predicted, cell_m, points, information, step_rad, entry):  # t
                 for sign in (-1.0, 1.0):
                     trial = pose.copy()
                     trial[axis] += sign * (turn if axis == 2 else shift)
-                    trial_value = score(field, predicted[:2], cell_m, points, trial) + _tie(trial - predicted, information)
+                    trial_value = score(field, predicted[:2], cell_m, points, trial) + _tie(
+                        trial - predicted, information
+                    )
                     if trial_value > value + 1e-6:
                         pose, value, improved = trial, trial_value, True
         shift *= 0.5

@@ -64,14 +64,15 @@ def build_map(request: BuildRequest) -> BuildResult:
     started = time.monotonic()
     with LogSource(list(request.logs), request.topics) as source, MapFolderWriter(request.target) as folder:
         hashes, pool = _hash_in_background(request.logs)
-        with pool, RecordingWriter(folder.path / "recording.rrd", request.target.name, source.start_ns or 0) as recording:
+        with (
+            pool,
+            RecordingWriter(folder.path / "recording.rrd", request.target.name, source.start_ns or 0) as recording,
+        ):
             pipeline = MappingPipeline(request.settings, _machine(request, source), _sweep_sink(recording))
             _run(pipeline, source, request.progress)
             outcome = _Outcome(request, source, pipeline, started)
             _write(folder, outcome, recording)
-        info = MapInfo(
-            request.logs, settings_table(request.settings), outcome.summary, outcome.warnings
-        )
+        info = MapInfo(request.logs, settings_table(request.settings), outcome.summary, outcome.warnings)
         final = folder.complete(info, {path: future.result() for path, future in hashes.items()})
     summary = outcome.summary | {"map": str(final)} | _cost(started, outcome.duration_s)
     return BuildResult(final, summary, outcome.warnings, outcome.final)
@@ -192,7 +193,9 @@ def _remarks(pipeline: MappingPipeline) -> list[str]:
     if not pipeline.has_inclinometer:
         remarks.append("no inclinometer in the log: the drive is treated as planar, heights are not observed")
     if pipeline.sweeps.integrator.totals.refused_sweeps:
-        remarks.append(f"integration: {pipeline.sweeps.integrator.totals.refused_sweeps} sweeps without a finite pose left out")
+        remarks.append(
+            f"integration: {pipeline.sweeps.integrator.totals.refused_sweeps} sweeps without a finite pose left out"
+        )
     return remarks
 
 
@@ -201,5 +204,3 @@ def _cost(started: float, duration_s: float) -> dict[str, float]:
     unit = 1024.0**2 if sys.platform == "darwin" else 1024.0
     peak = process_resource.getrusage(process_resource.RUSAGE_SELF).ru_maxrss / unit
     return {"wall_s": wall_s, "realtime_factor": duration_s / wall_s, "peak_memory_mib": peak}
-
-

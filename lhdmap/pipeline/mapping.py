@@ -73,6 +73,7 @@ class MappingPipeline:
                 self.wheels.update(message)
             case WheelPose():
                 self.wheels.update(message._replace(stamp_ns=self._rising(message.stamp_ns)))
+                self._process_ready()
             case Mount():
                 self.mounts.update(message)
             case _:
@@ -99,8 +100,10 @@ class MappingPipeline:
         self.attitude.update(message)
 
     def _process_ready(self) -> None:
-        """Process the scans whose attitude later messages will not change."""
-        ready_ns = self.attitude.ready_until_ns(self._newest_ns) if self.has_inclinometer else self._newest_ns
+        """Process the scans whose attitude and wheel motion later messages will not change."""
+        ready_ns = self.wheels.ready_until_ns(self._newest_ns)
+        if self.has_inclinometer:
+            ready_ns = min(ready_ns, self.attitude.ready_until_ns(self._newest_ns))
         while self._waiting and (self._waiting[0][1] <= ready_ns or len(self._waiting) > _QUEUE_SCANS):
             self._process(*self._waiting.popleft())
 
@@ -148,7 +151,9 @@ class MappingPipeline:
         if wheel_mps is not None:
             slip = self.slip.update(time_ns, wheel_mps, speed_mps)
         match_ = (step.residual_m, step.support)
-        self.records.add_processed(stamp_ns, match_, step.information, step.substitute, (step.degenerate, step.lost), slip)
+        self.records.add_processed(
+            stamp_ns, match_, step.information, step.substitute, (step.degenerate, step.lost), slip
+        )
         self.records.add_motion(time_ns, speed_mps, wheel_mps, self.wheels.articulation_at(time_ns))
 
 

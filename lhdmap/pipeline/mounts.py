@@ -51,10 +51,14 @@ class Mounts:
 
     def _assumed(self, frame: str, role: str) -> Mount:
         if self._machine is not None and (found := self._machine.mounts.get(_BY_ROLE.get(role, role))):
-            self.warnings.append(f"no mount of '{frame}' in the log: that of the machine file '{self._machine.name}' is taken")
+            self.warnings.append(
+                f"no mount of '{frame}' in the log: that of the machine file '{self._machine.name}' is taken"
+            )
             return Mount(0, found.parent, frame, found.T_parent_sensor)
         if role == "rear":
-            self.warnings.append(f"no mount of '{frame}' in the log: a level scanner at base_link that looks back is assumed")
+            self.warnings.append(
+                f"no mount of '{frame}' in the log: a level scanner at base_link that looks back is assumed"
+            )
             return Mount(0, "base_link", frame, se3.from_rpy(0.0, 0.0, np.pi))
         self.warnings.append(f"no mount of '{frame}' in the log: a level sensor at base_link is assumed")
         return Mount(0, "base_link", frame, np.eye(4))

@@ -30,7 +30,13 @@ class ScanRecords:
         self.times_ns.append(time_ns)
 
     def add_processed(
-        self, stamp_ns: int, match: tuple[float, float], information: FloatArray, substitute: str, flags: tuple[bool, bool], slip: float
+        self,
+        stamp_ns: int,
+        match: tuple[float, float],
+        information: FloatArray,
+        substitute: str,
+        flags: tuple[bool, bool],
+        slip: float,
     ) -> None:
         """Add a processed scan: match as (residual m, support), information (3,), flags as (degenerate, lost), slip."""
         self._processed_ns.append(stamp_ns)
@@ -38,11 +44,18 @@ class ScanRecords:
         self._substitutes.append(substitute)
         self._lost.append(flags[1])
 
-    def add_motion(self, time_ns: int, speed_mps: float, wheel_mps: float | None, articulation_rad: float | None) -> None:
+    def add_motion(
+        self, time_ns: int, speed_mps: float, wheel_mps: float | None, articulation_rad: float | None
+    ) -> None:
         """Add speed, wheel speed and articulation of a processed scan."""
         nan = math.nan
         self._curves.append(
-            (time_ns, speed_mps, nan if wheel_mps is None else wheel_mps, nan if articulation_rad is None else articulation_rad)
+            (
+                time_ns,
+                speed_mps,
+                nan if wheel_mps is None else wheel_mps,
+                nan if articulation_rad is None else articulation_rad,
+            )
         )
 
     @property
@@ -66,7 +79,15 @@ class ScanRecords:
         table = np.array(self._rows, dtype=float).reshape(-1, 7)
         stamps = np.array(self._processed_ns, dtype=np.int64)
         return Diagnostics(
-            stamps, table[:, 0], table[:, 1], table[:, 2], table[:, 3], table[:, 4], table[:, 5] > 0.5, self._substitutes, table[:, 6]
+            stamps,
+            table[:, 0],
+            table[:, 1],
+            table[:, 2],
+            table[:, 3],
+            table[:, 4],
+            table[:, 5] > 0.5,
+            self._substitutes,
+            table[:, 6],
         )
 
     def speed(self) -> SpeedSeries | None:

@@ -93,8 +93,9 @@ class Track:
 
 def resample(rows: Rows, times_ns: Stamps) -> Rows:
     """Return poses at other times, shape (M,): linear between the rows, held before the first and after the last."""
-    x = rows.times_ns.astype(float) - float(rows.times_ns[0])
-    at = times_ns.astype(float) - float(rows.times_ns[0])
+    # differences first: stamps of today's clocks have 19 digits, a float keeps 16
+    x = (rows.times_ns - rows.times_ns[0]).astype(float)
+    at = (times_ns - rows.times_ns[0]).astype(float)
     return Rows(times_ns, np.column_stack([np.interp(at, x, column) for column in rows.poses.T]))
 
 

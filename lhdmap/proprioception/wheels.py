@@ -41,12 +41,12 @@ class WheelSettings:
     unknown_articulation_deg: float = setting(
         15.0, unit="deg", minimum=0.0, doc="The same where the log has no articulation."
     )
-    pose_distance_std: float = setting(0.05, unit="m/m", minimum=0.0, doc="Dead reckoning: error of each metre driven.")
+    pose_distance_std: float = setting(0.07, unit="m/m", minimum=0.0, doc="Dead reckoning: error of each metre driven.")
     pose_turn_std: float = setting(
-        0.05, unit="rad/rad", minimum=0.0, doc="Dead reckoning: error of each radian turned."
+        0.3, unit="rad/rad", minimum=0.0, doc="Dead reckoning: error of each radian turned."
     )
     pose_drift_deg: float = setting(
-        1.0, unit="deg/m", minimum=0.0, doc="Dead reckoning: heading error for each metre driven."
+        6.0, unit="deg/m", minimum=0.0, doc="Dead reckoning: heading error for each metre driven."
     )
     max_gap_s: float = setting(0.5, unit="s", minimum=0.01, doc="Tachometer, joints: across a longer gap no motion.")
     max_hold_s: float = setting(0.2, unit="s", minimum=0.0, doc="The last samples stand for this long after them.")

@@ -48,11 +48,20 @@ class PlanarWorld:
         """Return exact ranges, shape (N,), metres (inf = none): pose (3,) for all beams or (N, 3), one for each."""
         poses = np.broadcast_to(np.asarray(T_world_scanner, dtype=float), (angles_rad.size, 3))
         return _cast(
-            np.ascontiguousarray(poses), angles_rad, max_range_m, self.segments_m, self.origin_m, self.shape, self.starts, self.members
+            np.ascontiguousarray(poses),
+            angles_rad,
+            max_range_m,
+            self.segments_m,
+            self.origin_m,
+            self.shape,
+            self.starts,
+            self.members,
         )
 
 
-def rough_profile(rng: np.random.Generator, length_m: float, rms_m: float, octaves: int = 6, persistence: float = 0.75) -> CubicSpline:
+def rough_profile(
+    rng: np.random.Generator, length_m: float, rms_m: float, octaves: int = 6, persistence: float = 0.75
+) -> CubicSpline:
     """Return a random smooth function of arc length with the given rms over `octaves` from 4 m down by halves."""
     s = np.arange(-5.0, length_m + 5.0, 0.02)
     total = np.zeros_like(s)
@@ -122,13 +131,17 @@ def world_from_polylines(polylines: list[FloatArray], line: FloatArray) -> Plana
     return PlanarWorld(segments, low, shape, starts, owner[order], line)
 
 
-def drive_along(line: FloatArray, speed_mps: float, rate_hz: float, start_m: float = 5.0, end_m: float = 8.0) -> FloatArray:
+def drive_along(
+    line: FloatArray, speed_mps: float, rate_hz: float, start_m: float = 5.0, end_m: float = 8.0
+) -> FloatArray:
     """Return poses x, y, heading, shape (N, 3), at the scan rate along the centre line at constant speed."""
     s = np.arange(start_m, 0.02 * (len(line) - 1) - end_m, speed_mps / rate_hz)
     grid = 0.02 * np.arange(len(line))
     # A machine cannot jump in curvature: its heading is the line's, averaged over 2 m.
     kernel = np.hanning(101) / np.hanning(101).sum()
-    smooth = np.column_stack([np.convolve(np.pad(column, 50, mode="reflect", reflect_type="odd"), kernel, "valid") for column in line.T])
+    smooth = np.column_stack(
+        [np.convolve(np.pad(column, 50, mode="reflect", reflect_type="odd"), kernel, "valid") for column in line.T]
+    )
     poses = np.column_stack([CubicSpline(grid, column)(s) for column in smooth[:, :2].T])
     tangent = np.column_stack([CubicSpline(grid, column)(s, 1) for column in smooth[:, :2].T])
     return np.column_stack([poses, np.unwrap(np.arctan2(tangent[:, 1], tangent[:, 0]))])
@@ -150,8 +163,14 @@ def simulate_scans(
         noisy[noisy > scanner.max_range_m] = np.inf
         scans.append(
             LaserScan(
-                round((100.0 + k / rate_hz) * 1e9), "laser", float(angles[0]), math.radians(scanner.step_deg), increment_s, 0.05,
-                scanner.max_range_m, noisy,
+                round((100.0 + k / rate_hz) * 1e9),
+                "laser",
+                float(angles[0]),
+                math.radians(scanner.step_deg),
+                increment_s,
+                0.05,
+                scanner.max_range_m,
+                noisy,
             )
         )
     return scans
@@ -163,12 +182,17 @@ def _wall(rng: np.random.Generator, line: FloatArray, offset_m: float, rms_m: fl
     return line[:, :2] + shift[:, None] * np.column_stack([-np.sin(line[:, 2]), np.cos(line[:, 2])])
 
 
-def _with_opening(rng: np.random.Generator, wall: FloatArray, line: FloatArray, at_m: float, rms_m: float) -> list[FloatArray]:
+def _with_opening(
+    rng: np.random.Generator, wall: FloatArray, line: FloatArray, at_m: float, rms_m: float
+) -> list[FloatArray]:
     """Cut a 4 m opening into the wall and add a dead-end cross drift of 15 m behind it."""
     a, b = round(at_m / 0.02), round((at_m + 4.0) / 0.02)
     heading = line[a, 2] + math.pi / 2
     depth = np.arange(0, 15.0, 0.02)
-    direction, normal = np.array([math.cos(heading), math.sin(heading)]), np.array([-math.sin(heading), math.cos(heading)])
+    direction, normal = (
+        np.array([math.cos(heading), math.sin(heading)]),
+        np.array([-math.sin(heading), math.cos(heading)]),
+    )
     sides = []
     for corner in (wall[a], wall[b]):
         rough = rough_profile(rng, 15.0, rms_m)(depth)
