@@ -17,5 +17,7 @@ SHARED_DATA = Path(__file__).resolve().parents[2] / "shared" / "data"
 def shared_data() -> Path:
     """Folder of the real recordings beside the checkout; a checkout alone does not have it."""
     if not SHARED_DATA.is_dir():
-        pytest.skip(f"the real recordings are not beside this checkout ({SHARED_DATA.name} folder absent): nothing to read")
+        pytest.skip(
+            f"the real recordings are not beside this checkout ({SHARED_DATA.name} folder absent): nothing to read"
+        )
     return SHARED_DATA

@@ -85,7 +85,8 @@ class PlaneMap:
         body = normals @ pose[:3, :3]
         J = np.concatenate([np.cross(p, body), body], axis=1)
         JW = J.T * weight
-        return JW @ J, JW @ distance, (sigmas, distance)
+        H, g = discounted(JW @ J, JW @ distance, WEAK)
+        return H, g, (sigmas, distance)
 
     def _associate(self, points: FloatArray) -> tuple[npt.NDArray[np.intp], npt.NDArray[np.intp]]:
         """Return indices of the points that lie in a voxel of the map, and of those voxels."""
@@ -103,6 +104,19 @@ class PlaneMap:
         spread, axes = np.linalg.eigh(self._covariances[voxel, :3, :3])
         self._normals[voxel] = axes[:, :, 0]
         self._variances[voxel] = self._noise_m**2 + np.clip(spread[:, 0], 0.0, 1.0) * self._voxel_m**2 / 12.0
+
+
+WEAK = 2500.0
+
+
+def discounted(H: FloatArray, g: FloatArray, weak: float) -> tuple[FloatArray, FloatArray]:
+    inverse = np.linalg.inv(H + 1e-6 * np.eye(6))
+    information = 1.0 / inverse[3, 3]
+    removed = information * weak / (information + weak)
+    H, g = H.copy(), g.copy()
+    H[3, 3] -= removed
+    g[3] += removed * float(-(inverse @ g)[3])
+    return H, g
 
 
 def _keys(points: FloatArray, voxel_m: float) -> npt.NDArray[np.int64]:

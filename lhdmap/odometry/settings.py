@@ -136,7 +136,7 @@ class AnchorSettings:
         minimum=0.0,
     )
     min_support: float = setting(
-        0.3,
+        0.25,
         doc="Share of hits that must agree with the map; below it the surroundings are searched.",
         minimum=0.0,
         maximum=1.0,
