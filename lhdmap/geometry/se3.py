@@ -77,6 +77,13 @@ def rpy_from_quaternions(quaternions_xyzw: FloatArray) -> FloatArray:
     return np.stack([roll, pitch, yaw], axis=-1)
 
 
+def roll_pitch(x: float, y: float, z: float, w: float) -> tuple[float, float]:
+    """Return roll and pitch (rad) of one quaternion (need not be of unit length)."""
+    scale = 2.0 / (x * x + y * y + z * z + w * w)
+    roll = math.atan2(scale * (w * x + y * z), 1.0 - scale * (x * x + y * y))
+    return roll, math.asin(min(max(scale * (w * y - z * x), -1.0), 1.0))
+
+
 def inverse(T_a_b: FloatArray) -> FloatArray:
     """Return T_b_a of a 4 x 4 pose."""
     T = np.eye(4)

@@ -65,7 +65,7 @@ def _imu(cursor: Cursor) -> tuple[Message, ...]:
     acceleration = _measured(cursor)
     if covariance[0] == -1.0 or not 0.5 < sum(value * value for value in quaternion) < 2.0:
         raise InputError("no orientation in an Imu message")
-    roll, pitch, _ = se3.rpy_from_quaternions(np.array(quaternion)).tolist()
+    roll, pitch = se3.roll_pitch(*quaternion)
     return (Inclination(stamp, frame, roll, pitch, rate, acceleration),)
 
 

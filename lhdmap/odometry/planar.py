@@ -58,6 +58,7 @@ class PlanarOdometry:
                 range_flow or RangeFlowSettings(),
             )
         self._clock = ScanClock()
+        self._turn = 0
         self._rate = AdaptiveRate(self._settings)
         self._wheels_used = False
 
@@ -71,9 +72,15 @@ class PlanarOdometry:
         if not self._rate.due(dt_s, self._motion.velocity) and not self._clock.bunched:
             return self._step(scan.stamp_ns, None)
         floor_m = self._settings.min_height_m if T_level_sensor[2, 3] > 2.0 * self._settings.min_height_m else -math.inf
-        points = planar_points(scan, T_level_sensor, self._motion.velocity, floor_m, view.boxes_m)
+        points = planar_points(scan, T_level_sensor, self._motion.velocity, floor_m, view.boxes_m, self._part(scan))
         points[:, 2] += view.height_m
         return self._step(scan.stamp_ns, self._matcher.step(points, _planar_mount(T_level_sensor)))
+
+    def _part(self, scan: LaserScan) -> tuple[int, int]:
+        """Return first beam and step so that no more than `max_beams` are used, another part each time."""
+        step = -(-scan.ranges_m.size // self._settings.max_beams)
+        self._turn += 1
+        return self._turn % max(step, 1), max(step, 1)
 
     @property
     def clock(self) -> ScanClock:

@@ -18,6 +18,7 @@ def planar_points(
     velocity: FloatArray,
     min_height_m: float = -math.inf,
     boxes_m: FloatArray = NO_BOXES,
+    every: tuple[int, int] = (0, 1),
 ) -> FloatArray:
     """Return the hits as points, shape (N, 3), metres, in the level frame of `base_link` at the scan's stamp.
 
@@ -27,6 +28,7 @@ def planar_points(
         velocity: forward, lateral, turning speed (3,) that undoes the sweep (beam i was measured `i * time_increment` later).
         min_height_m: hits below this height in the level frame are floor and left out.
         boxes_m: shape (K, 6), x y z minimum and maximum of the machine's bodies in the level frame: own hits are left out.
+        every: first beam and step, to take only a part of the beams.
     """
     out = np.empty((scan.ranges_m.size, 3))
     count = _points(
@@ -37,16 +39,17 @@ def planar_points(
         velocity,
         min_height_m,
         boxes_m,
+        every,
         out,
     )
     return out[:count]
 
 
 @nb.njit(cache=True, nogil=True)
-def _points(ranges, sweep, limits, T, velocity, min_height, boxes, out):  # type: ignore[no-untyped-def]
+def _points(ranges, sweep, limits, T, velocity, min_height, boxes, every, out):  # type: ignore[no-untyped-def]
     angle_min, increment, beam_s = sweep
     count = 0
-    for i in range(ranges.size):
+    for i in range(every[0], ranges.size, every[1]):
         r = ranges[i]
         if not (limits[0] <= r <= limits[1]) or r == np.inf:
             continue

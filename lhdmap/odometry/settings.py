@@ -26,11 +26,18 @@ class OdometrySettings:
         maximum=1.0,
     )
     step_m: float = setting(
-        0.06,
+        0.1,
         unit="m",
         doc="Adaptive rate: a scan is processed once the machine has moved this far.",
         minimum=0.0,
         source="measured: no loss against every scan (docs/odometry.md)",
+    )
+    max_beams: int = setting(
+        400,
+        unit="beams",
+        minimum=50,
+        source="measured: 381 and 761 beams give the same error (docs/odometry.md)",
+        doc="A scan with more beams is thinned, each time from another beam on.",
     )
     step_deg: float = setting(1.0, unit="deg", doc="... or has turned this far.", minimum=0.0, source="measured")
     step_s: float = setting(0.2, unit="s", doc="... or this time has passed.", minimum=0.0, source="lhdmap")

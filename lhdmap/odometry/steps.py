@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
+import numba as nb
 import numpy as np
 
 from lhdmap.messages import FloatArray
@@ -56,13 +57,15 @@ class OdometryStep(NamedTuple):
     lost: bool
 
 
+@nb.njit(cache=True, nogil=True)
 def body_information(H_map: FloatArray, heading_rad: float) -> FloatArray:
     """Return H (3, 3) in the body's axes."""
     c, s = math.cos(heading_rad), math.sin(heading_rad)
     R = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
-    return R.T @ H_map @ R
+    return R.T @ np.ascontiguousarray(H_map) @ R
 
 
+@nb.njit(cache=True, nogil=True)
 def marginal_information(H: FloatArray) -> FloatArray:
     """Return for each axis the information left when the other two are unknown: 1 / diag(H^-1), shape (3,).
 
@@ -70,7 +73,8 @@ def marginal_information(H: FloatArray) -> FloatArray:
     """
     out = np.zeros(3)
     for axis in range(3):
-        others = [k for k in range(3) if k != axis]
-        block = H[np.ix_(others, others)] + 1e-9 * np.eye(2)
-        out[axis] = max(H[axis, axis] - H[axis, others] @ np.linalg.solve(block, H[others, axis]), 0.0)
+        i, j = (axis + 1) % 3, (axis + 2) % 3
+        a, b, d = H[i, i] + 1e-9, H[i, j], H[j, j] + 1e-9
+        u, v = H[axis, i], H[axis, j]
+        out[axis] = max(H[axis, axis] - (u * u * d - 2.0 * u * v * b + v * v * a) / (a * d - b * b), 0.0)
     return out

@@ -65,13 +65,12 @@ class SweepIntegration:
     ) -> None:
         if not self.integrator.knows(sweep.frame_id):
             self.integrator.add_mount(self._mounts.of(sweep.frame_id, role))
-        end_ns = time_ns + _length_ns(sweep)
-        poses = SweepPoses(
-            track.matrix_at(time_ns),
-            track.matrix_at(end_ns),
-            wheels.articulation_at(time_ns) or 0.0,
-            wheels.articulation_at(end_ns) or 0.0,
-        )
+        length_ns = _length_ns(sweep)
+        T_start, angle = track.matrix_at(time_ns), wheels.articulation_at(time_ns) or 0.0
+        poses = SweepPoses(T_start, T_start, angle, angle)
+        if length_ns != 0:
+            end_ns = time_ns + length_ns
+            poses = SweepPoses(T_start, track.matrix_at(end_ns), angle, wheels.articulation_at(end_ns) or 0.0)
         self._pending.append(self._worker.submit(self._integrate, role, sweep, poses))
         while len(self._pending) > _MOST_PENDING:
             self._pending.popleft().result()

@@ -70,7 +70,13 @@ def covered(stamps_ns: npt.NDArray[np.int64], span_ns: tuple[int, int], gap_ns: 
     n = stamps_ns.shape[0]
     if n == 0 or span_ns[0] < stamps_ns[0] - hold_ns or span_ns[1] > stamps_ns[n - 1] + hold_ns:
         return False
-    i = max(int(np.searchsorted(stamps_ns, span_ns[0], side="right")) - 1, 0)
+    i, above = 0, n  # the last sample at or before the start, by bisection
+    while above - i > 1:
+        middle = (i + above) // 2
+        if stamps_ns[middle] <= span_ns[0]:
+            i = middle
+        else:
+            above = middle
     while i < n - 1 and stamps_ns[i] < span_ns[1]:
         if stamps_ns[i + 1] - stamps_ns[i] > gap_ns:
             return False

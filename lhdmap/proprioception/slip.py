@@ -113,11 +113,13 @@ class SlipEstimator:
             return math.nan
         wheel_mps *= self.scale
         window = self._window
-        window.append((stamp_ns, max(abs(wheel_mps), abs(lidar_mps))))
+        speed = max(abs(wheel_mps), abs(lidar_mps))
+        while window and window[-1][1] <= speed:  # never the largest again: the window stays sorted, its first leads
+            window.pop()
+        window.append((stamp_ns, speed))
         while window[0][0] < stamp_ns - self.settings.window_s * 1e9:
             window.popleft()
-        largest = max(speed for _, speed in window)
-        return (wheel_mps - lidar_mps) / max(largest, self.settings.min_speed_mps)
+        return (wheel_mps - lidar_mps) / max(window[0][1], self.settings.min_speed_mps)
 
     def _excess(self, wheel_mps: float) -> float:
         return wheel_mps * self.scale - (self.speed_mps or 0.0)
