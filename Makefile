@@ -1,0 +1,59 @@
+# make demo | test | lint | bench | clean: each sets up what it needs first. VENV=DIR keeps the environment elsewhere.
+SHELL := /bin/bash
+.SHELLFLAGS := -euo pipefail -c
+.DEFAULT_GOAL := help
+
+PYTHON ?= $(firstword $(foreach name,python3.11 python3.12 python3,$(if $(shell command -v $(name)),$(name))))
+VENV ?= .venv
+BIN := $(VENV)/bin
+JOBS ?= 2
+# One stamp, named after what the environment was made from: a machine that is kept installs once.
+STAMP := $(VENV)/.made-from-$(shell cat pyproject.toml <(pwd) | sha256sum | cut -c1-16)
+
+# The linear algebra of several libraries meets in one process: one thread each, or they fight for the cores.
+export OMP_NUM_THREADS ?= 1
+export OPENBLAS_NUM_THREADS ?= 1
+
+.PHONY: help setup system demo test lint format config bench wheel clean
+
+help: ## List the targets
+	@sed -nE 's/^([a-z]+):.*## (.*)/  make \1\t\2/p' $(MAKEFILE_LIST) | expand -t 16
+
+setup: $(STAMP) ## Make the environment in .venv (Python 3.11 or 3.12), once
+
+system: ## Install the system libraries that are missing (Debian, as root), or say which
+	@sh tools/system_packages.sh $(PYTHON)
+
+$(STAMP): pyproject.toml
+	@sh tools/system_packages.sh $(PYTHON)
+	$(PYTHON) -m venv $(VENV)
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[dev]'
+	@rm -f $(VENV)/.made-from-* && touch $@
+
+demo: $(STAMP) ## Simulate the sample drive, build its map, evaluate it: demo/
+	$(BIN)/lhdmap demo --output demo
+
+test: $(STAMP) ## Run all tests
+	$(BIN)/python -m pytest -n $(JOBS)
+
+lint: $(STAMP) ## Check style, formatting and types
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/mypy
+
+format: $(STAMP) ## Format the code
+	$(BIN)/ruff check --fix .
+	$(BIN)/ruff format .
+
+config: $(STAMP) ## Write pipelines/default.toml anew from the settings in the code
+	$(BIN)/lhdmap config > pipelines/default.toml.new && mv pipelines/default.toml.new pipelines/default.toml
+
+bench: $(STAMP) ## Measure speed and memory
+	$(BIN)/python -m tools.bench
+
+wheel: $(STAMP) ## Build the wheel: dist/
+	$(BIN)/python -m pip wheel --quiet --disable-pip-version-check --no-deps --wheel-dir dist .
+
+clean: ## Remove what was made, the environment too; the maps in demo/ stay
+	rm -rf $(VENV) dist build .pytest_cache .mypy_cache .ruff_cache .hypothesis
+	find . -name __pycache__ -type d -prune -exec rm -rf {} +

@@ -1,0 +1,99 @@
+"""`lhdmap demo`: the sample drive from end to end, without any input."""
+
+from __future__ import annotations
+
+import argparse
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from lhdmap.cli.build_map import progress_of
+from lhdmap.cli.console import Console
+
+if TYPE_CHECKING:
+    from lhdmap.messages import Record
+    from lhdmap.pipeline.demo import Demo
+
+FIRST_RUN = "the first run compiles the inner loops: up to a minute more than the next ones"
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the options of `lhdmap demo`."""
+    parser.add_argument(
+        "-o",
+        "--output",
+        type=Path,
+        metavar="DIR",
+        help="folder to make (default: lhdmap_demo here, or the next free name)",
+    )
+    parser.add_argument(
+        "--config", type=Path, metavar="FILE.toml", help="settings over the defaults (lhdmap config prints them)"
+    )
+    parser.add_argument(
+        "--set", action="append", default=[], metavar="section.key=value", help="one setting; repeatable"
+    )
+
+
+def run(arguments: argparse.Namespace, console: Console) -> int:
+    """Simulate, map, evaluate; say where everything is."""
+    from lhdmap.config import load_settings
+    from lhdmap.pipeline.demo import Watcher, run_demo
+
+    started = time.monotonic()
+    settings = load_settings(arguments.config, arguments.set)
+    watcher = Watcher(console.note, _simulation_progress(console), progress_of(console))
+    console.note(FIRST_RUN)
+    demo = run_demo(arguments.output or Path("lhdmap_demo"), settings, watcher)
+    for text in demo.built.warnings:
+        console.warn(text)
+    wall_s = time.monotonic() - started
+    console.result(demo_values(demo, wall_s), demo_text(demo, wall_s))
+    return 0
+
+
+def demo_values(demo: Demo, wall_s: float) -> dict[str, Any]:
+    """Return what `--json` prints."""
+    return {
+        "folder": str(demo.folder),
+        "log": str(demo.drive.log),
+        "truth": str(demo.drive.truth_file),
+        "map": demo.built.summary | {"warnings": demo.built.warnings},
+        "report": str(demo.built.folder / "report.html"),
+        "recording": str(demo.built.folder / "recording.rrd"),
+        "evaluation": demo.evaluation.to_json(),
+        "wall_s": wall_s,
+    }
+
+
+def demo_text(demo: Demo, wall_s: float) -> str:
+    """Return the result for a person: what was made, how good it is, where it is, what to do with it."""
+    found, built = demo.evaluation, demo.built
+    ten = next((s for s in found.segments if s.length_m == 10.0 and s.n), None)
+    segments = f"; over 10 m segments {ten.translation_pct:.2f} % (mean of {ten.n})" if ten else ""
+    end = f"{found.end_pct:.2f} %" if found.end_pct is not None else "not known"
+    return "\n".join(
+        [
+            f"drive       {demo.drive.distance_m:.0f} m, {demo.drive.scans} front scans, {demo.drive.log}",
+            f"map         {built.summary['scans_processed']} scans processed, cloud and trajectory, {built.folder}",
+            f"error       end point {end} of the distance{segments}",
+            f"time        {wall_s:.0f} s, of which build-map {built.summary['wall_s']:.0f} s",
+            "",
+            f"report      open {built.folder / 'report.html'} in a browser",
+            f"recording   lhdmap view {built.folder}",
+            f"comparison  {demo.plot_file}",
+            "your log    lhdmap doctor LOG, then lhdmap build-map LOG",
+        ]
+    )
+
+
+def _simulation_progress(console: Console) -> Any:
+    from lhdmap.simulation.world import START_NS
+
+    def position(record: Record) -> float:
+        return (record.log_time_ns - START_NS) * 1e-9
+
+    def shown(records: Iterator[Record], duration_s: float) -> Iterator[Record]:
+        return console.progress(records, total=duration_s, label="simulate", position=position)
+
+    return shown
