@@ -1,0 +1,1 @@
+"""Tables of measured figures: `python -m tools.evaluate.odometry_table`, `python -m tools.evaluate.real_logs`."""
