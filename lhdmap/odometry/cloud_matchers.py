@@ -1,6 +1,6 @@
 """Matchers of 3D clouds against a map: VGICP with a final fit to planes, and kiss-icp as the baseline.
 
-Both find a pose near a predicted one, are judged by the same map of planes, and blend with the prediction by information.
+Both find a pose near a predicted one; the same map of planes judges it and says how to blend it with the prediction.
 VGICP: Koide et al., ICRA 2021, in the library small_gicp; kiss-icp: Vizzo et al., RA-L 2023.
 """
 
@@ -14,31 +14,34 @@ import numpy as np
 from lhdmap.geometry import se3
 from lhdmap.messages import FloatArray
 from lhdmap.odometry.cloud_motion import exp, log, orthonormal
-from lhdmap.odometry.cloud_planes import PlaneFit, PlaneMap
+from lhdmap.odometry.cloud_planes import PlaneFit, PlaneMap, PlaneNoise
 from lhdmap.odometry.cloud_settings import CloudOdometrySettings
 
 _NEIGHBOURS = 20
+_LEAST_POINTS = 100
 _COARSE = 3.0  # voxels of the map that wide starts are matched against first, in voxels of the fine one
 _FAR = 1e3  # metres that a library may move a pose before the result is taken for nonsense
 
 
 class Cloud(NamedTuple):
-    """A cloud in `base_link`, sweep undone: all points (M, 3), the thinned ones (N, 3), and these with covariances for
-    small_gicp."""
+    """A cloud in `base_link`, sweep undone: all points (M, 3), the thinned ones (N, 3) alone and with covariances."""
 
     full_m: FloatArray
     points_m: FloatArray
     prepared: Any
 
 
-def prepare(points_m: FloatArray, sample_m: float) -> Cloud:
-    """Return the cloud of points (M, 3) thinned to one per cell of `sample_m`, with covariances."""
+def prepare(points_m: FloatArray, sample_m: float) -> Cloud | None:
+    """Return the cloud of points (M, 3) thinned to one per cell of `sample_m`; None where too few are left."""
     import small_gicp
 
-    prepared, _ = small_gicp.preprocess_points(
-        points_m, downsampling_resolution=sample_m, num_neighbors=_NEIGHBOURS, num_threads=1
-    )
-    return Cloud(points_m, prepared.points()[:, :3], prepared)
+    if len(points_m) < _LEAST_POINTS:
+        return None
+    thinned = small_gicp.voxelgrid_sampling(points_m, sample_m, num_threads=1)
+    if len(thinned) < _LEAST_POINTS:
+        return None
+    small_gicp.estimate_covariances(thinned, num_neighbors=_NEIGHBOURS, num_threads=1)
+    return Cloud(points_m, np.array(thinned.points()[:, :3]), thinned)
 
 
 class Prediction(NamedTuple):
@@ -70,6 +73,7 @@ class VgicpMatcher:
 
     def __init__(self, settings: CloudOdometrySettings) -> None:
         self._settings = settings
+        self._noise = PlaneNoise(settings.range_noise_m, settings.chance_sigma_m)
         self.clear()
 
     def clear(self) -> None:
@@ -106,7 +110,7 @@ class VgicpMatcher:
 
     def _plane_map(self) -> PlaneMap:
         if self._planes is None:
-            self._planes = PlaneMap(self._fine, self._settings.voxel_m, self._settings.range_noise_m)
+            self._planes = PlaneMap(self._fine, self._settings.voxel_m, self._noise)
         return self._planes
 
     def _align(self, voxels: Any, cloud: Cloud, start: FloatArray, reach_m: float) -> FloatArray:
@@ -200,5 +204,6 @@ class KissMatcher:
 def blended(fit: PlaneFit, predicted: Prediction) -> FloatArray:
     """Return the mean (4, 4) of the fitted and the predicted pose, weighted by their information."""
     error = log(se3.inverse(fit.pose) @ predicted.pose)
-    step = np.linalg.solve(fit.information + predicted.information, predicted.information @ error)
-    return orthonormal(fit.pose @ exp(step))
+    pull = predicted.information @ error
+    step = np.linalg.solve(fit.information + predicted.information, pull)
+    return orthonormal(fit.pose @ exp(np.asarray(step, dtype=np.float64)))

@@ -1,7 +1,7 @@
 """The motion model in space: a Kalman filter of the pose of `base_link` and its velocity at constant velocity.
 
-Twists are (rotation, translation) in body axes, shape (6,): rad and m, or rad/s and m/s. Errors of a pose are such twists
-on its right: T_true = T exp(error).
+Twists are (rotation, translation) in body axes, shape (6,): rad and m, or rad/s and m/s. Errors of a pose are such
+twists on its right: T_true = T exp(error).
 """
 
 from __future__ import annotations
@@ -16,16 +16,17 @@ from lhdmap.messages import FloatArray
 from lhdmap.odometry.cloud_settings import CloudOdometrySettings
 
 _GATE_SIGMAS = 4.0
-_LONGEST_STEP_S = 1.0
+_LONGEST_STEP_S = 3.0
 _GAP_VARIANCE = np.diag([0.01, 0.01, 0.5, 4.0, 0.1, 0.1])
+_JUMP_VARIANCE = np.diag([1e-4] * 3 + [1e-2] * 3)
 _PLANAR = [3, 4, 2]  # forward, lateral, heading as components of a twist
 
 
 class CloudPrior(NamedTuple):
     """Motion of `base_link` since the cloud before by wheels: `T_previous_base` (4, 4).
 
-    `covariance`: (6, 6) in the order rotation, translation (rad, m), or (3, 3) of forward, lateral (m) and heading (rad)
-    for wheels that know nothing of the rest.
+    `covariance`: (6, 6) in the order rotation, translation (rad, m), or (3, 3) of forward, lateral (m) and heading
+    (rad) for wheels that know nothing of the rest.
     """
 
     T_previous_base: FloatArray
@@ -108,10 +109,10 @@ class CloudMotion:
     @property
     def prior_information(self) -> FloatArray:
         """Inverse of the pose's covariance, shape (6, 6)."""
-        return np.linalg.inv(self.P[:6, :6] + 1e-14 * np.eye(6))
+        return np.asarray(np.linalg.inv(self.P[:6, :6] + 1e-14 * np.eye(6)), dtype=np.float64)
 
     def predict(self, dt_s: float) -> None:
-        """Move on by `dt_s`. After a long gap the old velocity says little: the model runs for a second at most."""
+        """Move on by `dt_s`. After a long gap the old velocity says little: the model runs for three seconds at most."""
         dt = min(dt_s, _LONGEST_STEP_S)
         step = exp(self.twist * dt)
         self.pose = orthonormal(self.pose @ step)
@@ -125,7 +126,7 @@ class CloudMotion:
             self.P[6:, 6:] += _GAP_VARIANCE
 
     def fuse_prior(self, prior: CloudPrior, dt_s: float) -> bool:
-        """Fuse the wheels' motion over `dt_s` as a velocity; False where its forward part contradicts the motion (slip).
+        """Fuse the wheels' motion over `dt_s` as a velocity; False where its forward part contradicts it (slip).
 
         Components that are not finite, or off by more than the gate, are left out.
         """
@@ -160,6 +161,12 @@ class CloudMotion:
         self.twist = self.twist + (A @ log(se3.inverse(self.pose) @ matched))[6:]
         self.pose = orthonormal(matched)
         self._set_covariance(self.P + A @ (posterior - prior) @ A.T)
+
+    def relocate(self, pose: FloatArray) -> None:
+        """Go on from another pose (4, 4) with the velocity as it was: what jumped was not the machine."""
+        self.pose = orthonormal(pose)
+        self.P[:6, :] = self.P[:, :6] = 0.0
+        self.P[:6, :6] = _JUMP_VARIANCE
 
     def forget(self, share: float) -> None:
         """Shrink the pose's uncertainty by a share: what it is relative to was renewed."""

@@ -6,7 +6,6 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from lhdmap.geometry import se3
 from lhdmap.messages import FloatArray, PointCloud
@@ -14,25 +13,28 @@ from lhdmap.odometry.cloud_matchers import Cloud, CloudMatcher, KissMatcher, Pre
 from lhdmap.odometry.cloud_motion import CloudMotion, CloudPrior, exp
 from lhdmap.odometry.cloud_planes import PlaneFit
 from lhdmap.odometry.cloud_settings import CloudOdometrySettings
+from lhdmap.odometry.cloud_sweep import Sweep, middle_s, sweep_of
 from lhdmap.odometry.scan_points import NO_BOXES
 
 _FIRST_CLOUDS = 10
-_LEAST_POINTS = 100
 _LOST_BEFORE_RESTART = 10
 _BODY = [3, 4, 2]  # forward, lateral, heading as components of a twist
-_RESKEW_M = 0.02  # error of the sweep's correction that is worth a second match
-_BY_DEFINITION = np.full(3, 1e8)
+_SMEAR_M = 0.02  # error of the sweep's correction that is worth a second match
+_SHORTEST_S = 0.05
+_BY_DEFINITION = 1e8 * np.eye(6)  # information of the pose that defines a frame
+_WIDE_PRIOR = 0.01  # a jump contradicts the prior by definition: it must not hold the match back
 
 
 class CloudStep(NamedTuple):
     """Outcome of one cloud; as `OdometryStep`, in space.
 
-    `T_odom_base`: pose (4, 4); `covariance`: (6, 6) of the pose against the local map, as the error twist in body axes,
-    rotation (rad) before translation (m); `velocity`: forward, lateral (m/s), turning (rad/s); `information`: (3,) along,
-    across (1/m²) and heading (1/rad²) of this cloud against the map, the other five unknown; `residual_m`: rms distance of
-    the inliers; `support`: share of the points that agree with the map; `degenerate`: a direction was not observed;
-    `substitute`: what stood in for it (`wheels`, `motion` or empty); `processed`: False where the adaptive rate only
-    predicted; `lost`: the cloud did not fit the map, the pose is the prediction.
+    `T_odom_base`: pose (4, 4) at the stamp; `covariance`: (6, 6) of the pose against the local map, that is of the
+    step, as a twist in body axes, rotation (rad) before translation (m); `velocity`: forward, lateral (m/s), turning
+    (rad/s); `information`: (3,) along, across (1/m²) and heading (1/rad²) of this cloud against the map, the other five
+    unknown; `residual_m`: rms distance of the points that agree with the map; `support`: their share; `degenerate`: a
+    direction was not observed; `substitute`: what stood in for it (`wheels`, `motion` or empty); `processed`: False
+    where the adaptive rate only predicted; `lost`: the cloud did not fit the map where it could be (the pose is the
+    prediction), or only after a jump that no machine makes.
     """
 
     stamp_ns: int
@@ -48,22 +50,39 @@ class CloudStep(NamedTuple):
     lost: bool
 
 
+class _First(NamedTuple):
+    """The first cloud, the middle of its sweep after its stamp (s), and the velocity (6,) that undid it."""
+
+    sweep: Sweep
+    middle_s: float
+    twist: FloatArray
+
+
+class _Placed(NamedTuple):
+    """What a cloud was found to be: `fit` is None where it was not matched."""
+
+    fit: PlaneFit | None
+    lost: bool = False
+
+
 class CloudOdometry:
     """Odometry with an adaptive rate: motion model, then a matcher (`settings.method`) that corrects it.
 
-    `update` takes clouds in time order with the mount of the scanner, and where there are any the wheels' motion since the
-    cloud before and the level frame's roll and pitch. It never raises on the content of a cloud.
+    `update` takes clouds in time order with the mount of the scanner, and where there are any the wheels' motion since
+    the cloud before and the machine's roll and pitch. It never raises on the content of a cloud. The motion model runs
+    on the middles of the sweeps.
     """
 
     def __init__(self, settings: CloudOdometrySettings | None = None) -> None:
         self._settings = settings or CloudOdometrySettings()
         self._motion = CloudMotion(self._settings)
-        self._matcher: CloudMatcher
-        self._matcher = (KissMatcher if self._settings.method == "kiss_icp" else VgicpMatcher)(self._settings)
+        self._matcher: CloudMatcher = (
+            KissMatcher(self._settings) if self._settings.method == "kiss_icp" else VgicpMatcher(self._settings)
+        )
         self._last_ns: int | None = None
-        self._last_middle_s = self._middle_s = 0.0
-        self._inserted: FloatArray | None = None
-        self._processed_pose: FloatArray = np.eye(4)
+        self._middle_s = 0.0
+        self._first: _First | None = None
+        self._processed_pose = self._inserted_pose = np.eye(4)
         self._wait_s = 0.0
         self._processed = self._inserts = self._lost_in_a_row = 0
         self._wheels_used = False
@@ -90,29 +109,34 @@ class CloudOdometry:
             T_level_base: roll and pitch of the machine as a pose (4, 4); the first one starts the odometry level.
             boxes_m: (K, 6), x y z minimum and maximum of the machine's bodies in `base_link`: own hits are left out.
         """
-        self._middle_s = _middle(cloud.time_offsets_s) if len(cloud.points_m) else self._last_middle_s
-        self._predict(cloud.stamp_ns, prior, T_level_base)
+        self._predict(cloud, prior, T_level_base)
         if not self._due():
-            return self._step(cloud.stamp_ns, None, lost=False)
-        points, times_s = self._hits(cloud, T_base_sensor, boxes_m)
-        if len(points) < _LEAST_POINTS:
-            return self._lose(cloud.stamp_ns, None)
-        undone = undistorted(points, times_s - self._middle_s, self._motion.twist)
-        if not self._inserts:
-            return self._begin(cloud.stamp_ns, undone)
-        return self._place(cloud.stamp_ns, points, times_s, undone)
+            return self._step(cloud.stamp_ns, None, self._motion.P[:6, :6])
+        limits_m = (self._settings.min_range_m, self._settings.max_range_m)
+        placed = self._place(sweep_of(cloud, T_base_sensor, limits_m, boxes_m))
+        covariance = self._motion.P[:6, :6].copy()
+        travel_m = _travel_m(se3.inverse(self._processed_pose) @ self._motion.pose)
+        if placed.fit is not None:
+            self._motion.forget(min(travel_m / self._settings.memory_m, 1.0))
+        self._processed += 1
+        self._processed_pose, self._wait_s = self._motion.pose, 0.0
+        return self._step(cloud.stamp_ns, placed, covariance)
 
-    def _predict(self, stamp_ns: int, prior: CloudPrior | None, T_level_base: FloatArray | None) -> None:
-        """Move the motion model to the cloud's stamp; one that runs backwards counts as no time."""
-        first = self._last_ns is None
+    def _predict(self, cloud: PointCloud, prior: CloudPrior | None, T_level_base: FloatArray | None) -> None:
+        """Move the motion model to the middle of the sweep; a stamp that runs backwards counts as no time."""
+        stamp_ns, first = cloud.stamp_ns, self._last_ns is None
         dt_s = 0.0 if self._last_ns is None else max(stamp_ns - self._last_ns, 0) * 1e-9
         self._last_ns = stamp_ns if self._last_ns is None else max(stamp_ns, self._last_ns)
+        middle = middle_s(cloud) if len(cloud.points_m) else self._middle_s
         self._wheels_used = prior is not None and self._motion.fuse_prior(prior, dt_s)
-        self._motion.predict(max(dt_s + self._middle_s - self._last_middle_s, 0.0) if not first else 0.0)
-        self._last_middle_s = self._middle_s
+        self._motion.predict(0.0 if first else max(dt_s + middle - self._middle_s, 0.0))
+        self._middle_s = middle
         self._wait_s += dt_s
-        if T_level_base is None or not np.isfinite(T_level_base).all():
-            return
+        if T_level_base is not None and np.isfinite(T_level_base).all():
+            self._level(T_level_base, first=first)
+
+    def _level(self, T_level_base: FloatArray, *, first: bool) -> None:
+        """Start level, then hold roll and pitch near the given ones: the map alone lets them drift."""
         if first:
             roll, pitch, _ = se3.to_rpy(T_level_base)
             self._motion.pose = se3.from_rpy(roll, pitch, 0.0)
@@ -126,150 +150,127 @@ class CloudOdometry:
         moved = _travel_m(step) >= s.step_m or _turn_rad(step) >= math.radians(s.step_deg)
         return moved or self._wait_s >= s.step_s or self._processed < _FIRST_CLOUDS
 
-    def _hits(self, cloud: PointCloud, T_base_sensor: FloatArray, boxes_m: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return the points in `base_link` (N, 3) that are in range and not on the machine, and their times (N,) or (0,)."""
-        points = np.asarray(cloud.points_m, dtype=np.float64).reshape(-1, 3)
-        times = np.asarray(cloud.time_offsets_s, dtype=np.float64)
-        with np.errstate(all="ignore"):
-            ranges = np.sqrt(np.einsum("ij,ij->i", points, points))
-            kept = (ranges >= self._settings.min_range_m) & (ranges <= self._settings.max_range_m)
-            timed = len(times) == len(points)
-            kept &= np.isfinite(times) if timed else True
-        points = points[kept] @ T_base_sensor[:3, :3].T + T_base_sensor[:3, 3]
-        times = times[kept] if timed else np.zeros(0)
-        outside = np.isfinite(points).all(axis=1)
-        for box in boxes_m:
-            outside &= ~((points >= box[:3]) & (points <= box[3:])).all(axis=1)
-        return points[outside], times[outside] if timed else times
+    def _place(self, sweep: Sweep) -> _Placed:
+        """Match the cloud and correct the motion; on a new velocity undo the sweep and match once more."""
+        cloud = self._prepare(sweep)
+        if cloud is None:
+            return _Placed(None, lost=True)
+        if not self._inserts:
+            return self._begin(sweep, cloud)
+        before, prior = self._motion.twist, self._motion.P
+        fit = self._match(cloud)
+        if fit is None:
+            return self._lose(cloud)
+        if self._jumped(fit):
+            self._motion.relocate(fit.pose)
+            return self._accept(cloud, fit)._replace(lost=True)
+        self._motion.correct(fit.pose, fit.information)
+        again = self._again(sweep, self._motion.twist - before, prior)
+        return self._accept(*(again or (cloud, fit)))
 
-    def _begin(self, stamp_ns: int, points: FloatArray) -> CloudStep:
+    def _prepare(self, sweep: Sweep) -> Cloud | None:
+        return prepare(sweep.undone(self._motion.twist), self._settings.sample_m)
+
+    def _begin(self, sweep: Sweep, cloud: Cloud) -> _Placed:
         """Start the map with one cloud at the predicted pose."""
-        cloud = prepare(points, self._settings.sample_m)
+        self._first = _First(sweep, self._middle_s, self._motion.twist) if self._processed == 0 else None
         self._insert(cloud)
-        self._note_processed()
-        covariance = self._motion.P[:6, :6].copy()
-        return CloudStep(
-            stamp_ns,
-            self._pose_at_stamp(),
-            covariance,
-            self._velocity(),
-            _BY_DEFINITION.copy(),
-            0.0,
-            1.0,
-            False,
-            "",
-            True,
-            False,
-        )
+        return _Placed(PlaneFit(self._motion.pose, _BY_DEFINITION, 0.0, 1.0))
 
-    def _place(self, stamp_ns: int, points: FloatArray, times_s: FloatArray, undone: FloatArray) -> CloudStep:
-        """Match the cloud; where that changed the velocity much, undo the sweep anew and match again."""
-        cloud, fit = self._match(undone)
+    def _match(self, cloud: Cloud) -> PlaneFit | None:
+        """Return the fit near the prediction or, where that fails, in its surroundings; None where nothing fits."""
+        s, motion = self._settings, self._motion
+        sigma_m = float(np.sqrt(motion.P[3, 3]))
+        reach_m = min(3.0 * sigma_m, s.reach_m) if sigma_m > 0.5 * s.voxel_m else 0.0
+        near = Prediction(motion.pose, motion.prior_information, _starts(motion.pose, reach_m, s.voxel_m))
+        fit = self._matcher.match(cloud, near)
         if not self._trusted(fit):
-            cloud, fit = self._match(undone, wide=True)
-            if not self._trusted(fit):
-                return self._lose(stamp_ns, fit, cloud)
-        before = self._motion.twist
-        travel_m = self._accept(fit)
-        change = self._motion.twist - before
-        if len(times_s) and float(np.abs(change[3:]).max()) * float(np.ptp(times_s)) > _RESKEW_M:
-            cloud = prepare(undistorted(points, times_s - self._middle_s, self._motion.twist), self._settings.sample_m)
-        covariance = self._motion.P[:6, :6].copy()
-        self._grow(cloud)
-        step = self._step(stamp_ns, fit, lost=False)._replace(covariance=covariance)
-        self._motion.forget(min(travel_m / self._settings.memory_m, 1.0))
-        return step
-
-    def _match(self, points: FloatArray, *, wide: bool = False) -> tuple[Cloud, PlaneFit]:
-        cloud = prepare(points, self._settings.sample_m)
-        sigma_m = float(np.sqrt(self._motion.P[3, 3]))
-        unsure = wide or sigma_m > 0.5 * self._settings.voxel_m
-        reach_m = self._settings.reach_m if wide else min(3.0 * sigma_m, self._settings.reach_m)
-        starts = _starts(self._motion.pose, reach_m, self._settings.voxel_m, turned=wide) if unsure else ()
-        information = self._motion.prior_information * (0.01 if wide else 1.0)
-        return cloud, self._matcher.match(cloud, Prediction(self._motion.pose, information, starts))
+            starts = _starts(motion.pose, s.reach_m, s.voxel_m, turned=True)
+            fit = self._matcher.match(cloud, Prediction(motion.pose, _WIDE_PRIOR * near.information, starts))
+        return fit if self._trusted(fit) else None
 
     def _trusted(self, fit: PlaneFit) -> bool:
-        """Return whether enough of the hits agree with the map."""
-        return fit.support >= self._settings.min_support and bool(np.isfinite(fit.pose).all())
+        """Return whether enough of the points agree with the map."""
+        return fit.support >= self._settings.min_support
 
-    def _accept(self, fit: PlaneFit) -> float:
-        """Correct the motion by the fit; return the travel since the last cloud processed, metres."""
-        self._lost_in_a_row = 0
+    def _jumped(self, fit: PlaneFit) -> bool:
+        """Return whether the fit is farther from the last pose than the machine can have moved."""
+        moved_m = _travel_m(se3.inverse(self._processed_pose) @ fit.pose)
+        return moved_m > self._settings.max_speed_mps * max(self._wait_s, _SHORTEST_S)
+
+    def _again(self, sweep: Sweep, change: FloatArray, prior: FloatArray) -> tuple[Cloud, PlaneFit] | None:
+        """Match once more where the velocity that undid the sweep was off by `change` (6,); None where it was not.
+
+        The first cloud was taken as measured at rest: it is undone anew, too, and the map begun anew with it.
+        """
+        first, self._first = self._first, None
+        if first is not None:
+            change = self._motion.twist - first.twist
+        if sweep.smear_m(change) < _SMEAR_M:
+            return None
+        if first is not None:
+            self._begin_again(first)
+        cloud = self._prepare(sweep)
+        self._motion.P = prior
+        fit = None if cloud is None else self._match(cloud)
+        if cloud is None or fit is None:
+            return None
         self._motion.correct(fit.pose, fit.information)
-        travel_m = _travel_m(se3.inverse(self._processed_pose) @ self._motion.pose)
-        self._note_processed()
-        return travel_m
+        return cloud, fit
 
-    def _note_processed(self) -> None:
-        self._processed += 1
-        self._processed_pose, self._wait_s = self._motion.pose.copy(), 0.0
+    def _begin_again(self, first: _First) -> None:
+        """Begin the map anew with the first cloud, whose stamp (not its middle) keeps the pose that was given out."""
+        cloud, start = self._prepare(first.sweep), self._inserted_pose
+        if cloud is None:
+            return
+        moved = start @ exp(first.middle_s * self._motion.twist)
+        self._motion.pose = moved @ se3.inverse(start) @ self._motion.pose
+        self._matcher.clear()
+        self._matcher.insert(cloud, moved)
+        self._inserted_pose = self._processed_pose = moved
 
-    def _lose(self, stamp_ns: int, fit: PlaneFit | None, cloud: Cloud | None = None) -> CloudStep:
+    def _accept(self, cloud: Cloud, fit: PlaneFit) -> _Placed:
+        """Insert the cloud where the machine has moved on since the last one that was; the first ones always."""
+        s = self._settings
+        self._lost_in_a_row = 0
+        step = se3.inverse(self._inserted_pose) @ self._motion.pose
+        moved = _travel_m(step) >= s.insert_m or _turn_rad(step) >= math.radians(s.insert_deg)
+        if moved or self._inserts < _FIRST_CLOUDS:
+            self._insert(cloud)
+        return _Placed(fit)
+
+    def _lose(self, cloud: Cloud) -> _Placed:
         """Go on by the motion alone; begin a new map at the predicted pose when nothing has fitted for a while."""
-        self._note_processed()
-        if cloud is not None:
-            self._lost_in_a_row += 1
-        if cloud is not None and self._lost_in_a_row >= _LOST_BEFORE_RESTART:
+        self._lost_in_a_row += 1
+        if self._lost_in_a_row >= _LOST_BEFORE_RESTART:
             self._matcher.clear()
             self._lost_in_a_row = self._inserts = 0
             self._insert(cloud)
-        return self._step(stamp_ns, fit, lost=True)
-
-    def _grow(self, cloud: Cloud) -> None:
-        """Insert the cloud where the machine has moved on since the last one that was; the first ones always."""
-        s = self._settings
-        step = se3.inverse(self._inserted if self._inserted is not None else np.eye(4)) @ self._motion.pose
-        if (
-            self._inserts < _FIRST_CLOUDS
-            or _travel_m(step) >= s.insert_m
-            or _turn_rad(step) >= math.radians(s.insert_deg)
-        ):
-            self._insert(cloud)
+        return _Placed(None, lost=True)
 
     def _insert(self, cloud: Cloud) -> None:
         self._matcher.insert(cloud, self._motion.pose)
         self._inserts += 1
-        self._inserted = self._motion.pose.copy()
+        self._inserted_pose = self._motion.pose
 
-    def _pose_at_stamp(self) -> FloatArray:
-        return self._motion.pose @ exp(-self._middle_s * self._motion.twist)
-
-    def _velocity(self) -> FloatArray:
-        return self._motion.twist[_BODY]
-
-    def _step(self, stamp_ns: int, fit: PlaneFit | None, *, lost: bool) -> CloudStep:
-        pose, covariance, velocity = self._pose_at_stamp(), self._motion.P[:6, :6].copy(), self._velocity()
-        substitute = "wheels" if self._wheels_used else "motion"
-        if fit is None:
-            used = substitute if lost else ""
-            return CloudStep(
-                stamp_ns,
-                pose,
-                covariance,
-                velocity,
-                np.zeros(3),
-                math.nan,
-                0.0 if lost else math.nan,
-                lost,
-                used,
-                lost,
-                lost,
-            )
-        information = marginal_information(fit.information)[_BODY] * (0.0 if lost else 1.0)
-        weak = lost or self._weak(information)
+    def _step(self, stamp_ns: int, placed: _Placed | None, covariance: FloatArray) -> CloudStep:
+        pose = self._motion.pose @ exp(-self._middle_s * self._motion.twist)
+        fit, lost = placed or _Placed(None)
+        information = np.zeros(3) if fit is None else marginal_information(fit.information)[_BODY]
+        weak = lost or (fit is not None and self._weak(information))
+        substitute = "" if not weak else "wheels" if self._wheels_used else "motion"
         return CloudStep(
-            stamp_ns,
-            pose,
-            covariance,
-            velocity,
-            information,
-            fit.residual_m,
-            fit.support,
-            weak,
-            substitute if weak else "",
-            True,
-            lost,
+            stamp_ns=stamp_ns,
+            T_odom_base=pose,
+            covariance=covariance.copy(),
+            velocity=self._motion.twist[_BODY],
+            information=information,
+            residual_m=math.nan if fit is None else fit.residual_m,
+            support=math.nan if placed is None else 0.0 if fit is None else fit.support,
+            degenerate=weak,
+            substitute=substitute,
+            processed=placed is not None,
+            lost=lost,
         )
 
     def _weak(self, information: FloatArray) -> bool:
@@ -278,39 +279,20 @@ class CloudOdometry:
         return bool((information * limits**2 < 1.0).any())
 
 
-def _middle(times_s: npt.ArrayLike) -> float:
-    """Return the mean time of a sweep after its stamp, seconds; zero where the points have no times."""
-    times = np.asarray(times_s, dtype=np.float64)
-    times = times[np.isfinite(times)]
-    return float(np.clip(times.mean(), -1.0, 1.0)) if times.size else 0.0
-
-
-def undistorted(points_m: FloatArray, times_s: FloatArray, twist: FloatArray) -> FloatArray:
-    """Return points (N, 3) in `base_link` at the stamp, each measured `times_s` (N,) after it while moving with `twist`.
-
-    The motion's series is cut after the second power of time: below 1 mm at 30 m for turns of 0.5 rad/s and 0.1 s.
-    """
-    if len(times_s) != len(points_m):
-        return points_m
-    omega, speed = twist[:3], twist[3:]
-    t = times_s[:, None]
-    first = np.cross(omega, points_m) + speed
-    return points_m + t * first + 0.5 * t * t * np.cross(omega, first)
-
-
 def marginal_information(H: FloatArray) -> FloatArray:
     """Return for each of the six components the information left when the other five are unknown, shape (6,)."""
-    return 1.0 / np.diag(np.linalg.inv(H + np.diag([1e-6] * 6)))
+    return 1.0 / np.diag(np.linalg.inv(H + 1e-6 * np.eye(6)))
 
 
-def _starts(pose: FloatArray, reach_m: float, spacing_m: float, *, turned: bool) -> tuple[FloatArray, ...]:
+def _starts(pose: FloatArray, reach_m: float, spacing_m: float, *, turned: bool = False) -> tuple[FloatArray, ...]:
     """Return poses (4, 4) along the machine's axis to either side of `pose`, and turned ones where wanted."""
-    count = int(reach_m / spacing_m + 0.5)
+    count = math.ceil(reach_m / spacing_m - 0.5)
     shifts = [k * spacing_m for i in range(1, count + 1) for k in (i, -i)]
-    starts = [pose @ exp(np.array([0.0, 0.0, 0.0, shift, 0.0, 0.0])) for shift in shifts]
-    for turn_deg in (10.0, -10.0, 20.0, -20.0) if turned else ():
-        starts.append(pose @ exp(np.array([0.0, 0.0, math.radians(turn_deg), 0.0, 0.0, 0.0])))
-    return tuple(starts)
+    turns = [math.radians(turn_deg) for turn_deg in (10.0, -10.0, 20.0, -20.0)] if turned else []
+    twists = [(0.0, 0.0, 0.0, shift, 0.0, 0.0) for shift in shifts] + [
+        (0.0, 0.0, turn, 0.0, 0.0, 0.0) for turn in turns
+    ]
+    return tuple(pose @ exp(np.array(twist)) for twist in twists)
 
 
 def _travel_m(T: FloatArray) -> float:

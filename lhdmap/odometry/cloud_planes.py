@@ -1,8 +1,8 @@
 """Planes of a voxel map: what a cloud's points are measured against, in metres, and what they can tell of the pose.
 
-VGICP's cost holds a pull along the surface towards the voxels' means, that is towards standing still; in a smooth tunnel
-it outweighs the walls. Here only distances to planes count, so that an axis without information shows as such and the
-motion's prior decides it.
+VGICP's cost holds a pull along the surface towards the voxels' means, that is towards standing still; in a smooth
+tunnel it outweighs the walls. Here only distances to planes count, so that an axis without information shows as such
+and the motion's prior decides it.
 """
 
 from __future__ import annotations
@@ -21,26 +21,34 @@ _CUTOFF = 3.0  # sigmas beyond which a point has no weight
 _MEDIAN = 0.6745  # median of |x| in sigmas for a normal distribution
 _ROUNDS = 5
 _SMALL_STEP = 1e-4
-_LEAST_POINTS = 12
 
 
 class PlaneFit(NamedTuple):
-    """A pose (4, 4) with the information (6, 6) of the cloud alone about it in body axes, the residual (m, rms of inliers),
-    the share of points that agree with the map (`support`) and that it covers (`covered`)."""
+    """A pose (4, 4) and what a map says of it.
+
+    `information`: (6, 6) of the cloud alone about the pose, in body axes, rotation before translation; `residual_m`:
+    rms distance of the points that agree with the map; `support`: their share.
+    """
 
     pose: FloatArray
     information: FloatArray
     residual_m: float
     support: float
-    covered: float
+
+
+class PlaneNoise(NamedTuple):
+    """Range noise of the scanner (m), and the sigma (m) along the machine that noise of the normals fakes."""
+
+    range_m: float
+    chance_sigma_m: float
 
 
 class PlaneMap:
     """Planes of a `small_gicp.GaussianVoxelMap`, fitted when they are first asked for."""
 
-    def __init__(self, voxels: Any, voxel_m: float, noise_m: float) -> None:
-        """`voxels`: the map; `voxel_m`: its cell; `noise_m`: range noise of the scanner."""
-        self._voxel_m, self._noise_m = voxel_m, noise_m
+    def __init__(self, voxels: Any, voxel_m: float, noise: PlaneNoise) -> None:
+        """`voxels`: the map; `voxel_m`: its cell."""
+        self._voxel_m, self._noise = voxel_m, noise
         self._means: FloatArray = voxels.voxel_points()[:, :3]
         self._covariances = voxels.voxel_covs().reshape(-1, 4, 4)
         keys = _keys(self._means, voxel_m)
@@ -58,7 +66,7 @@ class PlaneMap:
         for _ in range(_ROUNDS):
             H, g, _ = self._normal_equations(points, pose)
             error = log(se3.inverse(predicted) @ pose)
-            step = -np.linalg.solve(H + prior, g + prior @ error)
+            step = np.asarray(np.linalg.solve(H + prior, -(g + prior @ error)), dtype=np.float64)
             pose = orthonormal(pose @ exp(step))
             if np.abs(step).max() < _SMALL_STEP:
                 break
@@ -69,7 +77,7 @@ class PlaneMap:
         H, _, distances = self._normal_equations(points, pose)
         inside = distances[0] < _CUTOFF
         residual = float(np.sqrt(np.mean(distances[1][inside] ** 2))) if inside.any() else float("nan")
-        return PlaneFit(pose, H, residual, float(inside.sum()) / len(points), len(inside) / len(points))
+        return PlaneFit(pose, H, residual, float(inside.sum()) / len(points))
 
     def _normal_equations(
         self, points: FloatArray, pose: FloatArray
@@ -85,7 +93,7 @@ class PlaneMap:
         body = normals @ pose[:3, :3]
         J = np.concatenate([np.cross(p, body), body], axis=1)
         JW = J.T * weight
-        H, g = discounted(JW @ J, JW @ distance, WEAK)
+        H, g = discounted(JW @ J, JW @ distance, self._noise.chance_sigma_m**-2)
         return H, g, (sigmas, distance)
 
     def _associate(self, points: FloatArray) -> tuple[npt.NDArray[np.intp], npt.NDArray[np.intp]]:
@@ -100,23 +108,25 @@ class PlaneMap:
         return seen, voxel
 
     def _fit_planes(self, voxel: npt.NDArray[np.intp]) -> None:
-        """Fit normals and variances: in a voxel whose points' normals differ, distances to the one plane scatter more."""
+        """Fit normals and variances: where the normals in a voxel differ, distances to its one plane scatter more."""
         spread, axes = np.linalg.eigh(self._covariances[voxel, :3, :3])
         self._normals[voxel] = axes[:, :, 0]
-        self._variances[voxel] = self._noise_m**2 + np.clip(spread[:, 0], 0.0, 1.0) * self._voxel_m**2 / 12.0
+        self._variances[voxel] = self._noise.range_m**2 + np.clip(spread[:, 0], 0.0, 1.0) * self._voxel_m**2 / 12.0
 
 
-WEAK = 2500.0
+def discounted(H: FloatArray, gradient: FloatArray, chance: float) -> tuple[FloatArray, FloatArray]:
+    """Return H (6, 6) and gradient (6,) with the information along the machine (I) cut to I²/(I + chance).
 
-
-def discounted(H: FloatArray, g: FloatArray, weak: float) -> tuple[FloatArray, FloatArray]:
+    Noise of the normals makes any wall tell something of the motion along it, always that there is none: a little
+    information along a tunnel is worse than none, whereas much of it is hardly touched.
+    """
     inverse = np.linalg.inv(H + 1e-6 * np.eye(6))
     information = 1.0 / inverse[3, 3]
-    removed = information * weak / (information + weak)
-    H, g = H.copy(), g.copy()
+    removed = information * chance / (information + chance)
+    H, gradient = H.copy(), gradient.copy()
+    gradient[3] -= removed * float(inverse[3] @ gradient)
     H[3, 3] -= removed
-    g[3] += removed * float(-(inverse @ g)[3])
-    return H, g
+    return H, gradient
 
 
 def _keys(points: FloatArray, voxel_m: float) -> npt.NDArray[np.int64]:

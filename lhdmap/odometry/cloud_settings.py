@@ -89,8 +89,19 @@ class CloudOdometrySettings:
         minimum=0.01,
         source="inclinometer",
     )
+    chance_sigma_m: float = setting(
+        0.01,
+        unit="m",
+        doc="Information along the machine worse than this is discounted: noise of the walls' normals fakes it.",
+        minimum=0.0001,
+        source="measured in smooth drifts with wheels: 0.2 % of the way, not 1.2 %",
+    )
     weak_sigma_m: float = setting(
-        0.02, unit="m", doc="A cloud that fixes a direction worse than this is flagged degenerate.", minimum=0.0
+        0.03,
+        unit="m",
+        doc="A cloud that fixes a direction worse than this is flagged degenerate.",
+        minimum=0.0,
+        source="rough walls give 0.002-0.006 m, moderate 0.02 m, smooth ones 0.08 m",
     )
     weak_sigma_deg: float = setting(0.2, unit="deg", doc="The same for the heading.", minimum=0.0)
     min_support: float = setting(
@@ -98,6 +109,9 @@ class CloudOdometrySettings:
         doc="Share of hits that must agree with the map; below it the cloud counts as lost.",
         minimum=0.0,
         maximum=1.0,
+    )
+    max_speed_mps: float = setting(
+        15.0, unit="m/s", doc="A cloud that fits only where the machine cannot have got to counts as lost.", minimum=0.1
     )
     reach_m: float = setting(
         2.0,
