@@ -99,7 +99,9 @@ def summary_text(summary: dict[str, Any]) -> str:
             f"scans        {summary['scans']} ({summary['scans_processed']} processed)",
             f"drive        {summary['distance_m']:.1f} m in {summary['duration_s']:.1f} s",
             f"weak scans   {100 * summary['degenerate_share']:.0f} %, lost stretches {summary['lost_stretches']}",
-            f"run          {summary['wall_s']:.1f} s = {summary['realtime_factor']:.1f} x real time, "
-            f"{summary['peak_memory_mib']:.0f} MiB",
+            (
+                f"run          {summary['wall_s']:.1f} s = {summary['realtime_factor']:.1f} x real time, "
+                f"{summary['peak_memory_mib']:.0f} MiB"
+            ),
         ]
     )

@@ -10,6 +10,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from typing import Any, TypeVar
 
 T = TypeVar("T")
+_TELLING_SHARE = 0.05  # before that the time is start-up (the first run compiles), and says nothing of the rest
 
 
 class Console:
@@ -75,7 +76,9 @@ class _Meter:
     def _show(self, share: float, elapsed_s: float) -> None:
         left = elapsed_s * (1.0 - share) / share if share > 0 else math.inf
         rate = share * self._total / elapsed_s if elapsed_s > 0 else 0.0
-        text = f"{self._label}: {100 * share:3.0f} %, {rate:.1f} x real time, {left:.0f} s left"
+        text = f"{self._label}: {100 * share:3.0f} %"
+        if share >= _TELLING_SHARE:
+            text += f", {rate:.1f} x real time, {left:.0f} s left"
         print(
             f"\r{text}   " if self._terminal else text, end="" if self._terminal else "\n", file=sys.stderr, flush=True
         )

@@ -11,10 +11,14 @@ import importlib
 import sys
 import traceback
 import warnings
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING
 
 from lhdmap import __version__
-from lhdmap.errors import LhdmapError
+from lhdmap.errors import LhdmapError, LhdmapWarning
+
+if TYPE_CHECKING:
+    from lhdmap.cli.console import Console
 
 COMMANDS = {
     "demo": "generate the sample drive, build its map, evaluate it, write report and recording",
@@ -26,6 +30,8 @@ COMMANDS = {
     "config": "print the settings with unit and source",
 }
 EXIT_USAGE, EXIT_INPUT, EXIT_INTERRUPTED = 2, 3, 4
+INSTALL_HINT = "on Debian, open3d needs: apt-get install libegl1 libgl1 libx11-6 libusb-1.0-0; all else comes with pip"
+FAULT_HINT = "please report it with the output of the same command and --debug"
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -81,7 +87,7 @@ def _run(arguments: argparse.Namespace) -> int:
     console = Console(json=arguments.json, quiet=arguments.quiet)
     try:
         with warnings.catch_warnings():
-            warnings.showwarning = lambda message, *_, **__: console.warn(str(message))
+            warnings.showwarning = _shower(console, everything=arguments.debug)
             return int(_module(arguments.command).run(arguments, console))
     except LhdmapError as error:
         if arguments.debug:
@@ -98,3 +104,23 @@ def _run(arguments: argparse.Namespace) -> int:
             traceback.print_exc()
         console.error(f"{type(error).__name__}: {error}")
         return EXIT_INPUT
+    except ImportError as error:
+        if arguments.debug:
+            traceback.print_exc()
+        console.error(f"the installation is not complete: {error}\n{INSTALL_HINT}")
+        return EXIT_INPUT
+    except Exception as error:  # noqa: BLE001  # the last resort: a fault of lhdmap is told in two lines as well
+        if arguments.debug:
+            traceback.print_exc()
+        console.error(f"a fault in lhdmap, not in what you asked for: {type(error).__name__}: {error}\n{FAULT_HINT}")
+        return EXIT_INPUT
+
+
+def _shower(console: Console, *, everything: bool) -> Callable[..., None]:
+    """Return what shows warnings: those of lhdmap, which are about the input; of libraries only with `--debug`."""
+
+    def show(message: Warning | str, category: type[Warning], *_: object, **__: object) -> None:
+        if everything or issubclass(category, LhdmapWarning):
+            console.warn(str(message))
+
+    return show

@@ -26,7 +26,7 @@ class OdometrySettings:
         maximum=1.0,
     )
     step_m: float = setting(
-        0.1,
+        0.08,
         unit="m",
         doc="Adaptive rate: a scan is processed once the machine has moved this far.",
         minimum=0.0,
@@ -90,7 +90,7 @@ class AnchorSettings:
     """Local wall map that the default method matches scans against."""
 
     cell_m: float = setting(
-        0.03,
+        0.025,
         unit="m",
         doc="Finest cell in which hits are averaged; walls are lines fitted over three cells around a point.",
         source="measured over roughness 5-120 mm and noise 12-25 mm (docs/odometry.md)",
@@ -98,7 +98,7 @@ class AnchorSettings:
         maximum=0.5,
     )
     insert_m: float = setting(
-        0.1, unit="m", doc="Travel between scans that enter the map.", minimum=0.0, source="findings, section 3"
+        0.06, unit="m", doc="Travel between scans that enter the map.", minimum=0.0, source="findings, section 3"
     )
     insert_deg: float = setting(
         2.0, unit="deg", doc="Turn between scans that enter the map.", minimum=0.0, source="lhdmap"

@@ -66,7 +66,7 @@ def run_demo(target: Path, settings: Settings | None = None, watcher: Watcher | 
     return Demo(folder, drive, built, evaluation, evaluation_file, plot_file)
 
 
-def _silent(text: str) -> None:  # noqa: ARG001  # nobody watches
+def _silent(text: str) -> None:
     """Say nothing."""
 
 

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 
 import numba as nb
 import numpy as np
+import numpy.typing as npt
 from scipy.interpolate import CubicSpline
 
 from lhdmap.messages import FloatArray, LaserScan
@@ -40,8 +41,8 @@ class PlanarWorld:
     segments_m: FloatArray
     origin_m: FloatArray
     shape: tuple[int, int]
-    starts: np.ndarray  # type: ignore[type-arg]
-    members: np.ndarray  # type: ignore[type-arg]
+    starts: npt.NDArray[np.int64]
+    members: npt.NDArray[np.int64]
     centre_line_m: FloatArray
 
     def ranges(self, T_world_scanner: FloatArray, angles_rad: FloatArray, max_range_m: float) -> FloatArray:
