@@ -28,8 +28,7 @@ SPEEDS_KMH = (6.0, 12.0, 24.0)
 _MAP_MEMORY_M = 1.0
 
 
-def drive_run(drive: Drive, method: str = "anchored", *, wheels: bool = False, range_noise_m: float = 0.012
-) -> Run:
+def drive_run(drive: Drive, method: str = "anchored", *, wheels: bool = False, range_noise_m: float = 0.012) -> Run:
     """Run the odometry over one drive."""
     truth, scans = scans_of(drive)
     steps = wheels_of(truth, drive.rate_hz, drive.seed) if wheels else None
@@ -96,7 +95,9 @@ def disturbed(seeds: Sequence[int]) -> Iterator[Figure]:
             ("dust, mixed pixels, drop-outs", replace(base, dusty=True), 0.012, 0.05),
         )
         for name, drive, told_m, target in cases:
-            errors = [ten_metres(drive_run(replace(drive, seed=seed), range_noise_m=told_m)).translation_pct for seed in seeds]
+            errors = [
+                ten_metres(drive_run(replace(drive, seed=seed), range_noise_m=told_m)).translation_pct for seed in seeds
+            ]
             each = ", ".join(f"{e:.4f}" for e in errors)
             yield Figure(group, f"{name}, {rate:g} Hz", _mean(errors), "%", target, each)
 
