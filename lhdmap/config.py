@@ -16,6 +16,7 @@ from lhdmap.proprioception.attitude import AttitudeSettings
 from lhdmap.proprioception.slip import SlipSettings
 from lhdmap.proprioception.wheels import WheelSettings
 from lhdmap.report.recording import RecordingSettings
+from lhdmap.smoothing.settings import SmoothingSettings
 from lhdmap.settings import load_section, nearest, section_toml
 
 _HEADER = """\
@@ -36,6 +37,7 @@ class Settings:
     wheels: WheelSettings = field(default_factory=WheelSettings)
     slip: SlipSettings = field(default_factory=SlipSettings)
     integration: IntegrationSettings = field(default_factory=IntegrationSettings)
+    smoothing: SmoothingSettings = field(default_factory=SmoothingSettings)
     recording: RecordingSettings = field(default_factory=RecordingSettings)
 
 

@@ -61,6 +61,7 @@ class PlanarOdometry:
         self._turn = 0
         self._rate = AdaptiveRate(self._settings)
         self._wheels_used = False
+        self.points = np.zeros((0, 3))  # hits of the last processed scan, level base frame, heights in odom
 
     def update(
         self, scan: LaserScan, T_level_sensor: FloatArray, wheels: WheelStep | None = None, view: View = _PLAIN
@@ -74,6 +75,7 @@ class PlanarOdometry:
         floor_m = self._settings.min_height_m if T_level_sensor[2, 3] > 2.0 * self._settings.min_height_m else -math.inf
         points = planar_points(scan, T_level_sensor, self._motion.velocity, floor_m, view.boxes_m, self._part(scan))
         points[:, 2] += view.height_m
+        self.points = points
         return self._step(scan.stamp_ns, self._matcher.step(points, _planar_mount(T_level_sensor)))
 
     def _part(self, scan: LaserScan) -> tuple[int, int]:

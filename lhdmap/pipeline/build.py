@@ -20,13 +20,16 @@ from lhdmap.integration.cloud_io import write_cloud
 from lhdmap.logs.source import LogSource
 from lhdmap.machine import Machine
 from lhdmap.mapfolder import MapFolderWriter, MapInfo
-from lhdmap.messages import Message
+from lhdmap.messages import Joints, LaserScan, Message
 from lhdmap.pipeline.mapping import MappingPipeline
-from lhdmap.pipeline.track import Rows, resample, trajectory_of
+from lhdmap.pipeline.sweeps import SweepIntegration
+from lhdmap.pipeline.track import FinalTrack, Rows, resample, trajectory_of
+from lhdmap.proprioception.wheels import WheelOdometry
 from lhdmap.provenance import source_entry
 from lhdmap.report.data import ReportData, Summary, TopicRow
 from lhdmap.report.page import write_report
 from lhdmap.report.recording import RecordingWriter, record_run
+from lhdmap.smoothing.smoother import corrected
 from lhdmap.trajectory import Trajectory
 
 ROLES_READ = ("front", "rear", "inclinometer", "joints", "tachometer", "wheel_odometry", "tf_static")
@@ -98,13 +101,19 @@ class _Outcome:
         self.request, self.source, self.pipeline = request, source, pipeline
         records = pipeline.records
         stamps, times = np.array(records.stamps_ns, dtype=np.int64), np.array(records.times_ns, dtype=np.int64)
-        self.rows: Rows = pipeline.track.rows()
-        self.odometry = trajectory_of(resample(self.rows, times), stamps)
-        self.final = self.odometry
-        self.cloud: Cloud = pipeline.sweeps.cloud()
+        rows = pipeline.track.rows()
+        self.odometry = self.final = trajectory_of(resample(rows, times), stamps)
+        self.cloud: Cloud
+        correction = pipeline.smoother.correction()
+        if correction is None:
+            self.cloud = pipeline.sweeps.cloud()
+        else:
+            rows = Rows(rows.times_ns, corrected(rows.poses, rows.times_ns, correction))
+            self.final = trajectory_of(resample(rows, times), stamps)
+            self.cloud = integrate_again(request, pipeline, rows)
         self.duration_s = float(times[-1] - times[0]) * 1e-9 if len(times) else 0.0
         self.warnings = [*source.warnings, *source.damage, *pipeline.warnings, *_remarks(pipeline)]
-        steps = np.diff(self.rows.poses[:, :3], axis=0)
+        steps = np.diff(rows.poses[:, :3], axis=0)
         self.summary: dict[str, Any] = {
             "scans": len(stamps),
             "scans_processed": records.processed,
@@ -113,7 +122,7 @@ class _Outcome:
             **_cost(started, self.duration_s),
             "degenerate_share": records.degenerate_share,
             "lost_stretches": records.lost_stretches,
-            "closures": 0,
+            "closures": 0 if correction is None else correction.closures,
             "pile": None,
         }
 
@@ -136,6 +145,22 @@ class _Outcome:
             settings_text=settings_toml(self.request.settings),
             provenance={"log": ", ".join(path.name for path in self.request.logs)},
         )
+
+
+def integrate_again(request: BuildRequest, pipeline: MappingPipeline, rows: Rows) -> Cloud:
+    """Read the scans once more and integrate them at their final poses: closed loops have moved them."""
+    sweeps = SweepIntegration(request.settings, pipeline.machine, pipeline.mounts, None)
+    wheels = WheelOdometry(request.settings.wheels, pipeline.machine or Machine())
+    track, times = FinalTrack(rows), iter(pipeline.records.times_ns)
+    with LogSource(list(request.logs), request.topics) as source:
+        for role, message in source.messages([role for role in ("front", "rear", "joints") if role in source.roles]):
+            if isinstance(message, Joints):
+                wheels.update(message)
+            elif isinstance(message, LaserScan):
+                time_ns = next(times, message.stamp_ns) if role == "front" else message.stamp_ns
+                sweeps.add_final(role, time_ns, message, track, wheels)
+    sweeps.wait()
+    return sweeps.cloud()
 
 
 def _write(folder: MapFolderWriter, outcome: _Outcome, recording: RecordingWriter) -> None:

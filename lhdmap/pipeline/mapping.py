@@ -31,6 +31,7 @@ from lhdmap.pipeline.track import Track
 from lhdmap.proprioception.attitude import AttitudeFilter
 from lhdmap.proprioception.slip import SlipEstimator
 from lhdmap.proprioception.wheels import WheelOdometry
+from lhdmap.smoothing.smoother import Smoother
 
 _DEFAULT_MACHINE = Machine()
 _QUEUE_SCANS = 2000  # a sensor that stops must not hold back scans without bound
@@ -50,6 +51,7 @@ class MappingPipeline:
         self.sweeps = SweepIntegration(settings, machine, self.mounts, on_sweep)
         self.track = Track(settings.odometry.height_lever_m)
         self.records = ScanRecords()
+        self.smoother = Smoother(settings.smoothing)
         self.has_inclinometer = False
         self._newest_ns = self._time_ns = -(2**62)
         self._clock_ns = -(2**62)
@@ -127,6 +129,7 @@ class MappingPipeline:
         self.sweeps.hold("front", time_ns, scan)
         if step.processed:
             self.track.append(time_ns, step.T_odom_base, roll, pitch)
+            self.smoother.keys.update(time_ns, step.T_odom_base, self.odometry.points, weak=step.degenerate)
             self._record(scan.stamp_ns, time_ns, step)
             self.sweeps.advance(self.track, self.wheels)
 

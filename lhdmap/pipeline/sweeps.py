@@ -15,7 +15,7 @@ from lhdmap.integration.project import SweepPoses
 from lhdmap.machine import Machine
 from lhdmap.messages import FloatArray, LaserScan, PointCloud
 from lhdmap.pipeline.mounts import Mounts
-from lhdmap.pipeline.track import Track
+from lhdmap.pipeline.track import FinalTrack, Track
 from lhdmap.proprioception.wheels import WheelOdometry
 
 ScanSink = Callable[[str, int, FloatArray], None]
@@ -52,6 +52,16 @@ class SweepIntegration:
         for role, held in self._held.items():
             while held and len(track):
                 self._hand_over(role, *held.popleft(), track, wheels)
+        self.wait()
+
+    def add_final(
+        self, role: str, time_ns: int, sweep: LaserScan | PointCloud, track: FinalTrack, wheels: WheelOdometry
+    ) -> None:
+        """Integrate a sweep at once: the path is known to its end."""
+        self._hand_over(role, time_ns, sweep, track, wheels)
+
+    def wait(self) -> None:
+        """Wait until all that was handed over is in the cloud."""
         while self._pending:
             self._pending.popleft().result()
         self._worker.shutdown()
@@ -61,7 +71,7 @@ class SweepIntegration:
         return self.integrator.cloud()
 
     def _hand_over(
-        self, role: str, time_ns: int, sweep: LaserScan | PointCloud, track: Track, wheels: WheelOdometry
+        self, role: str, time_ns: int, sweep: LaserScan | PointCloud, track: Track | FinalTrack, wheels: WheelOdometry
     ) -> None:
         if not self.integrator.knows(sweep.frame_id):
             self.integrator.add_mount(self._mounts.of(sweep.frame_id, role))

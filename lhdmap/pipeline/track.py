@@ -91,6 +91,28 @@ class Track:
         return Rows(np.array(self._times, dtype=np.int64), np.array(self._poses, dtype=float).reshape(-1, 6))
 
 
+class FinalTrack:
+    """A finished path: any pose by time."""
+
+    def __init__(self, rows: Rows) -> None:
+        self._rows = rows
+
+    def matrix_at(self, time_ns: int) -> FloatArray:
+        """Return the pose (4, 4) at a time, held before the first and after the last."""
+        row = resample_near(self._rows, time_ns)
+        return se3.from_rpy(row[3], row[4], row[5], (row[0], row[1], row[2]))
+
+
+def resample_near(rows: Rows, time_ns: int) -> FloatArray:
+    """Return one pose (6,) at a time, linear between rows."""
+    after = int(np.searchsorted(rows.times_ns, time_ns))
+    if after == 0 or after == len(rows.times_ns):
+        return rows.poses[min(after, len(rows.times_ns) - 1)]
+    before_ns = int(rows.times_ns[after - 1])
+    share = (time_ns - before_ns) / (int(rows.times_ns[after]) - before_ns)
+    return rows.poses[after - 1] + share * (rows.poses[after] - rows.poses[after - 1])
+
+
 def resample(rows: Rows, times_ns: Stamps) -> Rows:
     """Return poses at other times, shape (M,): linear between the rows, held before the first and after the last."""
     # differences first: stamps of today's clocks have 19 digits, a float keeps 16

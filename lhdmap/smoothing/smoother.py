@@ -1,0 +1,67 @@
+"""The smoothing stage: key scans while the odometry runs, closures and the pose graph at the end, corrections between keys."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from lhdmap.geometry import se2
+from lhdmap.messages import FloatArray
+from lhdmap.smoothing.closures import find_closures
+from lhdmap.smoothing.graph import smoothed
+from lhdmap.smoothing.keys import KeyScans
+from lhdmap.smoothing.settings import SmoothingSettings
+
+
+class Correction(NamedTuple):
+    """Planar corrections of the odometry: `T_map_odom` (N, 3) at `times_ns` (N,), and the number of closures behind them."""
+
+    times_ns: npt.NDArray[np.int64]
+    T_map_odom: FloatArray
+    closures: int
+
+
+class Smoother:
+    """Collects key scans (`keys.update`); `correction` closes loops and solves the graph."""
+
+    def __init__(self, settings: SmoothingSettings) -> None:
+        self._settings = settings
+        self.keys = KeyScans(settings)
+
+    def correction(self) -> Correction | None:
+        """Return how the odometry is to be moved, or None where no place was seen twice."""
+        keys = self.keys.keys
+        closures = find_closures(keys, self._settings) if self._settings.closures else []
+        if not closures:
+            return None
+        poses = smoothed(keys, closures, self._settings)
+        moved = np.array([se2.compose(pose, se2.inverse(key.pose)) for pose, key in zip(poses, keys, strict=True)])
+        moved[:, 2] = np.unwrap(moved[:, 2])
+        return Correction(np.array([key.time_ns for key in keys], dtype=np.int64), moved, len(closures))
+
+
+def corrected(poses: FloatArray, times_ns: npt.NDArray[np.int64], correction: Correction) -> FloatArray:
+    """Return poses (N, 6: x, y, z, roll, pitch, heading) at `times_ns` moved by the correction, blended between keys.
+
+    Blending the keys' moves about the origin would swing far poses: each pose is moved by both neighbours and the results mixed.
+    """
+    at = np.clip(np.searchsorted(correction.times_ns, times_ns, side="right") - 1, 0, len(correction.times_ns) - 1)
+    after = np.minimum(at + 1, len(correction.times_ns) - 1)
+    span = np.maximum((correction.times_ns[after] - correction.times_ns[at]).astype(float), 1.0)
+    share = np.clip((times_ns - correction.times_ns[at]).astype(float) / span, 0.0, 1.0)[:, None]
+    planar = poses[:, [0, 1, 5]]
+    mixed = (1.0 - share) * _moved(correction.T_map_odom[at], planar) + share * _moved(
+        correction.T_map_odom[after], planar
+    )
+    out = poses.copy()
+    out[:, [0, 1, 5]] = mixed
+    return out
+
+
+def _moved(T: FloatArray, planar: FloatArray) -> FloatArray:
+    c, s = np.cos(T[:, 2]), np.sin(T[:, 2])
+    x = T[:, 0] + c * planar[:, 0] - s * planar[:, 1]
+    y = T[:, 1] + s * planar[:, 0] + c * planar[:, 1]
+    return np.column_stack([x, y, planar[:, 2] + T[:, 2]])
