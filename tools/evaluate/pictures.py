@@ -12,11 +12,6 @@ _LONGEST_PX = 1400
 
 def top_view(points_m: FloatArray, path_m: FloatArray, target: Path) -> None:
     """Write a PNG: points (N, 2+) dark on white, the path (M, 2+) in red, a bar of 10 m at the lower left."""
-    import matplotlib as mpl
-
-    mpl.use("Agg")
-    import matplotlib.image
-
     low = np.minimum(points_m[:, :2].min(0), path_m[:, :2].min(0)) - 1.0
     high = np.maximum(points_m[:, :2].max(0), path_m[:, :2].max(0)) + 1.0
     scale = _LONGEST_PX / float((high - low).max())
@@ -27,13 +22,7 @@ def top_view(points_m: FloatArray, path_m: FloatArray, target: Path) -> None:
         canvas[height - 1 - row, column] = colour
     canvas[height - 12 : height - 8, 10 : 10 + round(10.0 * scale)] = (0, 120, 0)
     target.parent.mkdir(parents=True, exist_ok=True)
-    levels = canvas.astype(np.float32) / 255.0
-    matplotlib.image.imsave(target, levels)
-    _shrink(target, canvas)
-
-
-def _shrink(target: Path, canvas: np.ndarray) -> None:  # type: ignore[type-arg]
-    """Write with a palette where the imaging library is there: a quarter of the size."""
     from PIL import Image
 
+    # a palette takes a quarter of the space
     Image.fromarray(canvas).quantize(8).save(target, optimize=True)
