@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import argparse
 import importlib
+import os
 import sys
 import traceback
 import warnings
@@ -51,7 +52,13 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 def entry_point() -> None:
     """Console script: `main` with the process's exit code."""
-    sys.exit(main())
+    exit_code = main()
+    if exit_code == EXIT_INTERRUPTED:
+        # Where Ctrl-C met Python inside a compiled library, the interpreter would end by the signal and not with our code.
+        sys.stdout.flush()
+        sys.stderr.flush()
+        os._exit(exit_code)
+    sys.exit(exit_code)
 
 
 def _parser(chosen: str) -> argparse.ArgumentParser:
@@ -89,31 +96,29 @@ def _run(arguments: argparse.Namespace) -> int:
         with warnings.catch_warnings():
             warnings.showwarning = _shower(console, everything=arguments.debug)
             return int(_module(arguments.command).run(arguments, console))
-    except LhdmapError as error:
-        if arguments.debug:
-            traceback.print_exc()
-        console.error(str(error))
-        return error.exit_code
     except KeyboardInterrupt:
         console.error("interrupted; what was finished is kept")
         return EXIT_INTERRUPTED
     except BrokenPipeError:
         return 0
-    except (OSError, MemoryError) as error:
-        if arguments.debug:
-            traceback.print_exc()
-        console.error(f"{type(error).__name__}: {error}")
-        return EXIT_INPUT
-    except ImportError as error:
-        if arguments.debug:
-            traceback.print_exc()
-        console.error(f"the installation is not complete: {error}\n{INSTALL_HINT}")
-        return EXIT_INPUT
     except Exception as error:  # noqa: BLE001  # the last resort: a fault of lhdmap is told in two lines as well
         if arguments.debug:
             traceback.print_exc()
-        console.error(f"a fault in lhdmap, not in what you asked for: {type(error).__name__}: {error}\n{FAULT_HINT}")
-        return EXIT_INPUT
+        text, exit_code = _told(error)
+        console.error(text)
+        return exit_code
+
+
+def _told(error: Exception) -> tuple[str, int]:
+    """Return what a person is told of an error, and the exit code."""
+    match error:
+        case LhdmapError():
+            return str(error), error.exit_code
+        case OSError() | MemoryError():
+            return f"{type(error).__name__}: {error}", EXIT_INPUT
+        case ImportError():
+            return f"the installation is not complete: {error}\n{INSTALL_HINT}", EXIT_INPUT
+    return f"a fault in lhdmap, not in what you asked for: {type(error).__name__}: {error}\n{FAULT_HINT}", EXIT_INPUT
 
 
 def _shower(console: Console, *, everything: bool) -> Callable[..., None]:

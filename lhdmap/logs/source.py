@@ -40,7 +40,7 @@ class LogSource:
         """Open all files and find out the roles of their topics; raises InputError where that fails."""
         with ExitStack() as stack:
             self._readers = [stack.enter_context(open_log(path)) for path in self.paths]
-            self.roles = assign_topics(self.topics(), self._overrides)
+            self.roles = self._assigned()
             if "front" not in self.roles and "points" not in self.roles:
                 raise InputError(f"{self._names()}: {missing_scanner(self.topics())}")
             for reader in self._readers:
@@ -53,6 +53,12 @@ class LogSource:
     ) -> None:
         """Close all files."""
         self._stack.close()
+
+    def _assigned(self) -> dict[str, str]:
+        try:
+            return assign_topics(self.topics(), self._overrides)
+        except InputError as error:
+            raise InputError(f"{self._names()}: {error}") from error
 
     @property
     def damage(self) -> list[str]:
