@@ -179,25 +179,18 @@ class KissMatcher:
         self._judge.insert(cloud, pose)
 
     def match(self, cloud: Cloud, predicted: Prediction) -> PlaneFit:
-        """Return kiss-icp's pose blended with the prediction."""
-        best = self._fit(cloud, predicted.pose, predicted)
-        for start in predicted.starts:
-            found = self._fit(cloud, start, predicted)
-            best = found if found.support > best.support + 0.01 else best
-        self._kiss.adaptive_threshold.update_model_deviation(se3.inverse(predicted.pose) @ best.pose)
-        return best
-
-    def _fit(self, cloud: Cloud, start: FloatArray, predicted: Prediction) -> PlaneFit:
+        """Return kiss-icp's pose blended with the prediction; its adaptive threshold is all the search that it has."""
         sigma = self._kiss.adaptive_threshold.get_threshold()
         source, _ = self._kiss.voxelize(cloud.full_m)
         pose = self._kiss.registration.align_points_to_map(
             points=source,
             voxel_map=self._kiss.local_map,
-            initial_guess=start,
+            initial_guess=predicted.pose,
             max_correspondance_distance=3.0 * sigma,
             kernel=sigma,
         )
-        fit = self._judge.judge(cloud, sensible(pose, start))
+        fit = self._judge.judge(cloud, sensible(pose, predicted.pose))
+        self._kiss.adaptive_threshold.update_model_deviation(se3.inverse(predicted.pose) @ fit.pose)
         return fit._replace(pose=blended(fit, predicted))
 
 

@@ -148,7 +148,7 @@ class CloudOdometry:
         s = self._settings
         step = se3.inverse(self._processed_pose) @ self._motion.pose
         moved = _travel_m(step) >= s.step_m or _turn_rad(step) >= math.radians(s.step_deg)
-        return moved or self._wait_s >= s.step_s or self._processed < _FIRST_CLOUDS
+        return moved or self._wait_s >= s.step_s or self._inserts < _FIRST_CLOUDS or self._lost_in_a_row > 0
 
     def _place(self, sweep: Sweep) -> _Placed:
         """Match the cloud and correct the motion; on a new velocity undo the sweep and match once more."""
