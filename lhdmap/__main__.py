@@ -1,6 +1,5 @@
-"""`python -m lhdmap` is `lhdmap`."""
+"""`python -m lhdmap`."""
 
 from lhdmap.cli.main import entry_point
 
-if __name__ == "__main__":
-    entry_point()
+entry_point()

@@ -11,17 +11,24 @@ from lhdmap.odometry.settings import OdometrySettings
 FORWARD, LATERAL, TURNING = 3, 4, 5
 _GATE_SIGMAS = 4.0
 _LONGEST_STEP_S = 1.0
+_STARTING_VARIANCE = np.diag([0.2**2, 0.05**2, 0.05**2])  # of a starting velocity from a dry run
 _GAP_VARIANCE = np.diag([4.0, 0.1, 0.5])
 
 
 class Motion:
-    """State and covariance of `motion_filter`: shared by the odometry and the matcher that corrects it."""
+    """State and covariance of `motion_filter`: shared by the odometry and the matcher that corrects it.
 
-    def __init__(self, settings: OdometrySettings) -> None:
+    `velocity` (3,): forward, lateral, turning speed at the start, where it is known.
+    """
+
+    def __init__(self, settings: OdometrySettings, velocity: FloatArray | None = None) -> None:
         self._accelerations = np.array(
             [settings.forward_acceleration, settings.lateral_acceleration, settings.turning_acceleration]
         )
         self.state, self.P = motion_filter.initial(np.zeros(3))
+        if velocity is not None:
+            self.state[3:6] = velocity
+            self.P[3:6, 3:6] = _STARTING_VARIANCE
 
     @property
     def pose(self) -> FloatArray:

@@ -12,7 +12,7 @@ from lhdmap.odometry.anchored import AnchoredMatcher
 from lhdmap.odometry.clock import ScanClock
 from lhdmap.odometry.flow_matcher import FlowMatcher
 from lhdmap.odometry.motion import FORWARD, TURNING, Motion
-from lhdmap.odometry.scan_points import NO_BOXES, planar_points
+from lhdmap.odometry.scan_points import NO_BOXES, half_sweep_ns, planar_points
 from lhdmap.odometry.settings import AnchorSettings, OdometrySettings, RangeFlowSettings, SearchSettings
 from lhdmap.odometry.steps import Matched, OdometryStep, WheelStep, body_information, marginal_information
 
@@ -43,9 +43,10 @@ class PlanarOdometry:
         anchor: AnchorSettings | None = None,
         wide: SearchSettings | None = None,
         range_flow: RangeFlowSettings | None = None,
+        velocity: FloatArray | None = None,
     ) -> None:
         self._settings = settings or OdometrySettings()
-        self._motion = Motion(self._settings)
+        self._motion = Motion(self._settings, velocity)
         self._matcher: AnchoredMatcher | FlowMatcher
         if self._settings.method == "range_flow":
             self._matcher = FlowMatcher(self._motion, self._settings, range_flow or RangeFlowSettings())
@@ -71,12 +72,12 @@ class PlanarOdometry:
         self._fuse(wheels, dt_s)
         self._motion.predict(dt_s)
         if not self._rate.due(dt_s, self._motion.velocity) and not self._clock.bunched:
-            return self._step(scan.stamp_ns, None)
+            return self._step(scan, None)
         floor_m = self._settings.min_height_m if T_level_sensor[2, 3] > 2.0 * self._settings.min_height_m else -math.inf
         points = planar_points(scan, T_level_sensor, self._motion.velocity, floor_m, view.boxes_m, self._part(scan))
         points[:, 2] += view.height_m
         self.points = points
-        return self._step(scan.stamp_ns, self._matcher.step(points, _planar_mount(T_level_sensor)))
+        return self._step(scan, self._matcher.step(points, _planar_mount(T_level_sensor)))
 
     def _part(self, scan: LaserScan) -> tuple[int, int]:
         """Return first beam and step so that no more than `max_beams` are used, another part each time."""
@@ -101,18 +102,20 @@ class PlanarOdometry:
             sigma_rps = math.hypot(wheels.turn_sigma_rad / dt_s, s.wheel_turn_noise_rps)
             self._motion.fuse_speed(TURNING, wheels.turn_rad / dt_s, sigma_rps, scaled=False)
 
-    def _step(self, stamp_ns: int, matched: Matched | None) -> OdometryStep:
+    def _step(self, scan: LaserScan, matched: Matched | None) -> OdometryStep:
         pose, velocity = self._motion.pose, self._motion.velocity
+        stamp_ns, time_ns = scan.stamp_ns, scan.stamp_ns + half_sweep_ns(scan)
         covariance = body_information(self._motion.P[:3, :3], pose[2])
         if matched is None:
             return OdometryStep(
-                stamp_ns, pose, covariance, velocity, np.zeros(3), math.nan, math.nan, False, "", False, False
+                stamp_ns, time_ns, pose, covariance, velocity, np.zeros(3), math.nan, math.nan, False, "", False, False
             )
         information = marginal_information(body_information(matched.information, pose[2]))
         weak = self._weak(information) or matched.lost
         substitute = ("wheels" if self._wheels_used else "motion") if weak else ""
         return OdometryStep(
             stamp_ns,
+            time_ns,
             pose,
             covariance,
             velocity,

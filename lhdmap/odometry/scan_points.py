@@ -20,12 +20,13 @@ def planar_points(
     boxes_m: FloatArray = NO_BOXES,
     every: tuple[int, int] = (0, 1),
 ) -> FloatArray:
-    """Return the hits as points, shape (N, 3), metres, in the level frame of `base_link` at the scan's stamp.
+    """Return the hits as points, shape (N, 3), metres, in the level frame of `base_link` in the middle of the sweep.
 
     Args:
         scan: the scan; beams without a valid return are left out.
         T_level_sensor: pose (4, 4) of the sensor in the level frame (mount, roll and pitch applied; heading of the machine).
-        velocity: forward, lateral, turning speed (3,) that undoes the sweep (beam i was measured `i * time_increment` later).
+        velocity: forward, lateral, turning speed (3,) that undoes the sweep (beam i was measured `i * time_increment` after
+            the stamp).
         min_height_m: hits below this height in the level frame are floor and left out.
         boxes_m: shape (K, 6), x y z minimum and maximum of the machine's bodies in the level frame: own hits are left out.
         every: first beam and step, to take only a part of the beams.
@@ -45,9 +46,15 @@ def planar_points(
     return out[:count]
 
 
+def half_sweep_ns(scan: LaserScan) -> int:
+    """Return the time from the stamp to the middle of the sweep, nanoseconds."""
+    return round(0.5e9 * scan.time_increment_s * max(scan.ranges_m.size - 1, 0))
+
+
 @nb.njit(cache=True, nogil=True)
 def _points(ranges, sweep, limits, T, velocity, min_height, boxes, every, out):  # type: ignore[no-untyped-def]
     angle_min, increment, beam_s = sweep
+    middle_s = 0.5 * beam_s * max(ranges.size - 1, 0)
     count = 0
     for i in range(every[0], ranges.size, every[1]):
         r = ranges[i]
@@ -60,7 +67,7 @@ def _points(ranges, sweep, limits, T, velocity, min_height, boxes, every, out): 
         z = T[2, 0] * x_s + T[2, 1] * y_s + T[2, 3]
         if z < min_height or _inside(x, y, z, boxes):
             continue
-        after = i * beam_s
+        after = i * beam_s - middle_s
         turn = velocity[2] * after
         c, s = math.cos(turn), math.sin(turn)
         ch, sh = math.cos(0.5 * turn), math.sin(0.5 * turn)

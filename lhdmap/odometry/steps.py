@@ -38,13 +38,15 @@ class Matched(NamedTuple):
 class OdometryStep(NamedTuple):
     """Outcome of one scan.
 
-    `T_odom_base`: planar pose (3,); `covariance`: (3, 3) of the step from the scan before, in body axes (m, rad);
+    `T_odom_base`: planar pose (3,) at `time_ns`, the middle of the sweep: there an error of the speed that undid the sweep does
+    not move the scan as a whole; `covariance`: (3, 3) of the step from the scan before, in body axes (m, rad);
     `information`: (3,) along, across (1/m²) and heading (1/rad²) of this scan against the map, the others given;
     `degenerate`: a direction was not observed; `substitute`: what stood in for it (`wheels`, `motion` or empty);
     `processed`: False where the adaptive rate only predicted; `lost`: the scan did not fit the map.
     """
 
     stamp_ns: int
+    time_ns: int
     T_odom_base: FloatArray
     covariance: FloatArray
     velocity: FloatArray

@@ -22,7 +22,8 @@ from lhdmap.messages import (
     WheelPose,
 )
 from lhdmap.odometry.planar import PlanarOdometry, View
-from lhdmap.odometry.scan_points import NO_BOXES
+from lhdmap.odometry.scan_points import NO_BOXES, half_sweep_ns
+from lhdmap.odometry.start import ScanInput, starting_velocity
 from lhdmap.odometry.steps import OdometryStep, WheelStep
 from lhdmap.pipeline.mounts import Mounts, level_sensor
 from lhdmap.pipeline.records import ScanRecords
@@ -34,6 +35,7 @@ from lhdmap.proprioception.wheels import WheelOdometry
 from lhdmap.smoothing.smoother import Smoother
 
 _DEFAULT_MACHINE = Machine()
+_WARM_SCANS, _FEWEST_WARM_SCANS, _WARM_NS = 25, 6, 1_500_000_000
 _QUEUE_SCANS = 2000  # a sensor that stops must not hold back scans without bound
 
 
@@ -47,7 +49,7 @@ class MappingPipeline:
         self.attitude = AttitudeFilter(settings.attitude)
         self.wheels = WheelOdometry(settings.wheels, machine or _DEFAULT_MACHINE)
         self.slip = SlipEstimator(settings.slip, settings.wheels.scale_std)
-        self.odometry = PlanarOdometry(settings.odometry, settings.anchor, settings.search, settings.range_flow)
+        self.odometry: PlanarOdometry | None = None  # begins once the first scans have told the speed
         self.sweeps = SweepIntegration(settings, machine, self.mounts, on_sweep)
         self.track = Track(settings.odometry.height_lever_m)
         self.records = ScanRecords()
@@ -106,8 +108,36 @@ class MappingPipeline:
         ready_ns = self.wheels.ready_until_ns(self._newest_ns)
         if self.has_inclinometer:
             ready_ns = min(ready_ns, self.attitude.ready_until_ns(self._newest_ns))
-        while self._waiting and (self._waiting[0][1] <= ready_ns or len(self._waiting) > _QUEUE_SCANS):
+        if self.odometry is None and not self._warm(ready_ns):
+            return
+        while self._waiting and (self._end_ns(0) <= ready_ns or len(self._waiting) > _QUEUE_SCANS):
             self._process(*self._waiting.popleft())
+
+    def _warm(self, ready_ns: int) -> bool:
+        """Return whether enough scans wait for the dry run that finds the starting speed."""
+        waiting = self._waiting
+        enough = len(waiting) >= _WARM_SCANS or (
+            len(waiting) >= _FEWEST_WARM_SCANS and waiting[-1][1] - waiting[0][1] >= _WARM_NS
+        )
+        return enough and self._end_ns(min(_WARM_SCANS, len(waiting)) - 1) <= ready_ns
+
+    def _end_ns(self, index: int) -> int:
+        """Return the time for which a waiting scan needs attitude and wheels: the middle of its sweep."""
+        scan, time_ns = self._waiting[index]
+        return time_ns + half_sweep_ns(scan)
+
+    def _begin(self, first: tuple[LaserScan, int]) -> PlanarOdometry:
+        """Start the odometry with the speed that a dry run over the first scans finds."""
+        waiting = [first, *list(self._waiting)[: _WARM_SCANS - 1]]
+        inputs, before_ns = [], self._time_ns
+        for scan, time_ns in waiting:
+            inputs.append(self._input(scan, before_ns, time_ns + half_sweep_ns(scan)))
+            before_ns = time_ns + half_sweep_ns(scan)
+        return self._odometry(starting_velocity(self._odometry, inputs))
+
+    def _odometry(self, velocity: FloatArray | None) -> PlanarOdometry:
+        s = self.settings
+        return PlanarOdometry(s.odometry, s.anchor, s.search, s.range_flow, velocity)
 
     def _rising(self, stamp_ns: int) -> int:
         """Return a stamp that never runs backwards once stamps of scans did: the order of the log then tells more."""
@@ -118,20 +148,26 @@ class MappingPipeline:
 
     def _process(self, scan: LaserScan, stamp_ns: int) -> None:
         """Run one scan of the front scanner through all stages; `stamp_ns` is its stamp made rising."""
-        time_ns, before_ns = max(stamp_ns, self._time_ns + 1), self._time_ns
+        if self.odometry is None:
+            self.odometry = self._begin((scan, stamp_ns))
+        time_ns = max(stamp_ns + half_sweep_ns(scan), self._time_ns + 1)
+        step = self.odometry.update(*self._input(scan, self._time_ns, time_ns))
         self._time_ns = time_ns
-        roll, pitch = self._attitude_at(time_ns)
-        T_level_sensor = level_sensor(self.mounts.of(scan.frame_id, "front"), roll, pitch)
-        view = View(self.track.height_m, self._boxes)
-        wheels = self._wheel_step(before_ns, time_ns)
-        step = self.odometry.update(scan, T_level_sensor, wheels, view)
-        self.records.add_scan(scan.stamp_ns, time_ns)
-        self.sweeps.hold("front", time_ns, scan)
+        self.records.add_scan(scan.stamp_ns, stamp_ns)
+        self.sweeps.hold("front", stamp_ns, scan)
         if step.processed:
-            self.track.append(time_ns, step.T_odom_base, roll, pitch)
+            self.track.append(time_ns, step.T_odom_base, *self._attitude_at(time_ns))
             self.smoother.keys.update(time_ns, step.T_odom_base, self.odometry.points, weak=step.degenerate)
             self._record(scan.stamp_ns, time_ns, step)
             self.sweeps.advance(self.track, self.wheels)
+
+    def _input(self, scan: LaserScan, before_ns: int, time_ns: int) -> ScanInput:
+        """Return a scan with all that is known of the machine at `time_ns`, the middle of its sweep."""
+        roll, pitch = self._attitude_at(time_ns)
+        T_level_sensor = level_sensor(self.mounts.of(scan.frame_id, "front"), roll, pitch)
+        return ScanInput(
+            scan, T_level_sensor, self._wheel_step(before_ns, time_ns), View(self.track.height_m, self._boxes)
+        )
 
     def _attitude_at(self, time_ns: int) -> tuple[float, float]:
         """Return roll and pitch; a log without inclinometer, or a gap of it, counts as level."""

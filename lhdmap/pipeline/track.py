@@ -13,6 +13,7 @@ from lhdmap.messages import FloatArray
 from lhdmap.trajectory import Trajectory
 
 Stamps = npt.NDArray[np.int64]
+_CARRY_ON_NS = 2e8
 
 
 class Rows(NamedTuple):
@@ -114,11 +115,17 @@ def resample_near(rows: Rows, time_ns: int) -> FloatArray:
 
 
 def resample(rows: Rows, times_ns: Stamps) -> Rows:
-    """Return poses at other times, shape (M,): linear between the rows, held before the first and after the last."""
+    """Return poses at other times, shape (M,): linear between the rows and for a moment beyond them (a sweep's half), then held."""
     # differences first: stamps of today's clocks have 19 digits, a float keeps 16
     x = (rows.times_ns - rows.times_ns[0]).astype(float)
     at = (times_ns - rows.times_ns[0]).astype(float)
-    return Rows(times_ns, np.column_stack([np.interp(at, x, column) for column in rows.poses.T]))
+    poses = np.column_stack([np.interp(at, x, column) for column in rows.poses.T])
+    if len(x) > 1:
+        for outside, (inner, edge) in ((at < x[0], (1, 0)), (at > x[-1], (-2, -1))):
+            slope = (rows.poses[edge] - rows.poses[inner]) / (x[edge] - x[inner])
+            beyond = np.clip(at[outside] - x[edge], -_CARRY_ON_NS, _CARRY_ON_NS)
+            poses[outside] = rows.poses[edge] + beyond[:, None] * slope
+    return Rows(times_ns, poses)
 
 
 def trajectory_of(rows: Rows, stamps_ns: Stamps) -> Trajectory:

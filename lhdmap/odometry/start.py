@@ -1,0 +1,59 @@
+"""The speed at the start: a dry run over the first scans, so that the first metre is not lost to finding it.
+
+Undoing a sweep needs the speed, and a map begun with the wrong one stays distorted; in smooth walls it takes dozens of scans to
+see the speed at all. The scans are run twice, the second time from what the first found; then the odometry begins for good.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from lhdmap.geometry import se2
+from lhdmap.messages import FloatArray, LaserScan
+from lhdmap.odometry.planar import PlanarOdometry, View
+from lhdmap.odometry.steps import OdometryStep, WheelStep
+
+_SPAN_SCANS = 6  # the starting speed is the mean over so many scans
+_LONGEST_SPAN_S = 1.0
+
+
+class ScanInput(NamedTuple):
+    """What `PlanarOdometry.update` takes for one scan."""
+
+    scan: LaserScan
+    T_level_sensor: FloatArray
+    wheels: WheelStep | None = None
+    view: View = View()
+
+
+def starting_velocity(
+    make: Callable[[FloatArray | None], PlanarOdometry], inputs: Sequence[ScanInput]
+) -> FloatArray | None:
+    """Return forward, lateral and turning speed (3,) at the first scan, or None where the scans do not show it.
+
+    `make` builds an odometry with a starting velocity (None: unknown).
+    """
+    if len(inputs) < 3:
+        return None
+    velocity: FloatArray | None = None
+    for _ in range(2):
+        odometry = make(velocity)
+        steps = [odometry.update(*one) for one in inputs]
+        if any(step.lost for step in steps):
+            return velocity
+        velocity = steps[-1].velocity if velocity is None else _mean_velocity(steps)
+    return velocity
+
+
+def _mean_velocity(steps: Sequence[OdometryStep]) -> FloatArray | None:
+    processed = [step for step in steps if step.processed][:_SPAN_SCANS]
+    dt_s = (processed[-1].time_ns - processed[0].time_ns) * 1e-9 if len(processed) > 1 else 0.0
+    if not 0.0 < dt_s < _LONGEST_SPAN_S:
+        return processed[-1].velocity if processed else None
+    step = se2.between(processed[0].T_odom_base, processed[-1].T_odom_base)
+    middle = 0.5 * step[2]
+    c, s = np.cos(middle), np.sin(middle)
+    return np.array([c * step[0] + s * step[1], -s * step[0] + c * step[1], step[2]]) / dt_s
