@@ -15,7 +15,7 @@ class CloudOdometrySettings:
         "vgicp",
         doc="'vgicp': clouds against a map of planes; 'kiss_icp': the point-to-point baseline, which slips in tunnels.",
         choices=("vgicp", "kiss_icp"),
-        source="compared in simulated drifts: 0.05 % of the way, and 1-90 %",
+        source="compared in simulated drifts: end error 0.04-0.24 % of the way against 0.6-100 %",
     )
     voxel_m: float = setting(
         0.5,
@@ -101,7 +101,7 @@ class CloudOdometrySettings:
         unit="m",
         doc="A cloud that fixes a direction worse than this (discounted) is flagged degenerate.",
         minimum=0.0,
-        source="straight drifts, 32 rings, reach 12 m: rough walls 0.009 m, moderate 0.04, smooth 0.1",
+        source="straight drifts, 32 rings, reach 12 m: rough 0.009 m, moderate 0.04, smooth 0.1",
     )
     weak_sigma_deg: float = setting(0.2, unit="deg", doc="The same for the heading.", minimum=0.0)
     min_support: float = setting(
