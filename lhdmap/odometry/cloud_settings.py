@@ -94,7 +94,7 @@ class CloudOdometrySettings:
         unit="m",
         doc="Information along the machine worse than this is discounted: noise of the walls' normals fakes it.",
         minimum=0.0001,
-        source="measured in smooth drifts with wheels: smooth drift with wheels: pull of 0.4 % of the way, 1 % at 0.01 m, 2 % at 0",
+        source="measured, smooth drift with wheels: pulls by 0.4 % of the way, 1 % at 0.01 m, 2 % at 0",
     )
     weak_sigma_m: float = setting(
         0.06,
