@@ -6,6 +6,7 @@ import math
 from typing import NamedTuple
 
 import numpy as np
+import numpy.typing as npt
 
 from lhdmap.machine import Machine, SensorMount
 from lhdmap.messages import Float32Array, FloatArray
@@ -13,6 +14,11 @@ from lhdmap.simulation.ray_kernel import fill_rays
 from lhdmap.simulation.sections import ScannerSettings
 
 _PERSON_M = 1.2  # how near a person stands
+_EDGE_M, _EDGE_OVER_NEIGHBOURS = (
+    0.3,
+    3.0,
+)  # a depth edge is a step this large, and this much larger than those beside it
+_NO_RETURN_M = 1e6
 
 
 class Beams(NamedTuple):
@@ -107,8 +113,23 @@ def measured(
 
 
 def _mixed(ranges: FloatArray, share: float, rng: np.random.Generator) -> FloatArray:
-    """Return ranges (S, N) in which a share of the beams beside a depth edge lies between its two surfaces."""
+    """Return ranges (S, N) in which a share of the depth edges have a beam, on a random side, between their two surfaces."""
     seen = np.where(np.isfinite(ranges), ranges, 1e9)
-    step = np.diff(seen, axis=1, append=seen[:, -1:])
-    edge = (np.abs(step) > 0.3) & (np.abs(step) < 1e6) & (rng.random(ranges.shape) < share)
-    return np.where(edge, ranges + rng.random(ranges.shape) * np.where(edge, step, 0.0), ranges)
+    step = np.diff(seen, axis=1)
+    mixed = _edges(np.abs(step)) & (rng.random(step.shape) < share)
+    first = rng.random(step.shape) < 0.5
+    between = seen[:, :-1] + rng.random(step.shape) * step
+    out = ranges.copy()
+    out[:, :-1] = np.where(mixed & first, between, out[:, :-1])
+    out[:, 1:] = np.where(mixed & ~first, between, out[:, 1:])
+    return out
+
+
+def _edges(step_m: FloatArray) -> npt.NDArray[np.bool_]:
+    """Return which steps between beams, sizes (S, N - 1), are depth edges; on a grazed wall the steps beside are large, too."""
+    padded = np.pad(step_m, ((0, 0), (1, 1)))
+    beside = np.maximum(padded[:, :-2], padded[:, 2:])
+    edges: npt.NDArray[np.bool_] = (
+        (step_m > _EDGE_M) & (step_m > _EDGE_OVER_NEIGHBOURS * beside) & (step_m < _NO_RETURN_M)
+    )
+    return edges

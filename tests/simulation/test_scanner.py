@@ -118,13 +118,23 @@ def test_mixed_pixels_lie_between_the_two_surfaces() -> None:
         exact, ScannerSettings(noise_m=0.0, mixed_pixel_share=0.4), np.zeros(500), np.random.default_rng(0)
     )
     changed = ranges != exact
-    assert changed[:, 49].mean() == pytest.approx(0.4, abs=0.07)
+    sides = changed[:, 49:51].mean(axis=0)
+    assert sides.sum() == pytest.approx(0.4, abs=0.07)
+    assert sides == pytest.approx([0.2, 0.2], abs=0.06)
     assert not changed[:, :49].any()
-    assert not changed[:, 50:].any()
+    assert not changed[:, 51:].any()
     between = ranges[changed]
     assert between.min() > 3.0
     assert between.max() < 8.0
     assert between.mean() == pytest.approx(5.5, abs=0.4)
+
+
+def test_a_wall_seen_at_a_grazing_angle_has_no_mixed_pixels() -> None:
+    """Its beams are metres apart in range, yet no edge: they hit one surface."""
+    exact = np.repeat(2.0 / np.sin(np.radians(np.arange(2.0, 90.0, 0.5)))[None], 50, axis=0).astype(np.float32)
+    assert np.abs(np.diff(exact[0])).max() > 3.0
+    settings = ScannerSettings(noise_m=0.0, mixed_pixel_share=1.0)
+    assert (measured(exact, settings, np.zeros(50), np.random.default_rng(0)) == exact).all()
 
 
 def test_a_person_hides_beams_and_a_blackout_all() -> None:

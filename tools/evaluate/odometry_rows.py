@@ -32,7 +32,7 @@ def drive_run(drive: Drive, method: str = "anchored", *, wheels: bool = False, r
     """Run the odometry over one drive."""
     truth, scans = scans_of(drive)
     steps = wheels_of(truth, drive.rate_hz, drive.seed) if wheels else None
-    return run(scans, truth, odometry(method, range_noise_m=range_noise_m), steps)
+    return run(scans, truth, lambda velocity: odometry(method, velocity, range_noise_m=range_noise_m), steps)
 
 
 def ten_metres(run_: Run) -> SegmentErrors:

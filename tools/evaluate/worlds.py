@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import functools
-from collections.abc import Sequence
+import time
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -13,13 +14,16 @@ from lhdmap.geometry import se2
 from lhdmap.messages import FloatArray, LaserScan
 from lhdmap.odometry.planar import PlanarOdometry
 from lhdmap.odometry.settings import AnchorSettings, OdometrySettings, RangeFlowSettings, SearchSettings
+from lhdmap.odometry.start import ScanInput, starting_velocity
 from lhdmap.odometry.steps import OdometryStep, WheelStep
+from lhdmap.pipeline.track import Rows, resample
 from lhdmap.simulation.planar import PlanarScanner, PlanarWorld, drift_world, drive_along, simulate_scans
 
 BoolArray = npt.NDArray[np.bool_]
 LEVEL = np.eye(4)
 ROUGH_M, MODERATE_M, SMOOTH_M = 0.12, 0.03, 0.005
 SEEDS = (101, 102, 103)  # worlds that no setting was chosen on
+WARM_SCANS = 25  # of the dry run at the start, as the pipeline takes
 _STEP_START_M = 0.5
 
 
@@ -129,22 +133,28 @@ def wheels_of(truth: FloatArray, rate_hz: float, seed: int) -> list[WheelStep]:
     return steps
 
 
-def odometry(method: str = "anchored", **values: float) -> PlanarOdometry:
+def odometry(method: str = "anchored", velocity: FloatArray | None = None, **values: float) -> PlanarOdometry:
     """Return a planar odometry with the default settings but for `values` of its first section."""
     settings = OdometrySettings(method=method, **values)  # type: ignore[arg-type]
-    return PlanarOdometry(settings, AnchorSettings(), SearchSettings(), RangeFlowSettings())
+    return PlanarOdometry(settings, AnchorSettings(), SearchSettings(), RangeFlowSettings(), velocity)
 
 
 def run(
-    scans: Sequence[LaserScan], truth: FloatArray, stage: PlanarOdometry, wheels: list[WheelStep] | None = None
+    scans: Sequence[LaserScan],
+    truth: FloatArray,
+    make: Callable[[FloatArray | None], PlanarOdometry],
+    wheels: list[WheelStep] | None = None,
 ) -> Run:
-    """Send all scans through the odometry; skipped scans lie between the processed ones."""
-    import time
+    """Send all scans through the odometry as the pipeline does: a dry run first tells the speed at the start.
 
+    `make` builds the odometry with a starting velocity. Skipped scans lie between the processed ones.
+    """
+    inputs = [ScanInput(scan, LEVEL, wheels[k] if wheels else None) for k, scan in enumerate(scans)]
+    stage = make(starting_velocity(make, inputs[:WARM_SCANS]))
     steps, cpu = [], []
-    for k, scan in enumerate(scans):
+    for one in inputs:
         started = time.thread_time()
-        step = stage.update(scan, LEVEL, wheels[k] if wheels else None)
+        step = stage.update(*one)
         if step.processed:
             cpu.append(time.thread_time() - started)
         steps.append(step)
@@ -152,13 +162,14 @@ def run(
 
 
 def interpolated(steps: list[OdometryStep]) -> FloatArray:
-    """Return a pose for every scan (N, 3), heading unwrapped."""
+    """Return a pose (N, 3) at every scan's stamp, heading unwrapped; the odometry's are those of the sweeps' middles."""
     used = [step for step in steps if step.processed]
-    at = np.array([step.stamp_ns - steps[0].stamp_ns for step in steps], dtype=float)
-    known = np.array([step.stamp_ns - steps[0].stamp_ns for step in used], dtype=float)
-    poses = np.array([step.T_odom_base for step in used])
-    poses[:, 2] = np.unwrap(poses[:, 2])
-    return np.column_stack([np.interp(at, known, column) for column in poses.T])
+    planar = np.array([step.T_odom_base for step in used])
+    rows = np.zeros((len(used), 6))
+    rows[:, [0, 1]], rows[:, 5] = planar[:, :2], np.unwrap(planar[:, 2])
+    known = np.array([step.time_ns for step in used], dtype=np.int64)
+    at = np.array([step.stamp_ns for step in steps], dtype=np.int64)
+    return resample(Rows(known, rows), at).poses[:, [0, 1, 5]]
 
 
 def aligned(estimate: FloatArray, truth: FloatArray) -> FloatArray:
