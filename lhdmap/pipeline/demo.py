@@ -56,7 +56,7 @@ def run_demo(target: Path, settings: Settings | None = None, watcher: Watcher | 
     say(f"1/3 simulate: {scenario.drive.distance_m:g} m of drift at {scenario.drive.speed_kmh:g} km/h, 2 scanners")
     drive = simulate_drift(scenario, folder / "drive.mcap", progress=watcher.simulate)
     say("2/3 build-map: from the log alone, its ground truth is not read")
-    request = BuildRequest([drive.log], folder / "map", settings or Settings(), progress=watcher.build)
+    request = BuildRequest([drive.log], folder / "drive_map", settings or Settings(), progress=watcher.build)
     built = build_map(request)
     say("3/3 eval: the map's trajectory against the truth of the simulation")
     evaluation = evaluate_trajectory(built.trajectory, drive.truth)

@@ -30,7 +30,7 @@ def test_all_files_are_where_it_says(demo: tuple[Path, Any]) -> None:
     assert told["folder"] == str(folder)
     for name in ("log", "truth", "report", "recording"):
         assert Path(told[name]).stat().st_size > 1000
-    assert MapFolder.open(folder / "map").changed_files() == []
+    assert MapFolder.open(folder / "drive_map").changed_files() == []
     assert (folder / "evaluation.png").stat().st_size > 1000
 
 
@@ -44,7 +44,7 @@ def test_the_map_is_close_to_the_truth(demo: tuple[Path, Any]) -> None:
 
 def test_a_pose_for_every_front_scan(demo: tuple[Path, Any]) -> None:
     folder, told = demo
-    assert len(read_tum(folder / "map" / "trajectory.tum").stamps_ns) == told["map"]["scans"]
+    assert len(read_tum(folder / "drive_map" / "trajectory.tum").stamps_ns) == told["map"]["scans"]
 
 
 def test_a_taken_name_is_left_alone(tmp_path: Path) -> None:
