@@ -42,9 +42,7 @@ class WheelSettings:
         15.0, unit="deg", minimum=0.0, doc="The same where the log has no articulation."
     )
     pose_distance_std: float = setting(0.07, unit="m/m", minimum=0.0, doc="Dead reckoning: error of each metre driven.")
-    pose_turn_std: float = setting(
-        0.3, unit="rad/rad", minimum=0.0, doc="Dead reckoning: error of each radian turned."
-    )
+    pose_turn_std: float = setting(0.3, unit="rad/rad", minimum=0.0, doc="Dead reckoning: error of each radian turned.")
     pose_drift_deg: float = setting(
         6.0, unit="deg/m", minimum=0.0, doc="Dead reckoning: heading error for each metre driven."
     )
