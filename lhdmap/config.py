@@ -11,13 +11,14 @@ from typing import Any
 
 from lhdmap.errors import ConfigError
 from lhdmap.integration.integrator import IntegrationSettings
+from lhdmap.odometry.cloud_settings import CloudOdometrySettings
 from lhdmap.odometry.settings import AnchorSettings, OdometrySettings, RangeFlowSettings, SearchSettings
 from lhdmap.proprioception.attitude import AttitudeSettings
 from lhdmap.proprioception.slip import SlipSettings
 from lhdmap.proprioception.wheels import WheelSettings
 from lhdmap.report.recording import RecordingSettings
-from lhdmap.smoothing.settings import SmoothingSettings
 from lhdmap.settings import load_section, nearest, section_toml
+from lhdmap.smoothing.settings import SmoothingSettings
 
 _HEADER = """\
 # Settings of the lhdmap pipeline: the defaults. Copy this file, change what you need and pass it with --config; keys that
@@ -33,6 +34,7 @@ class Settings:
     anchor: AnchorSettings = field(default_factory=AnchorSettings)
     search: SearchSettings = field(default_factory=SearchSettings)
     range_flow: RangeFlowSettings = field(default_factory=RangeFlowSettings)
+    cloud_odometry: CloudOdometrySettings = field(default_factory=CloudOdometrySettings)
     attitude: AttitudeSettings = field(default_factory=AttitudeSettings)
     wheels: WheelSettings = field(default_factory=WheelSettings)
     slip: SlipSettings = field(default_factory=SlipSettings)

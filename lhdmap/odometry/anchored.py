@@ -56,7 +56,7 @@ class AnchoredMatcher:
 
     def step(self, points: FloatArray, T_base_scanner: FloatArray) -> Matched:
         """Match points (N, 3), level base frame with absolute heights, at the predicted pose; correct the motion, grow the map."""
-        self._layered = self._layered or np.ptp(points[:, 2]) > _FLAT_M if len(points) else self._layered
+        self._layered |= len(points) > 0 and bool(np.ptp(points[:, 2]) > _FLAT_M)
         if len(points) < _FEWEST_HITS:
             return Matched(np.zeros((3, 3)), math.nan, 0.0, lost=True)
         if self._inserted is None:
@@ -161,8 +161,7 @@ class AnchoredMatcher:
 
     def _grow(self, points: FloatArray) -> None:
         """Insert the scan where the machine has moved on since the last one that was; the first scans always."""
-        assert self._inserted is not None
-        step = self._motion.pose - self._inserted
+        step = self._motion.pose - (self._inserted if self._inserted is not None else np.zeros(3))
         still = np.hypot(*step[:2]) < self._anchor.insert_m and abs(se2.wrap(step[2])) < math.radians(
             self._anchor.insert_deg
         )

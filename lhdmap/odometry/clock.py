@@ -18,7 +18,8 @@ class ScanClock:
     """
 
     def __init__(self) -> None:
-        self._last_s: float | None = None
+        self._first_ns: int | None = None
+        self._last_s = 0.0  # after the first stamp: a float keeps nanoseconds of minutes, not of years
         self._smooth_s = 0.0
         self._period_s = 0.0
         self._bunched = 0.0
@@ -31,16 +32,16 @@ class ScanClock:
 
     def step(self, stamp_ns: int) -> float:
         """Return the time (s) since the scan before; 0 for the first."""
-        now_s = stamp_ns * 1e-9
-        if self._last_s is None:
-            self._last_s = self._smooth_s = now_s
+        if self._first_ns is None:
+            self._first_ns = stamp_ns
             return 0.0
+        now_s = (stamp_ns - self._first_ns) * 1e-9
         dt_s = now_s - self._last_s
         self._last_s = now_s
         self._learn(dt_s)
         if not self.bunched:
             self._smooth_s = now_s
-            return max(dt_s, 0.0) if dt_s > 0.0 else self._period_s
+            return dt_s if dt_s > 0.0 else max(self._period_s, 0.0)
         return self._steady(now_s)
 
     def _learn(self, dt_s: float) -> None:
@@ -57,5 +58,6 @@ class ScanClock:
             step_s = max(now_s - self._smooth_s, self._period_s)
         else:
             step_s = min(max(self._period_s + _PULL * ahead_s, 0.5 * self._period_s), 3.0 * self._period_s)
+        step_s = max(step_s, 0.0)
         self._smooth_s += step_s
         return step_s

@@ -37,7 +37,8 @@ class Match(NamedTuple):
 def lines_at(map_, pose, points, layered, min_cells, lines):  # type: ignore[no-untyped-def]
     """Fit the wall's line at each scan point; return how many have one.
 
-    `points` (N, 3) in the level base frame, heights absolute; `lines` (N, 7): as `fit_line`, then the cell size of the level that served (0: none).
+    `points` (N, 3) in the level base frame, heights absolute; `lines` (N, 7): as `fit_line`, then the cell size of the
+    level that served (0: none).
     """
     c, s = math.cos(pose[2]), math.sin(pose[2])
     found = 0
@@ -124,9 +125,10 @@ def solve3(A: FloatArray, b: FloatArray) -> FloatArray:
 
 @nb.njit(cache=True, nogil=True)
 def match(map_, points, layered, predicted, prior_information, start, model):  # type: ignore[no-untyped-def]
-    """Return the `Match` of `points` (N, 3), level base frame with absolute heights: maximum a posteriori from `start` under the prior.
+    """Return the `Match` of `points` (N, 3), level base frame with absolute heights: maximum a posteriori from `start`.
 
-    `layered`: the scanner tilts, heights matter. The prior has mean `predicted` (3,) and weight `prior_information` (3, 3); lines are fitted anew when the pose has moved.
+    `layered`: the scanner tilts, heights matter. The prior has mean `predicted` (3,) and weight `prior_information`
+    (3, 3); lines are fitted anew when the pose has moved.
     """
     pose = start.copy()
     lines = np.zeros((points.shape[0], 7))

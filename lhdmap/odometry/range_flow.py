@@ -29,8 +29,11 @@ _FEWEST_BEAMS = 12.0
 
 
 class Flow(NamedTuple):
-    """Motion between two scans: `T_reference_current` (3,), `information` (3, 3) of the twist about the reference, residual in
-    sigmas (rms) and the share of beams that agree. Gradients that are only noise do not count as information."""
+    """Motion between two scans and how sure it is.
+
+    `T_reference_current` (3,); `information` (3, 3) of the twist about the reference (gradients that are only noise do not
+    count); residual in sigmas (rms); share of beams that agree.
+    """
 
     T_reference_current: FloatArray
     information: FloatArray

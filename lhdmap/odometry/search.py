@@ -11,7 +11,7 @@ import math
 import numba as nb
 import numpy as np
 
-from lhdmap.messages import FloatArray, Float32Array
+from lhdmap.messages import Float32Array, FloatArray
 
 FIELD_HALF_M = 25.0
 _SPREAD_CELLS = 2

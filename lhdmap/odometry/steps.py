@@ -26,8 +26,11 @@ class WheelStep(NamedTuple):
 
 
 class Matched(NamedTuple):
-    """What a matcher says of one scan: `information` (3, 3) of the scan alone in `odom` axes, residual, share of hits that
-    agree, and whether the scan could not be placed (the pose is then the prediction)."""
+    """What a matcher says of one scan.
+
+    `information` (3, 3) of the scan alone in `odom` axes, residual, share of hits that agree, and whether the scan could not
+    be placed (the pose is then the prediction).
+    """
 
     information: FloatArray
     residual_m: float

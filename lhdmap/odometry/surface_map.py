@@ -15,7 +15,7 @@ import numba as nb
 import numpy as np
 import numpy.typing as npt
 
-from lhdmap.messages import FloatArray, Float32Array
+from lhdmap.messages import Float32Array, FloatArray
 
 KERNEL_CELLS = 3  # a line is fitted to the cells within this many cells of a point
 KERNEL_SIGMA_CELLS = 2.0
@@ -26,8 +26,11 @@ _HEIGHT_FLOOR_M2 = 0.02**2  # spread in height below which no slope is fitted to
 
 
 class Level(NamedTuple):
-    """One grid: `tags` (n, n, LAYERS) int32 (0: empty), `hits` (n, n, LAYERS, 4) float32 as count and mean offset x, y, z from
-    the cell's corner, metres."""
+    """One grid of cells.
+
+    `tags` (n, n, LAYERS) int32 (0: empty); `hits` (n, n, LAYERS, 4) float32: count and mean offset x, y, z from the cell's
+    corner, metres.
+    """
 
     cell_m: float
     tags: npt.NDArray[np.int32]
@@ -91,7 +94,9 @@ def insert_all(map_: SurfaceMap, points_m: FloatArray, count_limit: float) -> No
 
 
 @nb.njit(cache=True, nogil=True)
-def fit_line(level: Level, x: float, y: float, z: float, layered: bool, min_cells: float, line: FloatArray) -> bool:
+def fit_line(  # noqa: C901  # one pass over the cells, unrolled for speed
+    level: Level, x: float, y: float, z: float, layered: bool, min_cells: float, line: FloatArray
+) -> bool:
     """Fit the wall near (x, y) at height z by a line with Gaussian weights; return whether the cells there support one.
 
     `layered`: look at the layers above and below, too (a planar scan has one). `line`, shape (6,), receives: centre x, y at

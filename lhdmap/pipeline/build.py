@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
@@ -20,7 +20,7 @@ from lhdmap.integration.cloud_io import write_cloud
 from lhdmap.logs.source import LogSource
 from lhdmap.machine import Machine
 from lhdmap.mapfolder import MapFolderWriter, MapInfo
-from lhdmap.messages import Joints, LaserScan, Message
+from lhdmap.messages import Joints, LaserScan, Message, PointCloud
 from lhdmap.pipeline.mapping import MappingPipeline
 from lhdmap.pipeline.sweeps import SweepIntegration
 from lhdmap.pipeline.track import FinalTrack, Rows, resample, trajectory_of
@@ -32,7 +32,7 @@ from lhdmap.report.recording import RecordingWriter, record_run
 from lhdmap.smoothing.smoother import corrected
 from lhdmap.trajectory import Trajectory
 
-ROLES_READ = ("front", "rear", "inclinometer", "joints", "tachometer", "wheel_odometry", "tf_static")
+ROLES_READ = ("front", "rear", "points", "inclinometer", "joints", "tachometer", "wheel_odometry", "tf_static")
 Progress = Callable[[Iterable[tuple[str, Message]], float], Iterable[tuple[str, Message]]]
 
 
@@ -71,7 +71,8 @@ def build_map(request: BuildRequest) -> BuildResult:
             pool,
             RecordingWriter(folder.path / "recording.rrd", request.target.name, source.start_ns or 0) as recording,
         ):
-            pipeline = MappingPipeline(request.settings, _machine(request, source), _sweep_sink(recording))
+            primary: Literal["front", "points"] = "front" if "front" in source.roles else "points"
+            pipeline = MappingPipeline(request.settings, _machine(request, source), _sweep_sink(recording), primary)
             _run(pipeline, source, request.progress)
             outcome = _Outcome(request, source, pipeline, started)
             _write(folder, outcome, recording)
@@ -153,10 +154,12 @@ def integrate_again(request: BuildRequest, pipeline: MappingPipeline, rows: Rows
     wheels = WheelOdometry(request.settings.wheels, pipeline.machine or Machine())
     track, times = FinalTrack(rows), iter(pipeline.records.times_ns)
     with LogSource(list(request.logs), request.topics) as source:
-        for role, message in source.messages([role for role in ("front", "rear", "joints") if role in source.roles]):
+        for role, message in source.messages(
+            [role for role in ("front", "rear", "points", "joints") if role in source.roles]
+        ):
             if isinstance(message, Joints):
                 wheels.update(message)
-            elif isinstance(message, LaserScan):
+            elif isinstance(message, (LaserScan, PointCloud)):
                 time_ns = next(times, message.stamp_ns) if role == "front" else message.stamp_ns
                 sweeps.add_final(role, time_ns, message, track, wheels)
     sweeps.wait()
@@ -177,7 +180,7 @@ def _machine(request: BuildRequest, source: LogSource) -> Machine | None:
     """Return the machine given, else the default loader where the log is one's (it has the joints of an LHD), else none."""
     if request.machine is not None:
         return request.machine
-    if "joints" in source.roles or "rear" in source.roles and "tf_static" in source.roles:
+    if "joints" in source.roles or ("rear" in source.roles and "tf_static" in source.roles):
         return Machine()
     return None
 
@@ -215,7 +218,7 @@ def _remarks(pipeline: MappingPipeline) -> list[str]:
     share = pipeline.records.degenerate_share
     if share > 0.2:
         remarks.append(f"odometry: in {100 * share:.0f} % of the scans a direction is weakly observed (smooth walls?)")
-    if not pipeline.has_inclinometer:
+    if not pipeline.has_inclinometer and pipeline.clouds is None:
         remarks.append("no inclinometer in the log: the drive is treated as planar, heights are not observed")
     if pipeline.sweeps.integrator.totals.refused_sweeps:
         remarks.append(

@@ -8,8 +8,10 @@ from __future__ import annotations
 
 import math
 from collections import deque
+from typing import Literal
 
 from lhdmap.config import Settings
+from lhdmap.geometry import se3
 from lhdmap.machine import Machine
 from lhdmap.messages import (
     FloatArray,
@@ -18,9 +20,12 @@ from lhdmap.messages import (
     LaserScan,
     Message,
     Mount,
+    PointCloud,
     Tachometer,
     WheelPose,
 )
+from lhdmap.odometry.cloud_motion import CloudPrior
+from lhdmap.odometry.cloud_odometry import CloudOdometry, CloudStep
 from lhdmap.odometry.planar import PlanarOdometry, View
 from lhdmap.odometry.scan_points import NO_BOXES, half_sweep_ns
 from lhdmap.odometry.start import ScanInput, starting_velocity
@@ -40,9 +45,18 @@ _QUEUE_SCANS = 2000  # a sensor that stops must not hold back scans without boun
 
 
 class MappingPipeline:
-    """Takes messages by role in time order; `finish` ends the stream. Trajectory and cloud are there at any time."""
+    """Takes messages by role in time order; `finish` ends the stream. Trajectory and cloud are there at any time.
 
-    def __init__(self, settings: Settings, machine: Machine | None = None, on_sweep: ScanSink | None = None) -> None:
+    `primary`: the sensor that the odometry runs on, the front scanner or a 3D scanner.
+    """
+
+    def __init__(
+        self,
+        settings: Settings,
+        machine: Machine | None = None,
+        on_sweep: ScanSink | None = None,
+        primary: Literal["front", "points"] = "front",
+    ) -> None:
         self.settings = settings
         self.machine = machine
         self.mounts = Mounts(machine)
@@ -51,6 +65,8 @@ class MappingPipeline:
         self.slip = SlipEstimator(settings.slip, settings.wheels.scale_std)
         self.odometry: PlanarOdometry | None = None  # begins once the first scans have told the speed
         self.sweeps = SweepIntegration(settings, machine, self.mounts, on_sweep)
+        self.clouds = CloudOdometry(settings.cloud_odometry) if primary == "points" else None
+        self._primary = primary
         self.track = Track(settings.odometry.height_lever_m)
         self.records = ScanRecords()
         self.smoother = Smoother(settings.smoothing)
@@ -58,18 +74,18 @@ class MappingPipeline:
         self._newest_ns = self._time_ns = -(2**62)
         self._clock_ns = -(2**62)
         self._disordered = False
-        self._waiting: deque[tuple[LaserScan, int]] = deque()
+        self._waiting: deque[tuple[LaserScan | PointCloud, int]] = deque()
         self._boxes = own_boxes(machine, settings.integration.body_margin_m)
 
     def update(self, role: str, message: Message) -> None:
         """Take one message of the log."""
         match message:
-            case LaserScan() if role == "front":
+            case LaserScan() | PointCloud() if role == self._primary:
                 self._disordered |= message.stamp_ns < self._newest_ns
                 self._newest_ns = max(self._newest_ns, message.stamp_ns)
                 self._waiting.append((message, self._rising(message.stamp_ns)))
                 self._process_ready()
-            case LaserScan():
+            case LaserScan() | PointCloud():
                 self.sweeps.hold(role, message.stamp_ns, message)
             case Inclination():
                 self._take_inclination(message)
@@ -108,7 +124,7 @@ class MappingPipeline:
         ready_ns = self.wheels.ready_until_ns(self._newest_ns)
         if self.has_inclinometer:
             ready_ns = min(ready_ns, self.attitude.ready_until_ns(self._newest_ns))
-        if self.odometry is None and not self._warm(ready_ns):
+        if self.clouds is None and self.odometry is None and not self._warm(ready_ns):
             return
         while self._waiting and (self._end_ns(0) <= ready_ns or len(self._waiting) > _QUEUE_SCANS):
             self._process(*self._waiting.popleft())
@@ -124,13 +140,13 @@ class MappingPipeline:
     def _end_ns(self, index: int) -> int:
         """Return the time for which a waiting scan needs attitude and wheels: the middle of its sweep."""
         scan, time_ns = self._waiting[index]
-        return time_ns + half_sweep_ns(scan)
+        return time_ns + (half_sweep_ns(scan) if isinstance(scan, LaserScan) else 0)
 
-    def _begin(self, first: tuple[LaserScan, int]) -> PlanarOdometry:
+    def _begin(self, first: tuple[LaserScan | PointCloud, int]) -> PlanarOdometry:
         """Start the odometry with the speed that a dry run over the first scans finds."""
         waiting = [first, *list(self._waiting)[: _WARM_SCANS - 1]]
         inputs, before_ns = [], self._time_ns
-        for scan, time_ns in waiting:
+        for scan, time_ns in ((scan, time_ns) for scan, time_ns in waiting if isinstance(scan, LaserScan)):
             inputs.append(self._input(scan, before_ns, time_ns + half_sweep_ns(scan)))
             before_ns = time_ns + half_sweep_ns(scan)
         return self._odometry(starting_velocity(self._odometry, inputs))
@@ -146,8 +162,12 @@ class MappingPipeline:
         self._clock_ns = max(self._clock_ns, stamp_ns)
         return stamp_ns
 
-    def _process(self, scan: LaserScan, stamp_ns: int) -> None:
-        """Run one scan of the front scanner through all stages; `stamp_ns` is its stamp made rising."""
+    def _process(self, scan: LaserScan | PointCloud, stamp_ns: int) -> None:
+        """Run one scan of the primary scanner through all stages; `stamp_ns` is its stamp made rising."""
+        if isinstance(scan, PointCloud):
+            if self.clouds is not None:
+                self._process_cloud(self.clouds, scan, stamp_ns)
+            return
         if self.odometry is None:
             self.odometry = self._begin((scan, stamp_ns))
         time_ns = max(stamp_ns + half_sweep_ns(scan), self._time_ns + 1)
@@ -159,6 +179,25 @@ class MappingPipeline:
             self.track.append(time_ns, step.T_odom_base, *self._attitude_at(time_ns))
             self.smoother.keys.update(time_ns, step.T_odom_base, self.odometry.points, weak=step.degenerate)
             self._record(scan.stamp_ns, time_ns, step)
+            self.sweeps.advance(self.track, self.wheels)
+
+    def _process_cloud(self, odometry: CloudOdometry, cloud: PointCloud, stamp_ns: int) -> None:
+        """Run one cloud of a 3D scanner through all stages."""
+        time_ns = max(stamp_ns, self._time_ns + 1)
+        motion = self.wheels.motion_between(self._time_ns, time_ns) if self._time_ns > 0 else None
+        prior = None
+        if motion is not None:
+            x, y, turn = (float(value) for value in motion.delta)
+            prior = CloudPrior(se3.from_rpy(0.0, 0.0, turn, (x, y, 0.0)), motion.covariance)
+        T_level_base = se3.from_rpy(*self._attitude_at(time_ns), 0.0) if self.has_inclinometer else None
+        T_base_sensor = self.mounts.of(cloud.frame_id, "points").T_parent_child
+        step = odometry.update(cloud._replace(stamp_ns=time_ns), T_base_sensor, prior, T_level_base, self._boxes)
+        self._time_ns = time_ns
+        self.records.add_scan(cloud.stamp_ns, time_ns)
+        self.sweeps.hold("points", time_ns, cloud)
+        if step.processed:
+            self.track.append_space(time_ns, step.T_odom_base)
+            self._record(cloud.stamp_ns, time_ns, step)
             self.sweeps.advance(self.track, self.wheels)
 
     def _input(self, scan: LaserScan, before_ns: int, time_ns: int) -> ScanInput:
@@ -183,7 +222,7 @@ class MappingPipeline:
         turn = None if motion.source == "tachometer" else float(motion.delta[2])
         return WheelStep(float(motion.delta[0]), forward_sigma, turn, turn_sigma)
 
-    def _record(self, stamp_ns: int, time_ns: int, step: OdometryStep) -> None:
+    def _record(self, stamp_ns: int, time_ns: int, step: OdometryStep | CloudStep) -> None:
         wheel_mps = self.wheels.speed_at(time_ns)
         speed_mps = float(step.velocity[0])
         slip = math.nan

@@ -115,7 +115,10 @@ def resample_near(rows: Rows, time_ns: int) -> FloatArray:
 
 
 def resample(rows: Rows, times_ns: Stamps) -> Rows:
-    """Return poses at other times, shape (M,): linear between the rows and for a moment beyond them (a sweep's half), then held."""
+    """Return poses at other times, shape (M,): linear between the rows.
+
+    For a moment beyond them (half a sweep) the motion goes on, then the pose is held.
+    """
     # differences first: stamps of today's clocks have 19 digits, a float keeps 16
     x = (rows.times_ns - rows.times_ns[0]).astype(float)
     at = (times_ns - rows.times_ns[0]).astype(float)

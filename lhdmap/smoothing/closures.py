@@ -71,7 +71,8 @@ def _close(
     sigma = 1.0 / np.sqrt(np.maximum(marginal_information(result.information), 1e-12))
     if sigma[:2].max() > settings.max_sigma_m:
         return None
-    covariance = np.linalg.inv(result.information) + np.diag([0.01**2, 0.01**2, math.radians(0.05) ** 2])
+    covariance: FloatArray = np.linalg.inv(result.information).astype(np.float64)
+    covariance += np.diag([0.01**2, 0.01**2, math.radians(0.05) ** 2])
     return Closure(candidate, current, result.pose, covariance)
 
 

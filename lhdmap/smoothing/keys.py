@@ -13,8 +13,10 @@ from lhdmap.smoothing.settings import SmoothingSettings
 
 
 class KeyScan(NamedTuple):
-    """A scan kept: time, pose (3,) by odometry, distance travelled, hits (N, 3) in the level base frame with heights over the
-    floor, and whether the odometry since the key before was weak."""
+    """A scan kept: time, pose (3,) by odometry, distance travelled, hits (N, 3), and whether the odometry was weak before it.
+
+    The hits are in the level base frame; `weak` tells of the way since the key before.
+    """
 
     time_ns: int
     pose: FloatArray
