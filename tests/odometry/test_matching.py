@@ -1,0 +1,80 @@
+"""Scan to map and the wide search: they end at the true pose."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from lhdmap.geometry import se2
+from lhdmap.messages import FloatArray
+from lhdmap.odometry.matching import MatchModel, match, solve3
+from lhdmap.odometry.scan_points import planar_points
+from lhdmap.odometry.search import search
+from lhdmap.odometry.surface_map import SurfaceMap, empty_map, insert_all
+
+from tests.odometry.planar_drives import LEVEL, drive
+
+MODEL = MatchModel(0.012, 3.0, 4.0, 0.05, 6)
+LAST = 100
+NO_PRIOR = np.diag([1e-2, 1e-2, 1e-1])
+
+
+def hits(index: int) -> FloatArray:
+    return planar_points(drive()[1][index], LEVEL, np.zeros(3))
+
+
+@pytest.fixture(scope="module")
+def walls() -> SurfaceMap:
+    """A map of a stretch of the drift, made of scans at their true poses."""
+    map_ = empty_map(0.025, 1024)
+    for index in range(LAST - 30, LAST):
+        insert_all(map_, se2.transform(drive()[0][index], hits(index)), 50.0)
+    return map_
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_matching_ends_at_the_true_pose(walls: SurfaceMap, seed: int) -> None:
+    true, rng = drive()[0][LAST], np.random.default_rng(seed)
+    start = true + rng.uniform(-1.0, 1.0, 3) * np.array([0.05, 0.05, math.radians(1.0)])
+    found = match(walls, hits(LAST), False, start, NO_PRIOR, start, MODEL)
+    error = se2.between(true, found.pose)
+    assert np.hypot(error[0], error[1]) < 0.004
+    assert abs(math.degrees(error[2])) < 0.05
+    assert found.support > 0.8
+
+
+def test_information_tells_the_errors_size(walls: SurfaceMap) -> None:
+    found = match(walls, hits(LAST), False, drive()[0][LAST], NO_PRIOR, drive()[0][LAST], MODEL)
+    assert np.linalg.eigvalsh(found.information).min() > 0.0
+    error = found.pose - drive()[0][LAST]
+    assert error @ found.information @ error < 60.0  # three degrees of freedom; the map's own error comes on top
+
+
+@pytest.mark.parametrize("turn_deg", [-30.0, 0.0, 30.0])
+@pytest.mark.parametrize("shift_m", [-0.75, 0.0, 0.75])
+def test_search_finds_far_starts(walls: SurfaceMap, shift_m: float, turn_deg: float) -> None:
+    true = drive()[0][LAST]
+    predicted = se2.compose(true, np.array([shift_m, 0.0, math.radians(turn_deg)]))
+    recent = np.concatenate([se2.transform(drive()[0][k], hits(k)) for k in range(LAST - 12, LAST)])
+    reach = np.array([1.0, math.radians(40.0)])
+    starts = search(recent, hits(LAST)[::3], predicted, 1e-3 * np.eye(3), reach, 0.1, math.radians(2.0))
+    usable = [start for start in starts if (np.abs(start) < 1e29).all()]
+    tried = [match(walls, hits(LAST), False, start, NO_PRIOR, start, MODEL) for start in usable]
+    error = se2.between(true, max(tried, key=lambda one: one.support).pose)
+    assert np.hypot(error[0], error[1]) < 0.01
+    assert abs(math.degrees(error[2])) < 0.1
+
+
+@settings(max_examples=50, deadline=None)
+@given(st.lists(st.floats(-3.0, 3.0), min_size=12, max_size=12))
+def test_the_solver_is_that_of_numpy(values: list[float]) -> None:
+    J = np.array(values[:9]).reshape(3, 3)
+    A, b = J @ J.T + 0.1 * np.eye(3), np.array(values[9:])
+    assert solve3(A, b) == pytest.approx(np.linalg.solve(A, b), rel=1e-6, abs=1e-9)
+
+
+def test_the_solver_says_nothing_of_a_singular_system() -> None:
+    assert (solve3(np.zeros((3, 3)), np.ones(3)) == 0.0).all()

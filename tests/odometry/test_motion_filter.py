@@ -1,0 +1,116 @@
+"""The motion filter against the textbook's formulas in plain numpy, and its invariants."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from lhdmap.messages import FloatArray
+from lhdmap.odometry import motion_filter
+from lhdmap.odometry.motion import FORWARD, Motion
+from lhdmap.odometry.settings import OdometrySettings
+
+ACCELERATION = np.array([0.7, 0.1, 1.0])
+
+
+def some_state(seed: int = 0) -> tuple[FloatArray, FloatArray]:
+    rng = np.random.default_rng(seed)
+    state = np.array([1.0, -2.0, 0.7, 3.0, 0.1, 0.4, 1.01]) + 0.1 * rng.standard_normal(7)
+    A = rng.standard_normal((7, 7))
+    return state, 0.01 * (A @ A.T) + 1e-3 * np.eye(7)
+
+
+def moved(state: FloatArray, dt_s: float) -> FloatArray:
+    """Constant body velocity, the turn applied at its middle."""
+    out = state.copy()
+    middle = state[2] + 0.5 * state[5] * dt_s
+    out[0] += (math.cos(middle) * state[3] - math.sin(middle) * state[4]) * dt_s
+    out[1] += (math.sin(middle) * state[3] + math.cos(middle) * state[4]) * dt_s
+    out[2] += state[5] * dt_s
+    return out
+
+
+def test_prediction_is_the_motion_and_its_jacobian() -> None:
+    state, P = some_state()
+    dt = 0.04
+    F = np.zeros((7, 7))
+    for k in range(7):
+        step = 1e-6 * np.eye(7)[k]
+        F[:, k] = (moved(state + step, dt) - moved(state - step, dt)) / 2e-6
+    expected, wanted = moved(state, dt), F @ P @ F.T
+    motion_filter.predict(state, P, dt, np.zeros(3))
+    wanted[6, 6] += 1e-7 * dt
+    assert state == pytest.approx(expected, abs=1e-12)
+    assert pytest.approx(wanted, abs=1e-9) == P
+
+
+def test_white_acceleration_grows_as_it_should() -> None:
+    """From rest and certainty: variances q dt, q dt^3 / 3, covariance q dt^2 / 2 (Bar-Shalom), here with q = a^2."""
+    state, P = np.zeros(7), np.zeros((7, 7))
+    motion_filter.predict(state, P, 0.5, ACCELERATION)
+    q = ACCELERATION**2
+    assert np.diag(P)[3:6] == pytest.approx(q * 0.5)
+    assert np.diag(P)[:3] == pytest.approx(q * 0.5**3 / 3.0)
+    assert [P[0, 3], P[1, 4], P[2, 5]] == pytest.approx(q * 0.5**2 / 2.0)
+
+
+def test_a_speed_update_is_kalmans() -> None:
+    state, P = some_state(1)
+    h = np.array([0.0, 0.0, 0.0, state[6], 0.0, 0.0, state[3]])
+    measured, variance = state[6] * state[3] + 0.1, 0.03**2
+    S = h @ P @ h + variance
+    K = P @ h / S
+    expected = state + K * 0.1
+    wanted = (np.eye(7) - np.outer(K, h)) @ P
+    nis = motion_filter.update_speed(state, P, FORWARD, measured, variance, True, 4.0)
+    assert nis == pytest.approx(0.01 / S)
+    assert state == pytest.approx(expected)
+    assert pytest.approx(wanted, abs=1e-12) == P
+
+
+def test_a_slipping_wheel_stays_out() -> None:
+    state, P = some_state(2)
+    P *= 1e-3
+    before = state.copy()
+    assert motion_filter.update_speed(state, P, FORWARD, state[3] * 1.5, 0.03**2, False, 4.0) > 16.0
+    assert (state == before).all()
+
+
+def test_a_pose_update_is_bayes() -> None:
+    """Fusing the maximum a posteriori pose of prior and scan is the Kalman update with the scan's pose."""
+    state, P = some_state(3)
+    information = np.diag([4e4, 9e4, 1e6])
+    scan_pose = state[:3] + np.array([0.01, -0.02, 0.003])
+    prior = np.linalg.inv(P[:3, :3])
+    matched = state[:3] + np.linalg.solve(prior + information, information @ (scan_pose - state[:3]))
+    H = np.eye(3, 7)
+    K = P @ H.T @ np.linalg.inv(H @ P @ H.T + np.linalg.inv(information))
+    expected, wanted = state + K @ (scan_pose - state[:3]), (np.eye(7) - K @ H) @ P
+    motion_filter.update_pose(state, P, matched, information)
+    assert state == pytest.approx(expected, abs=1e-9)
+    assert pytest.approx(wanted, abs=1e-9) == P
+
+
+@settings(max_examples=30, deadline=None)
+@given(
+    st.lists(st.tuples(st.sampled_from("psm"), st.floats(0.001, 2.0), st.floats(-1.0, 1.0)), min_size=1, max_size=30)
+)
+def test_the_covariance_stays_symmetric_and_positive(steps: list[tuple[str, float, float]]) -> None:
+    motion = Motion(OdometrySettings())
+    for kind, size, value in steps:
+        if kind == "p":
+            motion.predict(size)
+        elif kind == "s":
+            motion.fuse_speed(FORWARD, 5.0 * value, 0.03, scaled=True)
+        else:
+            motion.correct(motion.pose + 0.1 * value, 1e4 * size * np.eye(3))
+            motion.forget(min(size, 1.0) * 0.9)
+        P = motion.P
+        assert np.isfinite(P).all()
+        assert pytest.approx(P.T, abs=1e-9) == P
+        scale = np.sqrt(np.diag(P)) + 1e-12
+        assert np.linalg.eigvalsh(P / np.outer(scale, scale)).min() > -1e-6
+        assert -math.pi <= motion.pose[2] < math.pi
