@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import argparse
+import shutil
+import sys
 import time
 from collections.abc import Iterator
 from pathlib import Path
@@ -69,6 +71,7 @@ def demo_values(demo: Demo, wall_s: float) -> dict[str, Any]:
 def demo_text(demo: Demo, wall_s: float) -> str:
     """Return the result for a person: what was made, how good it is, where it is, what to do with it."""
     found, built = demo.evaluation, demo.built
+    program = "lhdmap" if shutil.which("lhdmap") else sys.argv[0]
     ten = next((s for s in found.segments if s.length_m == 10.0 and s.n), None)
     segments = f"; over 10 m segments {ten.translation_pct:.2f} % (mean of {ten.n})" if ten else ""
     end = f"{found.end_pct:.2f} %" if found.end_pct is not None else "not known"
@@ -80,9 +83,9 @@ def demo_text(demo: Demo, wall_s: float) -> str:
             f"time        {wall_s:.0f} s, of which build-map {built.summary['wall_s']:.0f} s",
             "",
             f"report      open {built.folder / 'report.html'} in a browser",
-            f"recording   lhdmap view {built.folder}",
+            f"recording   {program} view {built.folder}",
             f"comparison  {demo.plot_file}",
-            "your log    lhdmap doctor LOG, then lhdmap build-map LOG",
+            f"your log    {program} doctor LOG, then {program} build-map LOG",
         ]
     )
 
