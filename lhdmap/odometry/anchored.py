@@ -22,6 +22,7 @@ _LOST_BEFORE_RESTART = 5
 _FEWEST_HITS = 10
 _HEADING_AXIS = np.diag([0.0, 0.0, 1.0])
 _JUMP_PRIOR = 0.01
+_ENOUGH_SUPPORT = 0.4
 _SURPRISE = 3.5  # sigmas from the prediction
 _USUAL_RESIDUAL = 0.75  # weighted rms in sigmas that matches have whose noise is stated rightly
 _NOISE_GAIN = 0.05
@@ -115,8 +116,11 @@ class AnchoredMatcher:
         return np.array([shift, min(max(3.0 * float(sigma[2]), math.radians(20.0)), math.radians(self._wide.turn_deg))])
 
     def _trusted(self, result: Match) -> bool:
-        """Return whether most of the hits that the map covers agree with it."""
-        return result.support > 0.6 or (
+        """Return whether enough of the hits, or most of those that the map covers, agree with it.
+
+        Half of them do where someone walks beside the machine: a search would find that the person stands still, and stop.
+        """
+        return result.support > _ENOUGH_SUPPORT or (
             result.support > 0.8 * result.covered and result.support > self._anchor.min_support
         )
 

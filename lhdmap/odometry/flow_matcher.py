@@ -13,7 +13,7 @@ import numpy as np
 from lhdmap.geometry import se2
 from lhdmap.messages import FloatArray
 from lhdmap.odometry.flow_reference import FlowReference, compare, correct_by, scanner_pyramid
-from lhdmap.odometry.flow_scan import FlowScan
+from lhdmap.odometry.flow_scan import Pyramid
 from lhdmap.odometry.motion import Motion
 from lhdmap.odometry.settings import OdometrySettings, RangeFlowSettings
 from lhdmap.odometry.steps import BY_DEFINITION, Matched
@@ -51,7 +51,7 @@ class FlowMatcher:
         self._renew(levels, T_base_scanner)
         return Matched(information, best.residual_sigmas * self._noise_m, best.support, lost=False)
 
-    def _renew(self, levels: list[FlowScan], T_base_scanner: FloatArray) -> None:
+    def _renew(self, levels: Pyramid, T_base_scanner: FloatArray) -> None:
         """Make the scan a reference once it is far enough from the last one; a new reference is known by definition."""
         step = se2.between(self._newest, self._motion.pose)
         turned = abs(step[2]) >= math.radians(self._settings.spacing_deg)
@@ -59,7 +59,7 @@ class FlowMatcher:
             self._refer(levels, T_base_scanner)
             self._motion.forget(1.0)
 
-    def _refer(self, levels: list[FlowScan], T_base_scanner: FloatArray) -> None:
+    def _refer(self, levels: Pyramid, T_base_scanner: FloatArray) -> None:
         self._newest = self._motion.pose
         reference = FlowReference(se2.compose(self._newest, T_base_scanner), levels)
         self._references = [*self._references, reference][-self._settings.references :]

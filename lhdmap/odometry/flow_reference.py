@@ -9,7 +9,7 @@ import numpy as np
 
 from lhdmap.geometry import se2
 from lhdmap.messages import FloatArray
-from lhdmap.odometry.flow_scan import FlowScan, pyramid
+from lhdmap.odometry.flow_scan import Pyramid
 from lhdmap.odometry.motion import Motion
 from lhdmap.odometry.range_flow import flow
 from lhdmap.odometry.settings import RangeFlowSettings
@@ -23,7 +23,7 @@ class FlowReference(NamedTuple):
     """Pose of the scanner in `odom` (3,), its level frame, and its scan's pyramid."""
 
     T_odom_scanner: FloatArray
-    levels: list[FlowScan]
+    levels: Pyramid
 
 
 class FlowPose(NamedTuple):
@@ -35,14 +35,14 @@ class FlowPose(NamedTuple):
     support: float
 
 
-def scanner_pyramid(points: FloatArray, T_base_scanner: FloatArray, settings: RangeFlowSettings) -> list[FlowScan]:
+def scanner_pyramid(points: FloatArray, T_base_scanner: FloatArray, settings: RangeFlowSettings) -> Pyramid:
     """Return the pyramid of hits (N, 2) in the level base frame as seen from the scanner (planar pose (3,) in that frame)."""
-    return pyramid(se2.transform(se2.inverse(T_base_scanner), points), settings.width_m, settings.levels)
+    return Pyramid(se2.transform(se2.inverse(T_base_scanner), points), settings.width_m, settings.levels)
 
 
 def compare(
     reference: FlowReference,
-    levels: list[FlowScan],
+    levels: Pyramid,
     T_base_scanner: FloatArray,
     motion: Motion,
     noise_m: float,

@@ -7,25 +7,22 @@ from typing import NamedTuple
 
 import numba as nb
 import numpy as np
-import numpy.typing as npt
 
 from lhdmap.messages import FloatArray
 
 JUMP_SLOPE = 14.0  # neighbours whose line to each other is steeper than this against the beam do not share a wall
 _MOST_NEIGHBOURS = 24
-BINS_PER_BEAM = 2
+_FEWEST_BEAMS = 20
 
 
 class FlowScan(NamedTuple):
     """One level of a scan, seen from the scanner in its level frame; arrays of shape (N,), beams in rising angle.
 
-    `angle_rad`, `cos`, `sin`: direction; `range_m`: local least squares range; `slope`: dR/dtheta / R of the wall there
+    `cos`, `sin`: direction; `range_m`: local least squares range; `slope`: dR/dtheta / R of the wall there
     (0: no wall line); `slope_gain`: variance of that slope for
-    a range noise of 1 m; `bend_m`: scatter of the hits about that line; `joined`: 1 where beams i and i + 1 see the same wall;
-    `bins`: index of the first beam at or above each bin of the angle, `bin_rad` wide, from `angle_rad[0]` on.
+    a range noise of 1 m; `bend_m`: scatter of the hits about that line; `joined`: 1 where beams i and i + 1 see the same wall.
     """
 
-    angle_rad: FloatArray
     cos: FloatArray
     sin: FloatArray
     range_m: FloatArray
@@ -33,26 +30,52 @@ class FlowScan(NamedTuple):
     slope_gain: FloatArray
     bend_m: FloatArray
     joined: FloatArray
-    bins: npt.NDArray[np.int32]
-    bin_rad: float
 
 
-def pyramid(points_m: FloatArray, width_m: float, levels: int) -> list[FlowScan]:
-    """Return the scan's levels, finest first; level k keeps every 2^k-th beam and fits lines 2^k times as wide.
+class Pyramid:
+    """A scan's levels, made when they are asked for; level k keeps every 2^k-th beam and fits lines 2^k times as wide.
 
-    `points_m`: hits, shape (N, 2), about the scanner. Hits are put in the order of their angle; any order, offset and
-    spacing of the beams will do.
+    `points_m`: hits, shape (N, 2) or more columns, about the scanner. They are put in the order of their angle; any order,
+    offset and spacing of the beams will do. Most comparisons are near enough to need the finest level alone.
     """
-    angle = np.arctan2(points_m[:, 1], points_m[:, 0])
-    order = np.argsort(angle, kind="stable")
-    points, angle = points_m[order], angle[order]
-    scans = []
-    for level in range(levels):
-        stride = 2**level
-        if level > 0 and len(angle) // stride < 20:
-            break
-        scans.append(FlowScan(*_prepare(angle[::stride].copy(), points[::stride].copy(), width_m * stride)))
-    return scans
+
+    def __init__(self, points_m: FloatArray, width_m: float, levels: int) -> None:
+        angle = np.arctan2(points_m[:, 1], points_m[:, 0])
+        if (angle[1:] < angle[:-1]).any():
+            order = np.argsort(angle, kind="stable")
+            points_m, angle = points_m[order], angle[order]
+        self._points, self._angle, self._width_m = points_m, angle, width_m
+        self._levels: dict[int, FlowScan] = {}
+        self.coarsest = 0
+        while self.coarsest < levels - 1 and len(angle) >> (self.coarsest + 1) >= _FEWEST_BEAMS:
+            self.coarsest += 1
+
+    def level(self, level: int) -> FlowScan:
+        """Return one level, 0 the finest."""
+        if level not in self._levels:
+            stride = 1 << level
+            fields = _prepare(self._angle[::stride].copy(), self._points[::stride].copy(), self._width_m * stride)
+            self._levels[level] = FlowScan(*fields)
+        return self._levels[level]
+
+
+@nb.njit(cache=True, nogil=True)
+def _spacing(angle):  # type: ignore[no-untyped-def]
+    """Return the usual angle between neighbours: the mean of the gaps that no missing beam has widened."""
+    n = angle.size
+    if n < 2:
+        return 1.0
+    mean = (angle[n - 1] - angle[0]) / (n - 1)
+    total, count = 0.0, 0
+    for _ in range(2):
+        total, count = 0.0, 0
+        for i in range(n - 1):
+            gap = angle[i + 1] - angle[i]
+            if gap <= 1.5 * mean:
+                total += gap
+                count += 1
+        mean = total / count if count else mean
+    return mean
 
 
 @nb.njit(cache=True, nogil=True)
@@ -63,7 +86,7 @@ def _prepare(angle, points, width_m):  # type: ignore[no-untyped-def]
     for i in range(n):
         raw[i] = max(math.sqrt(points[i, 0] ** 2 + points[i, 1] ** 2), 1e-6)
         cos[i], sin[i] = points[i, 0] / raw[i], points[i, 1] / raw[i]
-    spacing = np.median(angle[1:] - angle[:-1]) if n > 1 else 1.0
+    spacing = _spacing(angle)
     joined = np.zeros(n)
     for i in range(n - 1):
         gap = angle[i + 1] - angle[i]
@@ -72,14 +95,7 @@ def _prepare(angle, points, width_m):  # type: ignore[no-untyped-def]
     smooth, slope, gain, bend = np.zeros(n), np.zeros(n), np.zeros(n), np.zeros(n)
     for i in range(n):
         _local_line(i, raw, cos, sin, joined, width_m, smooth, slope, gain, bend)
-    bin_rad = max(spacing / BINS_PER_BEAM, 1e-5)
-    bins = np.empty(int((angle[-1] - angle[0]) / bin_rad) + 2 if n else 1, dtype=np.int32)
-    i = 0
-    for k in range(bins.size):
-        while i < n - 1 and angle[i] < angle[0] + k * bin_rad:
-            i += 1
-        bins[k] = i
-    return angle, cos, sin, smooth, slope, gain, bend, joined, bins, bin_rad
+    return cos, sin, smooth, slope, gain, bend, joined
 
 
 @nb.njit(cache=True, nogil=True)

@@ -20,12 +20,13 @@ import numpy as np
 
 from lhdmap.geometry import se2
 from lhdmap.messages import FloatArray
-from lhdmap.odometry.flow_scan import FlowScan
+from lhdmap.odometry.flow_scan import Pyramid
 from lhdmap.odometry.matching import solve3
 
 CAUCHY_SIGMAS = 3.0
 GRAZING_WEIGHT = 0.1  # part of the squared slope by which the variance grows: discounts grazing beams and edges
 _FEWEST_BEAMS = 12.0
+_CONVERGED_M = 1e-4
 
 
 class Flow(NamedTuple):
@@ -42,8 +43,8 @@ class Flow(NamedTuple):
 
 
 def flow(
-    reference: list[FlowScan],
-    current: list[FlowScan],
+    reference: Pyramid,
+    current: Pyramid,
     guess: FloatArray,
     prior_information: FloatArray,
     noise_m: float,
@@ -51,14 +52,15 @@ def flow(
     coarsest: int = 0,
     iterations: int = 6,
 ) -> Flow:
-    """Estimate the motion from `reference` to `current` (pyramids, finest first), from level `coarsest` down to 0.
+    """Estimate the motion from `reference` to `current` (pyramids), from level `coarsest` down to 0.
 
     `guess` (3,) and `prior_information` (3, 3) are the prior. Where a scan has no beams, the guess comes back with no information.
     """
     pose = guess.copy()
+    coarsest = min(coarsest, reference.coarsest, current.coarsest)
     result = Flow(pose, np.zeros((3, 3)), math.nan, 0.0)
-    for level in range(min(coarsest, len(reference) - 1, len(current) - 1), -1, -1):
-        step = _solve(reference[level], current[level], pose, guess, prior_information, noise_m, iterations)
+    for level in range(coarsest, -1, -1):
+        step = _solve(reference.level(level), current.level(level), pose, guess, prior_information, noise_m, iterations)
         result = Flow(*step)
         pose = result.T_reference_current
     return result
@@ -86,7 +88,7 @@ def _solve(reference, current, start, guess, prior_information, noise_m, iterati
         pose = se2.compose(step, pose)
         pose[2] = guess[2] + se2.wrap(pose[2] - guess[2])
         scale = max(squares / max(weights, 1.0), 0.25)
-        if abs(step[0]) + abs(step[1]) + 4.0 * abs(step[2]) < 2e-5:
+        if abs(step[0]) + abs(step[1]) + 4.0 * abs(step[2]) < _CONVERGED_M:
             break
     beams = max(current.range_m.size + reference.range_m.size, 1)
     return pose, _true_information(H, N), math.sqrt(squares / max(weights, 1.0)), weights / beams
@@ -127,13 +129,14 @@ def accumulate(T_target_source, source, target, sign, noise_m, scale, H, N, b): 
     weights, squares, count = 0.0, 0.0, 0.0
     h00 = h01 = h02 = h11 = h12 = h22 = b0 = b1 = b2 = 0.0
     n00 = n01 = n02 = n11 = n12 = n22 = 0.0
+    j = 0
     for i in range(source.range_m.size):
         if source.slope[i] == 0.0:
             continue
         xs, ys = source.range_m[i] * source.cos[i], source.range_m[i] * source.sin[i]
         x, y = tx + c * xs - s * ys, ty + s * xs + c * ys
-        j, f = _segment_at(target, math.atan2(y, x))
-        if j < 0:
+        j, f, usable = _segment_at(target, x, y, j)
+        if not usable:
             continue
         # where the beam through (x, y) meets the wall segment between beams j and j + 1
         ax, ay = target.range_m[j] * target.cos[j], target.range_m[j] * target.sin[j]
@@ -196,16 +199,18 @@ def accumulate(T_target_source, source, target, sign, noise_m, scale, H, N, b): 
 
 
 @nb.njit(cache=True, nogil=True)
-def _segment_at(scan, angle):  # type: ignore[no-untyped-def]
-    """Return the beam j whose wall segment to j + 1 the angle falls on, and where in it (0 to 1); j = -1 where there is none."""
-    n = scan.angle_rad.size
-    place = (angle - scan.angle_rad[0]) / scan.bin_rad
-    if not 0.0 <= place < scan.bins.size - 1:
-        return -1, 0.0
-    j = max(scan.bins[int(place)] - 1, 0)
-    while j < n - 2 and scan.angle_rad[j + 1] <= angle:
+def _segment_at(scan, x, y, hint):  # type: ignore[no-untyped-def]
+    """Return the beam j whose wall segment to j + 1 the direction of (x, y) falls on, where in it, and whether there is one.
+
+    Points come in the order of their angle, so the search walks on from the last place, `hint`.
+    """
+    n = scan.range_m.size
+    j = hint
+    while j < n - 2 and scan.cos[j + 1] * y - scan.sin[j + 1] * x > 0.0:
         j += 1
-    gap = scan.angle_rad[j + 1] - scan.angle_rad[j]
-    if scan.joined[j] == 0.0 or scan.slope[j] == 0.0 or scan.slope[j + 1] == 0.0 or gap <= 0.0:
-        return -1, 0.0
-    return j, (angle - scan.angle_rad[j]) / gap
+    while j > 0 and scan.cos[j] * y - scan.sin[j] * x < 0.0:
+        j -= 1
+    before, after = scan.cos[j] * y - scan.sin[j] * x, scan.cos[j + 1] * y - scan.sin[j + 1] * x
+    inside = before >= 0.0 and after < 0.0 and scan.cos[j] * x + scan.sin[j] * y > 0.0
+    usable = inside and scan.joined[j] != 0.0 and scan.slope[j] != 0.0 and scan.slope[j + 1] != 0.0
+    return j, before / (before - after) if usable else 0.0, usable

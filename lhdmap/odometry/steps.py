@@ -67,7 +67,7 @@ def body_information(H_map: FloatArray, heading_rad: float) -> FloatArray:
     """Return H (3, 3) in the body's axes."""
     c, s = math.cos(heading_rad), math.sin(heading_rad)
     R = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
-    return R.T @ np.ascontiguousarray(H_map) @ R
+    return np.ascontiguousarray(R.T) @ np.ascontiguousarray(H_map) @ R
 
 
 @nb.njit(cache=True, nogil=True)

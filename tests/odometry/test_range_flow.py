@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from lhdmap.geometry import se2
 from lhdmap.messages import FloatArray, LaserScan
-from lhdmap.odometry.flow_scan import FlowScan, pyramid
+from lhdmap.odometry.flow_scan import Pyramid
 from lhdmap.odometry.range_flow import Flow, flow
 from lhdmap.odometry.scan_points import planar_points
 from lhdmap.odometry.settings import RangeFlowSettings
@@ -22,8 +22,8 @@ PLACE = drive_along(world().centre_line_m, 1.0, 1.0)[12]
 MOTION = np.array([0.11, 0.02, math.radians(1.5)])
 
 
-def levels(scan: LaserScan) -> list[FlowScan]:
-    return pyramid(planar_points(scan, LEVEL, np.zeros(3)), SETTINGS.width_m, SETTINGS.levels)
+def levels(scan: LaserScan) -> Pyramid:
+    return Pyramid(planar_points(scan, LEVEL, np.zeros(3)), SETTINGS.width_m, SETTINGS.levels)
 
 
 def scan_at(pose: FloatArray, scanner: PlanarScanner, seed: int = 1) -> LaserScan:
@@ -146,7 +146,7 @@ def test_a_smooth_straight_drift_is_not_observed_along() -> None:
     for _ in range(2):
         ranges = 2.0 / np.abs(np.sin(angles)) + 0.012 * rng.standard_normal(angles.size)
         points = ranges[:, None] * np.column_stack([np.cos(angles), np.sin(angles)])
-        scans.append(pyramid(points, SETTINGS.width_m, SETTINGS.levels))
+        scans.append(Pyramid(points, SETTINGS.width_m, SETTINGS.levels))
     found = flow(scans[0], scans[1], np.zeros(3), NO_PRIOR, 0.012)
     sigma = 1.0 / np.sqrt(np.maximum(np.diag(found.information), 1e-12))
     assert sigma[1] < 0.003

@@ -8,7 +8,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 from lhdmap.geometry import se2
 from lhdmap.messages import FloatArray, LaserScan
-from lhdmap.odometry.flow_scan import FlowScan, pyramid
+from lhdmap.odometry.flow_scan import Pyramid
 from lhdmap.odometry.range_flow import flow
 from lhdmap.odometry.scan_points import planar_points
 from lhdmap.odometry.settings import RangeFlowSettings
@@ -36,12 +36,12 @@ _PAIR_M = 0.13
 _PREDICTION_SIGMAS = np.array([0.01, 0.003, np.radians(0.1)])
 
 
-def levels_of(scan: LaserScan) -> list[FlowScan]:
+def levels_of(scan: LaserScan) -> Pyramid:
     """Return the pyramid of a level scan."""
-    return pyramid(planar_points(scan, LEVEL, np.zeros(3)), FLOW.width_m, FLOW.levels)
+    return Pyramid(planar_points(scan, LEVEL, np.zeros(3)), FLOW.width_m, FLOW.levels)
 
 
-def motion_between(first: list[FlowScan], second: list[FlowScan], noise_m: float = 0.012) -> FloatArray:
+def motion_between(first: Pyramid, second: Pyramid, noise_m: float = 0.012) -> FloatArray:
     """Return the motion (3,) by range flow from no motion, coarse to fine."""
     found = flow(first, second, np.zeros(3), _NO_PRIOR, noise_m, coarsest=FLOW.levels - 1, iterations=FLOW.iterations)
     return found.T_reference_current
@@ -60,7 +60,7 @@ def pairs(seeds: Sequence[int]) -> Iterator[Figure]:
             true = se2.between(poses[k - 1], poses[k])
             guess = true + _PREDICTION_SIGMAS * rng.standard_normal(3)
             started = time.thread_time()
-            finest = pyramid(planar_points(scans[k], LEVEL, np.zeros(3)), FLOW.width_m, 1)
+            finest = Pyramid(planar_points(scans[k], LEVEL, np.zeros(3)), FLOW.width_m, 1)
             found = flow(before[:1], finest, guess, _NO_PRIOR, 0.012, iterations=FLOW.iterations)
             cpu.append(time.thread_time() - started)
             predicted.append(se2.between(true, found.T_reference_current))
