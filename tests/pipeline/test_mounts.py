@@ -1,0 +1,71 @@
+"""Mounts: chains of the log, the machine file, a level sensor, in that order."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from lhdmap.geometry import se3
+from lhdmap.machine import Machine
+from lhdmap.messages import Mount
+from lhdmap.pipeline.mounts import Mounts, level_sensor
+
+T_BASE_MAST = se3.from_rpy(0.0, 0.0, 0.3, (1.0, 0.2, 0.5))
+T_MAST_SCANNER = se3.from_rpy(0.02, -0.05, -0.1, (0.1, 0.0, 1.5))
+
+
+def test_a_chain_of_transforms_is_followed_whatever_its_order() -> None:
+    mounts = Mounts(None)
+    mounts.update(Mount(0, "mast", "scanner", T_MAST_SCANNER))
+    assert not mounts.known("scanner")
+    mounts.update(Mount(0, "base_link", "mast", T_BASE_MAST))
+    assert mounts.known("scanner")
+    found = mounts.of("scanner", "front")
+    assert found.parent_frame == "base_link"
+    assert found.T_parent_child == pytest.approx(T_BASE_MAST @ T_MAST_SCANNER)
+    assert mounts.warnings == []
+
+
+def test_the_rear_body_is_a_body() -> None:
+    mounts = Mounts(None)
+    mounts.update(Mount(0, "rear_link", "back", T_MAST_SCANNER))
+    assert mounts.of("back", "rear").parent_frame == "rear_link"
+
+
+def test_without_a_chain_the_machine_file_is_taken() -> None:
+    machine = Machine()
+    mounts = Mounts(machine)
+    found = mounts.of("unknown", "front")
+    assert found.T_parent_child == pytest.approx(machine.mounts["lidar_front"].T_parent_sensor)
+    assert "unknown" in mounts.warnings[0]
+
+
+def test_without_a_machine_it_is_a_level_sensor() -> None:
+    mounts = Mounts(None)
+    assert mounts.of("laser", "front").T_parent_child == pytest.approx(np.eye(4))
+    assert mounts.of("back", "rear").T_parent_child[:2, 0] == pytest.approx([-1.0, 0.0])
+    assert len(mounts.warnings) == 2
+    mounts.of("laser", "front")
+    assert len(mounts.warnings) == 2  # said once
+
+
+@pytest.mark.parametrize("edges", [[("a", "b"), ("b", "a")], [("elsewhere", "a")]])
+def test_transforms_that_lead_nowhere(edges: list[tuple[str, str]]) -> None:
+    mounts = Mounts(None)
+    for parent, child in edges:
+        mounts.update(Mount(0, parent, child, np.eye(4)))
+    assert not mounts.known("a")
+    assert mounts.of("a", "front").T_parent_child == pytest.approx(np.eye(4))
+
+
+def test_a_transform_that_is_not_a_number_is_none() -> None:
+    mounts = Mounts(None)
+    mounts.update(Mount(0, "base_link", "a", np.full((4, 4), np.nan)))
+    assert not mounts.known("a")
+
+
+def test_level_frame_has_the_attitude_and_no_heading() -> None:
+    """On a machine that points 10 degrees down, a scanner 2 m up comes 0.35 m forward."""
+    mount = Mount(0, "base_link", "a", se3.from_rpy(0.0, 0.0, 0.0, (0.0, 0.0, 2.0)))
+    T = level_sensor(mount, 0.0, np.radians(10.0))
+    assert T[:3, 3] == pytest.approx([2.0 * np.sin(np.radians(10.0)), 0.0, 2.0 * np.cos(np.radians(10.0))])
+    assert T[2, 0] < 0.0  # it looks down
