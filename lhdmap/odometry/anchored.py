@@ -22,7 +22,9 @@ _LOST_BEFORE_RESTART = 5
 _FEWEST_HITS = 10
 _HEADING_AXIS = np.diag([0.0, 0.0, 1.0])
 _JUMP_PRIOR = 0.01
-_ENOUGH_SUPPORT = 0.4
+_DOUBT_SCANS = (
+    25  # that are flagged after a pose that the motion did not foretell: a jump, or someone beside the machine
+)
 _SURPRISE = 3.5  # sigmas from the prediction
 _USUAL_RESIDUAL = 0.75  # weighted rms in sigmas that matches have whose noise is stated rightly
 _NOISE_GAIN = 0.05
@@ -54,6 +56,7 @@ class AnchoredMatcher:
         self._lost_in_a_row = 0
         self._layered = False
         self._noise_scale = 1.0
+        self._doubt = 0
 
     def step(self, points: FloatArray, T_base_scanner: FloatArray) -> Matched:
         """Match points (N, 3), level base frame with absolute heights, at the predicted pose; correct the motion, grow the map."""
@@ -73,7 +76,9 @@ class AnchoredMatcher:
         travelled = float(np.hypot(*(self._motion.pose[:2] - before[:2])))
         self._motion.forget(1.0 - math.exp(-travelled / self._anchor.memory_m))
         self._grow(points)
-        return Matched(result.information, result.residual_sigmas * self._noise_m, result.support, lost=False)
+        information = np.zeros((3, 3)) if self._doubt > 0 else result.information
+        self._doubt = max(self._doubt - 1, 0)
+        return Matched(information, result.residual_sigmas * self._noise_m, result.support, lost=False)
 
     def _match(self, points: FloatArray, heading: tuple[float, float]) -> Match:
         """Match from the prediction (and a heading with its information); where that does not fit, search widely."""
@@ -98,7 +103,7 @@ class AnchoredMatcher:
         for start in starts[(np.abs(starts) < 1e29).all(axis=1)]:
             found = match(self._map, points, self._layered, predicted, _JUMP_PRIOR * prior, start, self._model)
             if found.support > result.support + 0.02:
-                result = found
+                result, self._doubt = found, _DOUBT_SCANS
         return result
 
     def _freed(self, points: FloatArray, result: Match, predicted: FloatArray, prior: FloatArray) -> Match:
@@ -116,11 +121,8 @@ class AnchoredMatcher:
         return np.array([shift, min(max(3.0 * float(sigma[2]), math.radians(20.0)), math.radians(self._wide.turn_deg))])
 
     def _trusted(self, result: Match) -> bool:
-        """Return whether enough of the hits, or most of those that the map covers, agree with it.
-
-        Half of them do where someone walks beside the machine: a search would find that the person stands still, and stop.
-        """
-        return result.support > _ENOUGH_SUPPORT or (
+        """Return whether most of the hits that the map covers agree with it."""
+        return result.support > 0.6 or (
             result.support > 0.8 * result.covered and result.support > self._anchor.min_support
         )
 
