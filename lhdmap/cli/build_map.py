@@ -96,6 +96,7 @@ def summary_text(summary: dict[str, Any]) -> str:
     return "\n".join(
         [
             f"map          {summary['map']}",
+            f"report       {Path(summary['map']) / 'report.html'}",
             f"scans        {summary['scans']} ({summary['scans_processed']} processed)",
             f"drive        {summary['distance_m']:.1f} m in {summary['duration_s']:.1f} s",
             f"weak scans   {100 * summary['degenerate_share']:.0f} %, lost stretches {summary['lost_stretches']}",
