@@ -91,9 +91,7 @@ def update_pose(state: FloatArray, P: FloatArray, matched: FloatArray, informati
     posterior = np.linalg.inv(np.linalg.inv(prior) + information)
     correction = matched - state[:3]
     correction[2] = (correction[2] + math.pi) % (2.0 * math.pi) - math.pi
-    A = (
-        np.ascontiguousarray(P[:, :3]) @ np.linalg.inv(prior).T.copy()
-    )  # the inverse is symmetric: rows for columns  # regression of the whole state on its pose
+    A = np.ascontiguousarray(P[:, :3]) @ np.linalg.inv(prior).T.copy()  # regression of the state on its pose
     state += A @ correction
     state[2] = (state[2] + math.pi) % (2.0 * math.pi) - math.pi
     P += A @ np.ascontiguousarray(posterior - prior) @ A.T

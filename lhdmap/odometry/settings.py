@@ -61,6 +61,15 @@ class OdometrySettings:
         minimum=0.0,
         source="rough walls give 0.0013 m, smooth ones 0.004-0.007 m (docs/odometry.md)",
     )
+    weak_ratio: float = setting(
+        5.0,
+        doc="... if it is also this much worse than the better direction (all directions alike are a coarse scanner, no drift).",
+        minimum=1.0,
+        source="rough walls give 2, moderate ones 4, smooth ones 10 (docs/odometry.md)",
+    )
+    blind_sigma_m: float = setting(
+        0.03, unit="m", doc="Worse than this is flagged whatever the other direction is.", minimum=0.0
+    )
     weak_sigma_deg: float = setting(0.2, unit="deg", doc="The same for the heading.", minimum=0.0, source="lhdmap")
     wheel_noise_mps: float = setting(
         0.03, unit="m/s", doc="Noise of the wheels' speed.", minimum=0.001, source="lhdmap"
