@@ -61,7 +61,7 @@ def pairs(seeds: Sequence[int]) -> Iterator[Figure]:
             guess = true + _PREDICTION_SIGMAS * rng.standard_normal(3)
             started = time.thread_time()
             finest = Pyramid(planar_points(scans[k], LEVEL, np.zeros(3)), FLOW.width_m, 1)
-            found = flow(before[:1], finest, guess, _NO_PRIOR, 0.012, iterations=FLOW.iterations)
+            found = flow(before, finest, guess, _NO_PRIOR, 0.012, iterations=FLOW.iterations)
             cpu.append(time.thread_time() - started)
             predicted.append(se2.between(true, found.T_reference_current))
             now = levels_of(scans[k])
