@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from lhdmap.messages import FloatArray
@@ -10,6 +12,9 @@ from lhdmap.odometry.settings import OdometrySettings
 
 FORWARD, LATERAL, TURNING = 3, 4, 5
 _GATE_SIGMAS = 4.0
+# Wheels that turn faster than the machine moves slip, for seconds; wheels that say anything else for longer than a moment
+# are right, and the match has run away along a direction that the walls do not fix.
+_SLIP_S, _DISSENT_S = 3.0, 0.5
 _LONGEST_STEP_S = 1.0
 _STARTING_VARIANCE = np.diag([0.2**2, 0.05**2, 0.05**2])  # of a starting velocity from a dry run
 _GAP_VARIANCE = np.diag([4.0, 0.1, 0.5])
@@ -26,6 +31,7 @@ class Motion:
             [settings.forward_acceleration, settings.lateral_acceleration, settings.turning_acceleration]
         )
         self.state, self.P = motion_filter.initial(np.zeros(3))
+        self._dissent_s = 0.0
         if velocity is not None:
             self.state[3:6] = velocity
             self.P[3:6, 3:6] = _STARTING_VARIANCE
@@ -48,6 +54,7 @@ class Motion:
 
     def predict(self, dt_s: float) -> None:
         """Move on by `dt_s`. After a long gap the old speed says little: the model runs for a second at most."""
+        self._dissent_s += dt_s
         motion_filter.predict(self.state, self.P, min(dt_s, _LONGEST_STEP_S), self._accelerations)
         if dt_s > _LONGEST_STEP_S:
             self.P[3:6, 3:6] += _GAP_VARIANCE
@@ -58,7 +65,20 @@ class Motion:
         With `scaled` the wheels' scale is part of the state and learned.
         """
         nis = motion_filter.update_speed(self.state, self.P, axis, measured, sigma**2, scaled, _GATE_SIGMAS)
-        return bool(nis <= _GATE_SIGMAS**2)
+        agrees = bool(nis <= _GATE_SIGMAS**2)
+        if axis != FORWARD:
+            return agrees
+        if agrees:
+            self._dissent_s = 0.0
+            return True
+        speed = float(self.state[FORWARD])
+        slips = measured * speed > 0.0 and abs(measured) > abs(speed)
+        if self._dissent_s < (_SLIP_S if slips else _DISSENT_S):
+            return False
+        self.P[FORWARD, FORWARD] += (measured - speed) ** 2
+        motion_filter.update_speed(self.state, self.P, axis, measured, sigma**2, False, math.inf)
+        self._dissent_s = 0.0
+        return True
 
     def correct(self, matched: FloatArray, information: FloatArray) -> None:
         """Take over the matched pose (3,), found under the prior, with the match's own `information` (3, 3)."""
