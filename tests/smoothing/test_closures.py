@@ -1,0 +1,115 @@
+"""Loop closures and the pose graph on places and graphs that are known."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from lhdmap.geometry import se2
+from lhdmap.messages import FloatArray
+from lhdmap.smoothing.closures import Closure, _confirmed, find_closures
+from lhdmap.smoothing.graph import smoothed
+from lhdmap.smoothing.keys import KeyScan, KeyScans
+from lhdmap.smoothing.settings import SmoothingSettings
+from lhdmap.smoothing.smoother import Smoother
+
+from tests.smoothing.places import drifted, keys_of, lap, square, straight
+
+SETTINGS = SmoothingSettings()
+NO_POINTS = np.zeros((1, 3), dtype=np.float32)
+
+
+@pytest.fixture(scope="module")
+def twice_round() -> tuple[FloatArray, list[KeyScan]]:
+    """A lap of 64 m and 16 m more of the next, by an odometry with 0.5 % scale error and 1.6° of turn a lap."""
+    true = lap(80)
+    return true, keys_of(square(), true, drifted(true, 1.005, 0.025))
+
+
+def test_a_second_lap_closes_the_loop(twice_round: tuple[FloatArray, list[KeyScan]]) -> None:
+    true, keys = twice_round
+    closures = find_closures(keys, SETTINGS)
+    assert len(closures) >= 8
+    for closure in closures:
+        error = se2.between(se2.between(true[closure.earlier], true[closure.current]), closure.T_earlier_current)
+        assert np.hypot(error[0], error[1]) < 0.05
+        assert abs(math.degrees(error[2])) < 0.5
+
+
+def test_the_graph_shrinks_the_error(twice_round: tuple[FloatArray, list[KeyScan]]) -> None:
+    true, keys = twice_round
+    before = np.array([key.pose for key in keys])
+    after = smoothed(keys, find_closures(keys, SETTINGS), SETTINGS)
+    assert after[0] == pytest.approx(true[0], abs=1e-4)
+    assert (
+        np.hypot(*(after[64:, :2] - true[64:, :2]).T).mean()
+        < 0.3 * np.hypot(*(before[64:, :2] - true[64:, :2]).T).mean()
+    )
+    assert np.hypot(*(after[:, :2] - true[:, :2]).T).mean() < np.hypot(*(before[:, :2] - true[:, :2]).T).mean()
+
+
+def test_a_straight_smooth_drift_is_never_closed() -> None:
+    world, true = straight(40, 0.0005)
+    assert find_closures(keys_of(world, true, drifted(true, 1.01, 0.0)), SETTINGS) == []
+
+
+def test_there_and_back_in_a_smooth_drift_fixes_nothing_along() -> None:
+    """Out of sight of its ends it looks the same everywhere: to close it would be to guess."""
+    world, true = straight(40, 0.0005)
+    way = np.concatenate([true[15:35], true[34:14:-1]])
+    assert find_closures(keys_of(world, way, way, reach_m=8.0), SETTINGS) == []
+
+
+def plain_keys(count: int) -> list[KeyScan]:
+    return [KeyScan(k, np.array([float(k), 0.0, 0.0]), float(k), NO_POINTS, False) for k in range(count)]
+
+
+def closure(earlier: int, current: int, shift_m: float = 0.0) -> Closure:
+    pose = np.array([float(current - earlier) + shift_m, 0.0, 0.0])
+    return Closure(earlier, current, pose, np.diag([1e-4, 1e-4, 1e-6]))
+
+
+def test_a_closure_that_its_neighbours_contradict_is_dropped() -> None:
+    right = [closure(2, 42), closure(3, 43), closure(5, 45), closure(6, 46)]
+    wrong = closure(4, 44, shift_m=3.0)
+    kept = _confirmed([*right[:2], wrong, *right[2:]], plain_keys(50), SETTINGS)
+    assert kept == right
+
+
+def test_a_lone_closure_is_dropped() -> None:
+    assert _confirmed([closure(2, 42)], plain_keys(50), SETTINGS) == []
+
+
+def test_the_graph_of_a_tiny_loop_has_the_least_squares_solution() -> None:
+    """Three steps of 1 m along a line and a closure that says 3.3: with equal weights the rest is shared out evenly."""
+    keys, sigma = plain_keys(4), SETTINGS.along_sigma
+    variance = 1e4 * np.diag([sigma**2, sigma**2, 1.0])  # so weak that the robust kernel stays quadratic
+    shift = 0.001
+    found = smoothed(keys, [Closure(0, 3, np.array([3.0 + shift, 0.0, 0.0]), variance)], SETTINGS)
+    weight = (1 / (1e4 * sigma**2)) / (1 / (1e4 * sigma**2) + 1 / (3 * sigma**2))
+    assert found[3, 0] - 3.0 == pytest.approx(shift * weight, rel=0.01)
+    assert np.diff(found[:, 0]) == pytest.approx(np.full(3, 1.0 + shift * weight / 3), abs=1e-9)
+
+
+def test_one_gross_closure_does_not_bend_the_graph() -> None:
+    right = [closure(k, k + 30) for k in range(20)]
+    found = smoothed(plain_keys(50), [*right, closure(10, 41, shift_m=15.0)], SETTINGS)
+    assert np.abs(found[:, 0] - np.arange(50.0)).max() < 0.1
+
+
+def test_without_closures_the_odometry_stands() -> None:
+    smoother = Smoother(SETTINGS)
+    for k in range(30):
+        smoother.keys.update(k, np.array([float(k), 0.0, 0.0]), np.ones((20, 3)), weak=False)
+    assert smoother.correction() is None
+
+
+def test_keys_are_a_metre_apart_and_remember_weakness() -> None:
+    keys = KeyScans(SETTINGS)
+    for k in range(101):
+        keys.update(k, np.array([0.1 * k, 0.0, 0.0]), np.ones((5, 3)), weak=k == 37)
+    places = np.array([key.pose[0] for key in keys.keys])
+    assert np.diff(places) == pytest.approx(1.0, abs=0.11)
+    assert [key.weak for key in keys.keys].count(True) == 1
+    assert keys.keys[-1].travelled_m == pytest.approx(places[-1])
