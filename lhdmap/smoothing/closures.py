@@ -26,6 +26,7 @@ _SEARCH_BEAMS = 120
 _CELL_M = 0.04
 _MODEL = MatchModel(noise_m=0.02, cutoff_sigmas=3.0, min_cells=3.0, coarse_noise=0.05, rounds=8)
 _STARTS = 3
+_MOST_UNEVEN = 10.0  # of the sigmas: noise of straight walls' directions looks like a little information along them
 
 
 class Closure(NamedTuple):
@@ -69,7 +70,7 @@ def _close(
     if result.support < settings.min_support:
         return None
     sigma = 1.0 / np.sqrt(np.maximum(marginal_information(result.information), 1e-12))
-    if sigma[:2].max() > settings.max_sigma_m:
+    if sigma[:2].max() > min(settings.max_sigma_m, _MOST_UNEVEN * sigma[:2].min()):
         return None
     covariance: FloatArray = np.linalg.inv(result.information).astype(np.float64)
     covariance += np.diag([0.01**2, 0.01**2, math.radians(0.05) ** 2])

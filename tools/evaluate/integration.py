@@ -108,7 +108,7 @@ def distances_to_mesh(points_m: FloatArray, mesh_file: Path) -> FloatArray:
 
     scene = o3d.t.geometry.RaycastingScene()
     scene.add_triangles(o3d.t.io.read_triangle_mesh(str(mesh_file)))
-    found: FloatArray = scene.compute_distance(o3d.core.Tensor(points_m.astype(np.float32))).numpy().astype(float)
+    found: FloatArray = scene.compute_distance(o3d.core.Tensor(points_m.astype(np.float32))).numpy().astype(float)  # type: ignore[call-overload]
     return found
 
 
