@@ -123,11 +123,14 @@ def _serve(recording: Path, arguments: argparse.Namespace, console: Console) -> 
     console.result({"recording": str(recording), "url": url}, f"open {url}  (Ctrl-C ends)")
     sys.stdout.flush()
     ports = ("--port", str(data_port), "--web-viewer-port", str(arguments.port))
-    done = subprocess.run(_viewer("--bind", host, "--serve-web", *ports, str(recording)), check=False)  # noqa: S603
-    if done.returncode != 0:
-        raise InputError(
-            f"the web viewer ended with code {done.returncode}; is port {arguments.port} in use? see --port"
-        )
+    with subprocess.Popen(_viewer("--bind", host, "--serve-web", *ports, str(recording))) as viewer:  # noqa: S603
+        try:
+            exit_code = viewer.wait()
+        finally:  # after Ctrl-C too, nothing serves any more once the command has ended
+            viewer.kill()
+            viewer.wait()
+    if exit_code != 0:
+        raise InputError(f"the web viewer ended with code {exit_code}; is port {arguments.port} in use? see --port")
     return 0
 
 
