@@ -14,7 +14,7 @@ STAMP := $(VENV)/.made-from-$(shell cat pyproject.toml <(pwd) | sha256sum | cut 
 export OMP_NUM_THREADS ?= 1
 export OPENBLAS_NUM_THREADS ?= 1
 
-.PHONY: help setup system demo test lint format config bench wheel clean
+.PHONY: help setup system demo test lint format config readme bench wheel clean
 
 help: ## List the targets
 	@sed -nE 's/^([a-z]+):.*## (.*)/  make \1\t\2/p' $(MAKEFILE_LIST) | expand -t 16
@@ -47,6 +47,10 @@ format: $(STAMP) ## Format the code
 
 config: $(STAMP) ## Write pipelines/default.toml anew from the settings in the code
 	$(BIN)/lhdmap config > pipelines/default.toml.new && mv pipelines/default.toml.new pipelines/default.toml
+
+readme: $(STAMP) ## Write the figures and pictures of README.md anew (needs chromium)
+	$(BIN)/python -m tools.readme_figures
+	$(BIN)/python -m tools.pictures
 
 bench: $(STAMP) ## Measure speed and memory
 	$(BIN)/python -m tools.bench
