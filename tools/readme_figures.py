@@ -44,6 +44,7 @@ def _figures(rows: list[dict[str, Any]], real: str, demo: dict[str, Any]) -> str
     ten = next(segment for segment in demo["evaluation"]["segments"] if segment["length_m"] == 10.0)
     wheels = _value(rows, WALLS, "smooth, tachometer", ": 10 m")
     cloud = (ROOT / "evaluation" / "integration.md").read_text(encoding="utf-8")
+    height = _cell(cloud, "largest error over the distance driven")
     exact, own, own_most = (
         _cell(cloud, row) for row in ("exact poses: median", "own odometry: median", "own odometry: p95")
     )
@@ -67,9 +68,10 @@ The project set itself targets for {len(judged)} of these figures; it meets {met
 0.1 s of lag. There the error over segments of 10 m is {ten["translation_pct"]:.2f} % (mean of {ten["n"]}), that of the end
 point {demo["evaluation"]["end_pct"]:.2f} % of the {demo["evaluation"]["distance_m"]:.0f} m driven.
 
-**Clouds** of such drives in space against the true surface ([table](evaluation/integration.md)): median distance {exact} with exact
-poses; with its own odometry over 60 m {own} (95 %: {own_most}); height error up to {_cell(cloud, "largest error over the distance driven")} of
-the distance.
+![Path and errors of the sample drive against its truth](docs/img/comparison.png)
+
+**Clouds** of such drives against the true surface ([table](evaluation/integration.md)): median distance {exact} with
+exact poses; with its own odometry over 60 m {own} (95 %: {own_most}); height error up to {height} of the distance.
 
 **Real logs** ([table and pictures](evaluation/real_logs.md)), default settings. Mean error of relations at most 60 s apart, for
 CSAIL of steps between corrected key scans:
