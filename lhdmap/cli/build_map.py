@@ -27,6 +27,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--topic", action="append", default=[], metavar="role=/topic", help="topic of a role, e.g. front=/scan"
     )
     parser.add_argument(
+        "--poses",
+        default="",
+        metavar="FILE.tum",
+        help="integrate with given poses: a TUM file, or ground-truth for those in the log",
+    )
+    parser.add_argument(
         "--machine", type=Path, metavar="FILE.toml", help="machine description (dimensions, bodies, mounts)"
     )
 
@@ -44,6 +50,7 @@ def run(arguments: argparse.Namespace, console: Console) -> int:
         topics=topic_overrides(arguments.topic),
         machine=load_machine(arguments.machine) if arguments.machine else None,
         progress=progress_of(console),
+        poses=arguments.poses,
     )
     result = build_map(request)
     for text in result.warnings:

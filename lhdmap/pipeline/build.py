@@ -21,6 +21,7 @@ from lhdmap.logs.source import LogSource
 from lhdmap.machine import Machine
 from lhdmap.mapfolder import MapFolderWriter, MapInfo
 from lhdmap.messages import Joints, LaserScan, Message, PointCloud
+from lhdmap.pipeline.given import given_rows
 from lhdmap.pipeline.mapping import MappingPipeline
 from lhdmap.pipeline.sweeps import SweepIntegration
 from lhdmap.pipeline.track import FinalTrack, Rows, resample, trajectory_of
@@ -38,7 +39,10 @@ Progress = Callable[[Iterable[tuple[str, Message]], float], Iterable[tuple[str, 
 
 @dataclass(frozen=True, slots=True)
 class BuildRequest:
-    """What is to be built: logs, the folder to make, settings, topics by role, the machine, how to show progress."""
+    """What is to be built: logs, the folder to make, settings, topics by role, the machine, how to show progress.
+
+    `poses`: given poses for the cloud and the final trajectory (`given.given_rows`); empty: the odometry's.
+    """
 
     logs: Sequence[Path]
     target: Path
@@ -46,6 +50,7 @@ class BuildRequest:
     topics: Mapping[str, str] = field(default_factory=dict)
     machine: Machine | None = None
     progress: Progress | None = None
+    poses: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,6 +70,7 @@ def build_map(request: BuildRequest) -> BuildResult:
         InputError: a log cannot be used, or holds no scan.
     """
     started = time.monotonic()
+    given = given_rows(request.poses, request.logs, request.topics) if request.poses else None
     with LogSource(list(request.logs), request.topics) as source, MapFolderWriter(request.target) as folder:
         hashes, pool = _hash_in_background(request.logs)
         with (
@@ -73,40 +79,58 @@ def build_map(request: BuildRequest) -> BuildResult:
         ):
             primary: Literal["front", "points"] = "front" if "front" in source.roles else "points"
             pipeline = MappingPipeline(request.settings, _machine(request, source), _sweep_sink(recording), primary)
-            _run(pipeline, source, request.progress)
-            outcome = _Outcome(request, source, pipeline, started)
+            interrupted = _run(pipeline, source, request.progress)
+            outcome = _Outcome(request, source, pipeline, started, given)
             _write(folder, outcome, recording)
+        if interrupted:  # what was finished is kept under the partial name
+            raise KeyboardInterrupt
         info = MapInfo(request.logs, settings_table(request.settings), outcome.summary, outcome.warnings)
         final = folder.complete(info, {path: future.result() for path, future in hashes.items()})
     summary = outcome.summary | {"map": str(final)} | _cost(started, outcome.duration_s)
     return BuildResult(final, summary, outcome.warnings, outcome.final)
 
 
-def _run(pipeline: MappingPipeline, source: LogSource, progress: Progress | None) -> None:
-    """Send all messages through the stages. After Ctrl-C the stages finish with what they have."""
+def _run(pipeline: MappingPipeline, source: LogSource, progress: Progress | None) -> bool:
+    """Send all messages through the stages; return whether Ctrl-C ended it: the stages then finish with what they have."""
+    interrupted = False
     messages: Iterable[tuple[str, Message]] = source.messages([role for role in ROLES_READ if role in source.roles])
     if progress is not None:
         messages = progress(messages, source.duration_s)
-    for role, message in messages:
-        pipeline.update(role, message)
+    try:
+        for role, message in messages:
+            pipeline.update(role, message)
+    except KeyboardInterrupt:
+        interrupted = True
     pipeline.finish()
     if not len(pipeline.track):
         damage = f" ({source.damage[0]})" if source.damage else ""
         raise InputError(f"{source.paths[0]}: no usable scan in it{damage}; lhdmap doctor tells what is wrong")
+    return interrupted
 
 
 class _Outcome:
     """Everything that the files of the map folder are made from."""
 
-    def __init__(self, request: BuildRequest, source: LogSource, pipeline: MappingPipeline, started: float) -> None:
+    def __init__(
+        self,
+        request: BuildRequest,
+        source: LogSource,
+        pipeline: MappingPipeline,
+        started: float,
+        given: Rows | None = None,
+    ) -> None:
         self.request, self.source, self.pipeline = request, source, pipeline
         records = pipeline.records
         stamps, times = np.array(records.stamps_ns, dtype=np.int64), np.array(records.times_ns, dtype=np.int64)
         rows = pipeline.track.rows()
         self.odometry = self.final = trajectory_of(resample(rows, times), stamps)
         self.cloud: Cloud
-        correction = pipeline.smoother.correction()
-        if correction is None:
+        correction = None if given is not None else pipeline.smoother.correction()
+        if given is not None:
+            rows = given
+            self.final = trajectory_of(resample(rows, times), stamps)
+            self.cloud = integrate_again(request, pipeline, rows)
+        elif correction is None:
             self.cloud = pipeline.sweeps.cloud()
         else:
             rows = Rows(rows.times_ns, corrected(rows.poses, rows.times_ns, correction))
@@ -149,7 +173,10 @@ class _Outcome:
 
 
 def integrate_again(request: BuildRequest, pipeline: MappingPipeline, rows: Rows) -> Cloud:
-    """Read the scans once more and integrate them at their final poses: closed loops have moved them."""
+    """Read the scans once more and integrate them at their final poses: closed loops have moved them, or they are given.
+
+    Sweeps before the first pose or after the last are left out.
+    """
     sweeps = SweepIntegration(request.settings, pipeline.machine, pipeline.mounts, None)
     wheels = WheelOdometry(request.settings.wheels, pipeline.machine or Machine())
     track, times = FinalTrack(rows), iter(pipeline.records.times_ns)
@@ -161,7 +188,8 @@ def integrate_again(request: BuildRequest, pipeline: MappingPipeline, rows: Rows
                 wheels.update(message)
             elif isinstance(message, (LaserScan, PointCloud)):
                 time_ns = next(times, message.stamp_ns) if role == "front" else message.stamp_ns
-                sweeps.add_final(role, time_ns, message, track, wheels)
+                if track.covers(time_ns):
+                    sweeps.add_final(role, time_ns, message, track, wheels)
     sweeps.wait()
     return sweeps.cloud()
 

@@ -98,6 +98,10 @@ class FinalTrack:
     def __init__(self, rows: Rows) -> None:
         self._rows = rows
 
+    def covers(self, time_ns: int) -> bool:
+        """Return whether a pose is known at this time (a fifth of a second beyond the ends counts)."""
+        return bool(self._rows.times_ns[0] - _CARRY_ON_NS <= time_ns <= self._rows.times_ns[-1] + _CARRY_ON_NS)
+
     def matrix_at(self, time_ns: int) -> FloatArray:
         """Return the pose (4, 4) at a time, held before the first and after the last."""
         row = resample_near(self._rows, time_ns)
