@@ -8,6 +8,7 @@ _FORGET = 0.01
 _PULL = 0.1
 _LONGEST_PERIODS = 12.0
 _LEARN_SCANS = 30
+_LEAST_S = 1e-6  # stamps nearer than this (made rising by a nanosecond) tell no time: a period has passed
 
 
 class ScanClock:
@@ -41,7 +42,7 @@ class ScanClock:
         self._learn(dt_s)
         if not self.bunched:
             self._smooth_s = now_s
-            return dt_s if dt_s > 0.0 else max(self._period_s, 0.0)
+            return dt_s if dt_s > _LEAST_S else max(self._period_s, 0.0)
         return self._steady(now_s)
 
     def _learn(self, dt_s: float) -> None:

@@ -46,6 +46,13 @@ def test_time_never_runs_backwards(gaps_ns: list[int]) -> None:
         assert step >= 0.0
 
 
+def test_stamps_made_rising_by_a_nanosecond_tell_no_time() -> None:
+    """A log whose stamps ran backwards has them: the scans are a period apart all the same."""
+    clock, stamps = ScanClock(), [START_NS + k * PERIOD_NS for k in range(100)]
+    stamps += [stamps[-1] + 1, stamps[-1] + 2]
+    assert [clock.step(stamp) for stamp in stamps][-2:] == pytest.approx([0.04, 0.04], rel=0.1)
+
+
 def processed_m(speed_mps: float, rate_hz: float) -> float:
     """Return the mean distance between processed scans at constant speed."""
     rate = AdaptiveRate(OdometrySettings())
