@@ -23,7 +23,7 @@ _FEWEST_HITS = 10
 _HEADING_AXIS = np.diag([0.0, 0.0, 1.0])
 _JUMP_PRIOR = 0.01
 _DOUBT_SCANS = (
-    25  # that are flagged after a pose that the motion did not foretell: a jump, or someone beside the machine
+    12  # that are flagged after a pose that the motion did not foretell: a jump, or someone beside the machine
 )
 _SURPRISE = 3.5  # sigmas from the prediction
 _USUAL_RESIDUAL = 0.75  # weighted rms in sigmas that matches have whose noise is stated rightly
@@ -76,9 +76,9 @@ class AnchoredMatcher:
         travelled = float(np.hypot(*(self._motion.pose[:2] - before[:2])))
         self._motion.forget(1.0 - math.exp(-travelled / self._anchor.memory_m))
         self._grow(points)
-        information = np.zeros((3, 3)) if self._doubt > 0 else result.information
-        self._doubt = max(self._doubt - 1, 0)
-        return Matched(information, result.residual_sigmas * self._noise_m, result.support, lost=False)
+        doubtful, self._doubt = self._doubt > 0, max(self._doubt - 1, 0)
+        residual_m = result.residual_sigmas * self._noise_m
+        return Matched(result.information, residual_m, result.support, lost=False, doubtful=doubtful)
 
     def _match(self, points: FloatArray, heading: tuple[float, float]) -> Match:
         """Match from the prediction (and a heading with its information); where that does not fit, search widely."""

@@ -111,7 +111,7 @@ class PlanarOdometry:
                 stamp_ns, time_ns, pose, covariance, velocity, np.zeros(3), math.nan, math.nan, False, "", False, False
             )
         information = marginal_information(body_information(matched.information, pose[2]))
-        weak = self._weak(information) or matched.lost
+        weak = self._weak(information) or matched.lost or matched.doubtful
         substitute = ("wheels" if self._wheels_used else "motion") if weak else ""
         return OdometryStep(
             stamp_ns,

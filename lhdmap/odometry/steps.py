@@ -28,14 +28,15 @@ class WheelStep(NamedTuple):
 class Matched(NamedTuple):
     """What a matcher says of one scan.
 
-    `information` (3, 3) of the scan alone in `odom` axes, residual, share of hits that agree, and whether the scan could not
-    be placed (the pose is then the prediction).
+    `information` (3, 3) of the scan alone in `odom` axes, residual, share of hits that agree, whether the scan could not be
+    placed (the pose is then the prediction), and whether it was placed where the motion did not foretell it.
     """
 
     information: FloatArray
     residual_m: float
     support: float
     lost: bool
+    doubtful: bool = False
 
 
 class OdometryStep(NamedTuple):
