@@ -22,9 +22,10 @@ _LOST_BEFORE_RESTART = 5
 _FEWEST_HITS = 10
 _HEADING_AXIS = np.diag([0.0, 0.0, 1.0])
 _JUMP_PRIOR = 0.01
-_DOUBT_SCANS = (
-    12  # that are flagged after a pose that the motion did not foretell: a jump, or someone beside the machine
-)
+# Scans that are flagged after a pose that the motion did not foretell: a jump, or someone beside the machine.
+_DOUBT_SCANS = 25
+_DOUBTFUL_SUPPORT = 0.58  # walls alone give 0.8 and more: less may be a crowd that moves along
+_SPINNING_RPS = 2.0  # no machine turns so fast: after a jump to such a speed the one before it stands
 _SURPRISE = 3.5  # sigmas from the prediction
 _USUAL_RESIDUAL = 0.75  # weighted rms in sigmas that matches have whose noise is stated rightly
 _NOISE_GAIN = 0.05
@@ -57,6 +58,7 @@ class AnchoredMatcher:
         self._layered = False
         self._noise_scale = 1.0
         self._doubt = 0
+        self._jumped = False
 
     def step(self, points: FloatArray, T_base_scanner: FloatArray) -> Matched:
         """Match points (N, 3), level base frame with absolute heights, at the predicted pose; correct the motion, grow the map."""
@@ -66,17 +68,21 @@ class AnchoredMatcher:
         if self._inserted is None:
             return self._begin(points, T_base_scanner)
         heading = self._young_heading(points, T_base_scanner)
-        before = self._motion.pose
+        before, velocity = self._motion.pose, self._motion.velocity
+        self._jumped = False
         result = self._match(points, heading)
         if result.support < self._anchor.min_support:
             return self._lose(points, T_base_scanner, result.support)
         self._lost_in_a_row = 0
         self._learn_noise(result.residual_sigmas)
         self._motion.correct(result.pose, result.information + heading[1] * _HEADING_AXIS)
+        if self._jumped and abs(self._motion.velocity[2]) > _SPINNING_RPS:
+            self._motion.distrust_velocity(velocity)
         travelled = float(np.hypot(*(self._motion.pose[:2] - before[:2])))
         self._motion.forget(1.0 - math.exp(-travelled / self._anchor.memory_m))
         self._grow(points)
-        doubtful, self._doubt = self._doubt > 0, max(self._doubt - 1, 0)
+        doubtful = self._doubt > 0 or result.support < _DOUBTFUL_SUPPORT
+        self._doubt = max(self._doubt - 1, 0)
         residual_m = result.residual_sigmas * self._noise_m
         return Matched(result.information, residual_m, result.support, lost=False, doubtful=doubtful)
 
@@ -103,7 +109,7 @@ class AnchoredMatcher:
         for start in starts[(np.abs(starts) < 1e29).all(axis=1)]:
             found = match(self._map, points, self._layered, predicted, _JUMP_PRIOR * prior, start, self._model)
             if found.support > result.support + 0.02:
-                result, self._doubt = found, _DOUBT_SCANS
+                result, self._doubt, self._jumped = found, _DOUBT_SCANS, True
         return result
 
     def _freed(self, points: FloatArray, result: Match, predicted: FloatArray, prior: FloatArray) -> Match:

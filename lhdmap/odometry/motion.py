@@ -17,6 +17,7 @@ _GATE_SIGMAS = 4.0
 _SLIP_S, _DISSENT_S = 3.0, 0.5
 _LONGEST_STEP_S = 1.0
 _STARTING_VARIANCE = np.diag([0.2**2, 0.05**2, 0.05**2])  # of a starting velocity from a dry run
+_DISTRUSTED_VARIANCE = np.diag([3.0**2, 0.3**2, 2.0**2])
 _GAP_VARIANCE = np.diag([4.0, 0.1, 0.5])
 
 
@@ -83,6 +84,13 @@ class Motion:
     def correct(self, matched: FloatArray, information: FloatArray) -> None:
         """Take over the matched pose (3,), found under the prior, with the match's own `information` (3, 3)."""
         motion_filter.update_pose(self.state, self.P, matched, information)
+
+    def distrust_velocity(self, velocity: FloatArray) -> None:
+        """Go on with this velocity (3,), hardly known: that of a jump is not the machine's and would run away."""
+        self.state[FORWARD : TURNING + 1] = velocity
+        self.P[FORWARD : TURNING + 1, :] = 0.0
+        self.P[:, FORWARD : TURNING + 1] = 0.0
+        self.P[FORWARD : TURNING + 1, FORWARD : TURNING + 1] = _DISTRUSTED_VARIANCE
 
     def forget(self, share: float) -> None:
         """Shrink the pose's uncertainty by a share: what it is relative to was renewed."""
