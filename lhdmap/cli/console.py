@@ -65,6 +65,7 @@ class _Meter:
         self._calls = 0
 
     def at(self, done: float) -> None:
+        """Tell how much is behind; prints only when the interval is over."""
         self._calls += 1
         if self._calls & 63:
             return
