@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -11,10 +10,11 @@ import numpy as np
 import numpy.typing as npt
 
 from lhdmap.errors import InputError
+from lhdmap.integration.batch import BatchMaker, BatchPoses, BatchRoom, Scans, alike, project_scans, size_of
 from lhdmap.integration.beams import sweep_stamps_ns, table_of
 from lhdmap.integration.cloud import Cloud
 from lhdmap.integration.normals import estimate_normals
-from lhdmap.integration.project import Counts, Limits, SweepPoints, SweepPoses, project_cloud, project_scan
+from lhdmap.integration.project import Counts, Limits, SweepPoses, project_cloud
 from lhdmap.integration.self_filter import Rig, rig_of
 from lhdmap.integration.voxel_grid import VoxelGrid
 from lhdmap.machine import Machine
@@ -89,7 +89,7 @@ class Integrator:
         self.totals = IntegrationTotals()
         self._machine = machine
         self._rigs: dict[str, Rig] = {}
-        self._room = SweepPoints.of_size(0)
+        self._maker = BatchMaker()
         for mount in mounts:
             self.add_mount(mount)
 
@@ -109,16 +109,18 @@ class Integrator:
         Raises:
             InputError: the sensor's frame has no mount.
         """
-        rig = self._rig(message.frame_id)
-        poses = _plain(poses)
-        if not _finite(poses):
-            self.totals.refused_sweeps += 1
-            return Integrated(self._room.points_map[:0], Counts(0, 0, 0, 0))
-        counts = self._project(message, poses, rig)
-        points = self._room.points_map[: counts.kept]
-        self.grid.add(points, self._room.stamps_ns[: counts.kept], self._room.viewpoint_map)
-        self._count(counts)
-        return Integrated(points, counts)
+        return self.update_all([message], BatchPoses.of([poses]))[0]
+
+    def update_all(self, messages: Sequence[LaserScan | PointCloud], poses: BatchPoses) -> list[Integrated]:
+        """Add many sweeps, in this order, as `update` does one; most of the work is one call for each scanner."""
+        room, finite = self._maker.room(messages), poses.finite()
+        for group in alike(messages, np.flatnonzero(finite).tolist()):
+            self._project(messages, np.array(group), poses, room)
+        rows = room.starts, np.ascontiguousarray(room.counts[:, 0])
+        self.grid.add_sweeps(room.points_map, room.stamps_ns, rows, room.viewpoints_map)
+        self._count(int(np.count_nonzero(finite)), len(messages), Counts(*room.counts.sum(axis=0).tolist()))
+        found = zip(room.starts.tolist(), room.counts.tolist(), strict=True)
+        return [Integrated(room.points_map[start : start + count[0]], Counts(*count)) for start, count in found]
 
     def cloud(self) -> Cloud:
         """Return the map so far with normals and curvature, stray voxels left out."""
@@ -139,38 +141,42 @@ class Integrator:
                 "a transform on /tf_static or a mount in the dataset or machine file was wanted"
             ) from None
 
-    def _project(self, message: LaserScan | PointCloud, poses: SweepPoses, rig: Rig) -> Counts:
-        low_m, high_m = self.settings.range_min_m, self.settings.range_max_m
-        span_ns = sweep_stamps_ns(message)
-        size = len(message.ranges_m if isinstance(message, LaserScan) else message.points_m)
-        if len(self._room.stamps_ns) < size:
-            self._room = SweepPoints.of_size(size)
+    def _project(
+        self,
+        messages: Sequence[LaserScan | PointCloud],
+        places: npt.NDArray[np.int64],
+        poses: BatchPoses,
+        room: BatchRoom,
+    ) -> None:
+        """Project a group (`batch.alike`) into the map."""
+        group = [messages[place] for place in places]
+        message, rig, limits = group[0], self._rig(group[0].frame_id), self._limits(group[0])
+        spans = [sweep_stamps_ns(one) for one in group]
         if isinstance(message, LaserScan):
-            low_m, high_m = max(low_m, float(message.range_min_m)), min(high_m, float(message.range_max_m))
-            limits = Limits(low_m, high_m, self.settings.stray_m, self.settings.stray_share)
-            ranges = _readonly(message.ranges_m)
-            return Counts(*project_scan(ranges, table_of(message), limits, span_ns, poses, rig, self._room))
+            ranges = np.array([one.ranges_m for one in group if isinstance(one, LaserScan)], dtype=np.float32)
+            scans = Scans(places, ranges, np.array(spans, dtype=np.int64))
+            project_scans(scans, table_of(message), limits, poses, rig, room)
+            return
+        place = int(places[0])
         cloud, offsets = _readonly(message.points_m), _readonly(message.time_offsets_s)
-        return Counts(*project_cloud(cloud, offsets, Limits(low_m, high_m), span_ns, poses, rig, self._room))
+        out = room.of_sweep(place, size_of(message))
+        room.counts[place] = project_cloud(cloud, offsets, limits, spans[0], poses.at(place), rig, out)
 
-    def _count(self, counts: Counts) -> None:
+    def _limits(self, message: LaserScan | PointCloud) -> Limits:
+        s = self.settings
+        if not isinstance(message, LaserScan):
+            return Limits(s.range_min_m, s.range_max_m)
+        low_m, high_m = max(s.range_min_m, float(message.range_min_m)), min(s.range_max_m, float(message.range_max_m))
+        return Limits(low_m, high_m, s.stray_m, s.stray_share)
+
+    def _count(self, taken: int, given: int, counts: Counts) -> None:
         totals = self.totals
-        totals.sweeps += 1
+        totals.sweeps += taken
+        totals.refused_sweeps += given - taken
         totals.kept += counts.kept
         totals.no_return += counts.no_return
         totals.self_hits += counts.self_hits
         totals.strays += counts.strays
-
-
-def _plain(poses: SweepPoses) -> SweepPoses:
-    """Return the poses with the types that the kernels were compiled for."""
-    start, end = (np.ascontiguousarray(T, dtype=np.float64) for T in poses[:2])
-    return SweepPoses(start, end, float(poses.articulation_start_rad), float(poses.articulation_end_rad))
-
-
-def _finite(poses: SweepPoses) -> bool:
-    total = poses.T_map_base_start.sum() + poses.T_map_base_end.sum()
-    return math.isfinite(total + poses.articulation_start_rad + poses.articulation_end_rad)
 
 
 def _readonly(array: npt.NDArray[np.float32]) -> npt.NDArray[np.float32]:

@@ -32,6 +32,9 @@ MASK = (1 << BITS) - 1
 BLOCK = 8192  # points added between two looks at the table's load
 
 
+Rows = tuple[npt.NDArray[np.int64], npt.NDArray[np.int64]]  # of each sweep: first row, number of rows
+
+
 class Table(NamedTuple):
     """Open addressing: `keys` (C,) int64, `slots` (C,) int32 into `voxels` (M,); C is a power of two."""
 
@@ -74,15 +77,24 @@ class VoxelGrid:
         """
         points = np.ascontiguousarray(points_map, dtype=np.float64)
         stamps = np.ascontiguousarray(stamps_ns, dtype=np.int64)
-        viewpoint = np.ascontiguousarray(viewpoint_map, dtype=np.float64)
+        viewpoints = np.ascontiguousarray(viewpoint_map, dtype=np.float64).reshape(1, 3)
         refused = 0
         for start in range(0, len(points), BLOCK):
-            block = points[start : start + BLOCK]
-            self._make_room(len(block))
-            self._count, bad = insert(
-                self._table, self._count, self.size_m, block, stamps[start : start + BLOCK], viewpoint
-            )
-            refused += bad
+            rows = np.array([start]), np.array([min(BLOCK, len(points) - start)])
+            refused += self.add_sweeps(points, stamps, rows, viewpoints)
+        return refused
+
+    def add_sweeps(
+        self, points_map: FloatArray, stamps_ns: npt.NDArray[np.int64], rows: Rows, viewpoints_map: FloatArray
+    ) -> int:
+        """Add the points of S sweeps, each a run of rows of the arrays (P, 3) and (P,), seen from viewpoints (S, 3).
+
+        Returns how many points were refused, as `add`.
+        """
+        self._make_room(int(rows[1].sum()))
+        self._count, refused = insert_sweeps(
+            self._table, self._count, self.size_m, points_map, stamps_ns, rows, viewpoints_map
+        )
         self.refused += refused
         return refused
 
@@ -178,6 +190,25 @@ def insert(
         voxel.hits += 1
         voxel.first_ns = min(voxel.first_ns, stamps_ns[i])
         voxel.last_ns = max(voxel.last_ns, stamps_ns[i])
+    return count, refused
+
+
+@nb.njit(cache=True, nogil=True)
+def insert_sweeps(
+    table: Table,
+    count: int,
+    size_m: FloatArray,
+    points: FloatArray,
+    stamps_ns: npt.NDArray[np.int64],
+    rows: Rows,
+    viewpoints: FloatArray,
+) -> tuple[int, int]:
+    """Add the points of many sweeps, sweep by sweep, as `insert` does; return (voxels now, points refused)."""
+    refused = 0
+    for k in range(rows[0].shape[0]):
+        first, end = rows[0][k], rows[0][k] + rows[1][k]
+        count, bad = insert(table, count, size_m, points[first:end], stamps_ns[first:end], viewpoints[k])
+        refused += bad
     return count, refused
 
 

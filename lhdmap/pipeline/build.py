@@ -190,7 +190,7 @@ def integrate_again(request: BuildRequest, pipeline: MappingPipeline, rows: Rows
                 time_ns = next(times, message.stamp_ns) if role == "front" else message.stamp_ns
                 if track.covers(time_ns):
                     sweeps.add_final(role, time_ns, message, track, wheels)
-    sweeps.wait()
+    sweeps.wait(track, wheels)
     return sweeps.cloud()
 
 

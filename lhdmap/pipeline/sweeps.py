@@ -6,12 +6,15 @@ from collections import deque
 from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
 
 from lhdmap.config import Settings
+from lhdmap.integration.batch import BatchPoses, size_of
 from lhdmap.integration.beams import sweep_stamps_ns
 from lhdmap.integration.cloud import Cloud
 from lhdmap.integration.integrator import Integrator
-from lhdmap.integration.project import SweepPoses
 from lhdmap.machine import Machine
 from lhdmap.messages import FloatArray, LaserScan, PointCloud
 from lhdmap.pipeline.mounts import Mounts
@@ -19,7 +22,17 @@ from lhdmap.pipeline.track import FinalTrack, Track
 from lhdmap.proprioception.wheels import WheelOdometry
 
 ScanSink = Callable[[str, int, FloatArray], None]
-_MOST_PENDING = 64  # sweeps handed over and not yet done: bounds the memory
+_BATCH_POINTS = 20_000  # sweeps are handed over together: switching between threads costs more than a small sweep
+_MOST_PENDING = 3  # batches handed over and not yet done: bounds the memory
+
+
+class _Sweep(NamedTuple):
+    """A sweep on its way, with the times at which its poses are wanted."""
+
+    role: str
+    start_ns: int
+    end_ns: int
+    message: LaserScan | PointCloud
 
 
 class SweepIntegration:
@@ -30,38 +43,41 @@ class SweepIntegration:
         self.integrator = Integrator(settings.integration, (), bodies)
         self._mounts = mounts
         self._on_sweep = on_sweep
-        self._held: dict[str, deque[tuple[int, LaserScan | PointCloud]]] = {}
+        self._held: dict[str, deque[_Sweep]] = {}
+        self._batch: list[_Sweep] = []
+        self._points = 0
         self._worker = ThreadPoolExecutor(max_workers=1, thread_name_prefix="integration")
         self._pending: deque[Future[None]] = deque()
 
-    def hold(self, role: str, time_ns: int, sweep: LaserScan | PointCloud) -> None:
+    def hold(self, role: str, time_ns: int, message: LaserScan | PointCloud) -> None:
         """Keep a sweep until the track has passed it; `time_ns` is its stamp made rising."""
-        self._held.setdefault(role, deque()).append((time_ns, sweep))
+        self._held.setdefault(role, deque()).append(_sweep(role, time_ns, message))
 
     def advance(self, track: Track, wheels: WheelOdometry) -> None:
         """Hand over the sweeps that end before the newest pose."""
         last_ns = track.last_ns
         if last_ns is None:
             return
-        for role, held in self._held.items():
-            while held and held[0][0] + _length_ns(held[0][1]) <= last_ns:
-                self._hand_over(role, *held.popleft(), track, wheels)
+        for held in self._held.values():
+            while held and held[0].end_ns <= last_ns:
+                self._add(held.popleft(), track, wheels)
 
     def finish(self, track: Track, wheels: WheelOdometry) -> None:
         """Integrate all that is held, its motion carried on after the last pose, and wait for the worker."""
-        for role, held in self._held.items():
+        for held in self._held.values():
             while held and len(track):
-                self._hand_over(role, *held.popleft(), track, wheels)
-        self.wait()
+                self._add(held.popleft(), track, wheels)
+        self.wait(track, wheels)
 
     def add_final(
-        self, role: str, time_ns: int, sweep: LaserScan | PointCloud, track: FinalTrack, wheels: WheelOdometry
+        self, role: str, time_ns: int, message: LaserScan | PointCloud, track: FinalTrack, wheels: WheelOdometry
     ) -> None:
-        """Integrate a sweep at once: the path is known to its end."""
-        self._hand_over(role, time_ns, sweep, track, wheels)
+        """Integrate a sweep soon: the path is known to its end."""
+        self._add(_sweep(role, time_ns, message), track, wheels)
 
-    def wait(self) -> None:
-        """Wait until all that was handed over is in the cloud."""
+    def wait(self, track: Track | FinalTrack, wheels: WheelOdometry) -> None:
+        """Wait until all that was given is in the cloud."""
+        self._hand_over(track, wheels)
         while self._pending:
             self._pending.popleft().result()
         self._worker.shutdown()
@@ -70,27 +86,34 @@ class SweepIntegration:
         """Return the cloud with normals and curvature; after `finish`."""
         return self.integrator.cloud()
 
-    def _hand_over(
-        self, role: str, time_ns: int, sweep: LaserScan | PointCloud, track: Track | FinalTrack, wheels: WheelOdometry
-    ) -> None:
-        if not self.integrator.knows(sweep.frame_id):
-            self.integrator.add_mount(self._mounts.of(sweep.frame_id, role))
-        length_ns = _length_ns(sweep)
-        T_start, angle = track.matrix_at(time_ns), wheels.articulation_at(time_ns) or 0.0
-        poses = SweepPoses(T_start, T_start, angle, angle)
-        if length_ns != 0:
-            end_ns = time_ns + length_ns
-            poses = SweepPoses(T_start, track.matrix_at(end_ns), angle, wheels.articulation_at(end_ns) or 0.0)
-        self._pending.append(self._worker.submit(self._integrate, role, sweep, poses))
+    def _add(self, sweep: _Sweep, track: Track | FinalTrack, wheels: WheelOdometry) -> None:
+        frame = sweep.message.frame_id
+        if not self.integrator.knows(frame):
+            self.integrator.add_mount(self._mounts.of(frame, sweep.role))
+        self._batch.append(sweep)
+        self._points += size_of(sweep.message)
+        if self._points >= _BATCH_POINTS:
+            self._hand_over(track, wheels)
+
+    def _hand_over(self, track: Track | FinalTrack, wheels: WheelOdometry) -> None:
+        """Give the batch to the worker, with the poses at the ends of its sweeps."""
+        batch, self._batch, self._points = self._batch, [], 0
+        if not batch:
+            return
+        ends = np.array([(sweep.start_ns, sweep.end_ns) for sweep in batch], dtype=np.int64)
+        T, angles = track.matrices_at(ends.ravel()), np.nan_to_num(wheels.articulations_at(ends.ravel()))
+        poses = BatchPoses(T.reshape(-1, 2, 4, 4), angles.reshape(-1, 2))
+        self._pending.append(self._worker.submit(self._integrate, batch, poses))
         while len(self._pending) > _MOST_PENDING:
             self._pending.popleft().result()
 
-    def _integrate(self, role: str, sweep: LaserScan | PointCloud, poses: SweepPoses) -> None:
-        done = self.integrator.update(sweep, poses)
+    def _integrate(self, batch: list[_Sweep], poses: BatchPoses) -> None:
+        done = self.integrator.update_all([sweep.message for sweep in batch], poses)
         if self._on_sweep is not None:
-            self._on_sweep(role, sweep.stamp_ns, done.points_map)
+            for sweep, integrated in zip(batch, done, strict=True):
+                self._on_sweep(sweep.role, sweep.message.stamp_ns, integrated.points_map)
 
 
-def _length_ns(sweep: LaserScan | PointCloud) -> int:
-    start_ns, end_ns = sweep_stamps_ns(sweep)
-    return end_ns - start_ns
+def _sweep(role: str, time_ns: int, message: LaserScan | PointCloud) -> _Sweep:
+    start_ns, end_ns = sweep_stamps_ns(message)
+    return _Sweep(role, time_ns, time_ns + end_ns - start_ns, message)

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import math
+from bisect import bisect_left
 from typing import NamedTuple
 
+import numba as nb
 import numpy as np
 import numpy.typing as npt
 
@@ -14,6 +16,7 @@ from lhdmap.trajectory import Trajectory
 
 Stamps = npt.NDArray[np.int64]
 _CARRY_ON_NS = 2e8
+_MOST_CARRIED = 3.0  # a growing track's last step goes on for up to two of its lengths
 
 
 class Rows(NamedTuple):
@@ -73,19 +76,11 @@ class Track:
         self._times.append(time_ns)
         self._poses.append((*(float(v) for v in T_odom_base[:3, 3]), roll, pitch, heading))
 
-    def matrix_at(self, time_ns: int) -> FloatArray:
-        """Return the pose (4, 4) at a time near the end of the track, linear between poses and carried on after the last."""
-        k = len(self._times) - 1
-        while k > 0 and self._times[k - 1] >= time_ns:
-            k -= 1
-        if k == 0:
-            row = self._poses[0]
-        else:
-            before, after = np.array(self._poses[k - 1]), np.array(self._poses[k])
-            span = self._times[k] - self._times[k - 1]
-            share = min((time_ns - self._times[k - 1]) / span, 3.0) if span > 0 else 1.0
-            row = tuple(before + share * (after - before))
-        return se3.from_rpy(row[3], row[4], row[5], (row[0], row[1], row[2]))
+    def matrices_at(self, times_ns: Stamps) -> FloatArray:
+        """Return poses (N, 4, 4) near the end of the track, linear between poses and carried on after the last."""
+        first = max(bisect_left(self._times, int(times_ns.min(initial=self._times[-1]))) - 1, 0)
+        times = np.array(self._times[first:], dtype=np.int64)
+        return _matrices(times, np.array(self._poses[first:], dtype=float), times_ns, _MOST_CARRIED)
 
     def rows(self) -> Rows:
         """Return all poses as columns."""
@@ -102,20 +97,37 @@ class FinalTrack:
         """Return whether a pose is known at this time (a fifth of a second beyond the ends counts)."""
         return bool(self._rows.times_ns[0] - _CARRY_ON_NS <= time_ns <= self._rows.times_ns[-1] + _CARRY_ON_NS)
 
-    def matrix_at(self, time_ns: int) -> FloatArray:
-        """Return the pose (4, 4) at a time, held before the first and after the last."""
-        row = resample_near(self._rows, time_ns)
-        return se3.from_rpy(row[3], row[4], row[5], (row[0], row[1], row[2]))
+    def matrices_at(self, times_ns: Stamps) -> FloatArray:
+        """Return poses (N, 4, 4) at any times, held before the first and after the last."""
+        return _matrices(self._rows.times_ns, self._rows.poses, times_ns, 1.0)
 
 
-def resample_near(rows: Rows, time_ns: int) -> FloatArray:
-    """Return one pose (6,) at a time, linear between rows."""
-    after = int(np.searchsorted(rows.times_ns, time_ns))
-    if after == 0 or after == len(rows.times_ns):
-        return rows.poses[min(after, len(rows.times_ns) - 1)]
-    before_ns = int(rows.times_ns[after - 1])
-    share = (time_ns - before_ns) / (int(rows.times_ns[after]) - before_ns)
-    return rows.poses[after - 1] + share * (rows.poses[after] - rows.poses[after - 1])
+@nb.njit(cache=True, nogil=True)
+def _matrices(times_ns: Stamps, poses: FloatArray, at_ns: Stamps, most_share: float) -> FloatArray:
+    """Return the poses (N, 4, 4) at `at_ns` (N,) between rows (M,), (M, 6).
+
+    The first row is held before it; the last step goes on up to `most_share` times its length.
+    """
+    out = np.zeros((at_ns.shape[0], 4, 4))
+    for n in range(at_ns.shape[0]):
+        after = min(np.searchsorted(times_ns, at_ns[n]), times_ns.shape[0] - 1)
+        row = poses[after]
+        if after > 0:
+            share = (at_ns[n] - times_ns[after - 1]) / (times_ns[after] - times_ns[after - 1])
+            row = poses[after - 1] + min(share, most_share) * (poses[after] - poses[after - 1])
+        _write_pose(row, out[n])
+    return out
+
+
+@nb.njit(cache=True, nogil=True)
+def _write_pose(row: FloatArray, out: FloatArray) -> None:
+    """Write the matrix of x, y, z, roll, pitch, heading: `se3.from_rpy` for kernels."""
+    cr, sr, cp, sp = math.cos(row[3]), math.sin(row[3]), math.cos(row[4]), math.sin(row[4])
+    cy, sy = math.cos(row[5]), math.sin(row[5])
+    out[0, 0], out[0, 1], out[0, 2], out[0, 3] = cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr, row[0]
+    out[1, 0], out[1, 1], out[1, 2], out[1, 3] = sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr, row[1]
+    out[2, 0], out[2, 1], out[2, 2], out[2, 3] = -sp, cp * sr, cp * cr, row[2]
+    out[3, 3] = 1.0
 
 
 def resample(rows: Rows, times_ns: Stamps) -> Rows:

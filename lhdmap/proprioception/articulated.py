@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numba as nb
 import numpy as np
@@ -10,12 +11,14 @@ import numpy.typing as npt
 
 from lhdmap.messages import FloatArray
 
+# These kernels take microseconds: to release the interpreter's lock would cost more than they do.
 STEP_NS = 10_000_000  # of the integration: 7 cm at 24 km/h
-Samples = tuple[npt.NDArray[np.int64], FloatArray]
+Stamps = npt.NDArray[np.int64]
+Samples = tuple[Stamps, FloatArray]
 
 
-@nb.njit(cache=True, nogil=True)
-def interpolate(stamps_ns: npt.NDArray[np.int64], values: FloatArray, at_ns: int) -> float:
+@nb.njit(cache=True)
+def interpolate(stamps_ns: Stamps, values: FloatArray, at_ns: int) -> float:
     """Return the value at a time by linear interpolation; before the first and after the last sample these are held."""
     after = np.searchsorted(stamps_ns, at_ns)
     if after == 0:
@@ -26,7 +29,47 @@ def interpolate(stamps_ns: npt.NDArray[np.int64], values: FloatArray, at_ns: int
     return values[after - 1] + share * (values[after] - values[after - 1])
 
 
-@nb.njit(cache=True, nogil=True)
+@nb.njit(cache=True)
+def value_at(stamps_ns: Stamps, values: FloatArray, at_ns: int, limits_ns: tuple[int, int]) -> float:
+    """Return the value at a time, NaN where the samples do not cover it; `limits_ns`: gap and hold as in `covered`."""
+    return interpolate(stamps_ns, values, at_ns) if covered(stamps_ns, (at_ns, at_ns), *limits_ns) else math.nan
+
+
+@nb.njit(cache=True)
+def values_at(stamps_ns: Stamps, values: FloatArray, at_ns: Stamps, limits_ns: tuple[int, int]) -> FloatArray:
+    """Return the values at many times, shape (M,), each as `value_at`."""
+    out = np.empty(at_ns.shape[0])
+    for m in range(at_ns.shape[0]):
+        out[m] = value_at(stamps_ns, values, at_ns[m], limits_ns)
+    return out
+
+
+class DriveErrors(NamedTuple):
+    """What is believed of the sensors, standard deviations.
+
+    A constant error of the articulation (rad), its noise as it turns the front body (rad), scale (1) and noise (m/s) of the
+    tachometer, side slip (m/m).
+    """
+
+    articulation_rad: float
+    heading_noise_rad: float
+    scale: float
+    speed_mps: float
+    side_slip: float
+
+
+@nb.njit(cache=True)
+def drive(
+    speed: Samples, articulation: Samples, span_ns: tuple[int, int], lengths_m: tuple[float, float], errors: DriveErrors
+) -> tuple[FloatArray, FloatArray]:
+    """Return the motion of `integrate_motion`, shape (3,), and its covariance, shape (3, 3)."""
+    delta, path_m, lever = integrate_motion(speed, articulation, span_ns, lengths_m)
+    heading = math.hypot(lever * errors.articulation_rad, errors.heading_noise_rad)
+    along = math.hypot(errors.scale * path_m, errors.speed_mps * (span_ns[1] - span_ns[0]) / 1e9)
+    return delta, motion_covariance(along, errors.side_slip * path_m, heading, delta)
+
+
+@nb.njit(cache=True)
 def integrate_motion(
     speed: Samples, articulation: Samples, span_ns: tuple[int, int], lengths_m: tuple[float, float]
 ) -> tuple[FloatArray, float, float]:
@@ -64,8 +107,8 @@ def integrate_motion(
     return pose, path, abs(lever)
 
 
-@nb.njit(cache=True, nogil=True)
-def covered(stamps_ns: npt.NDArray[np.int64], span_ns: tuple[int, int], gap_ns: int, hold_ns: int) -> bool:
+@nb.njit(cache=True)
+def covered(stamps_ns: Stamps, span_ns: tuple[int, int], gap_ns: int, hold_ns: int) -> bool:
     """Return whether samples go from start to end of a span without a long gap; those at the ends hold for a while."""
     n = stamps_ns.shape[0]
     if n == 0 or span_ns[0] < stamps_ns[0] - hold_ns or span_ns[1] > stamps_ns[n - 1] + hold_ns:
@@ -84,7 +127,7 @@ def covered(stamps_ns: npt.NDArray[np.int64], span_ns: tuple[int, int], gap_ns: 
     return True
 
 
-@nb.njit(cache=True, nogil=True)
+@nb.njit(cache=True)
 def motion_covariance(along_m: float, across_m: float, heading_rad: float, delta: FloatArray) -> FloatArray:
     """Return the covariance, shape (3, 3), of a motion (3,) from three independent errors, standard deviations.
 

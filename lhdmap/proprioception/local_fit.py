@@ -10,10 +10,11 @@ import numpy.typing as npt
 
 from lhdmap.messages import FloatArray
 
+# No nogil: one moment takes microseconds, to release the interpreter's lock would cost more.
 Stamps = npt.NDArray[np.int64]
 
 
-@nb.njit(cache=True, nogil=True)
+@nb.njit(cache=True)
 def fit_at(
     stamps_ns: Stamps, rows: FloatArray, at_ns: Stamps, half_window_s: float, max_gap_s: float, rate_s: float
 ) -> tuple[FloatArray, FloatArray]:
@@ -46,13 +47,14 @@ def fit_at(
         values[m] = 0.0
         square = 0.0
         for i in range(weights.shape[0]):
-            values[m] += weights[i] * rows[first + i]
+            for column in range(rows.shape[1]):
+                values[m, column] += weights[i] * rows[first + i, column]
             square += weights[i] * weights[i]
         factors[m] = math.sqrt(square)
     return values, factors
 
 
-@nb.njit(cache=True, nogil=True)
+@nb.njit(cache=True)
 def _bridged(stamps_ns: Stamps, after: int, at_ns: int, max_gap_s: float) -> bool:
     """Return whether the samples next to a time are near enough; `after`: index of the first one not before it."""
     n = stamps_ns.shape[0]
@@ -65,7 +67,7 @@ def _bridged(stamps_ns: Stamps, after: int, at_ns: int, max_gap_s: float) -> boo
     return stamps_ns[following] - stamps_ns[before] <= max_gap_s * 1e9
 
 
-@nb.njit(cache=True, nogil=True)
+@nb.njit(cache=True)
 def _neighbours(stamps_ns: Stamps, after: int, at_ns: int) -> tuple[int, FloatArray]:
     """Return the first index and the weights of linear interpolation; outside of all samples the nearest one alone."""
     if after == 0 or after == stamps_ns.shape[0]:
@@ -74,7 +76,7 @@ def _neighbours(stamps_ns: Stamps, after: int, at_ns: int) -> tuple[int, FloatAr
     return after - 1, np.array([1.0 - share, share])
 
 
-@nb.njit(cache=True, nogil=True)
+@nb.njit(cache=True)
 def _weights(stamps_ns: Stamps, at_ns: int, half_window_s: float, rate_s: float) -> FloatArray:
     """Return the weights with which the samples enter the fitted value, shape (N,); none where no fit is possible."""
     n = stamps_ns.shape[0]
@@ -99,7 +101,7 @@ def _weights(stamps_ns: Stamps, at_ns: int, half_window_s: float, rate_s: float)
     return kernel * (c[0] + c[1] * u + c[2] * u * u)
 
 
-@nb.njit(cache=True, nogil=True)
+@nb.njit(cache=True)
 def _coefficients(s: FloatArray, quadratic: bool, rate: float) -> FloatArray:
     """Return the solution c of [[s0 s1 s2] [s1 s2 s3] [s2 s3 s4]] c = (1, rate, 0), shape (3,); NaN where singular."""
     if quadratic:

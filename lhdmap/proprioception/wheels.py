@@ -12,10 +12,11 @@ from dataclasses import dataclass
 from typing import Literal, NamedTuple
 
 import numpy as np
+import numpy.typing as npt
 
 from lhdmap.machine import Machine
 from lhdmap.messages import FloatArray, Joints, Tachometer, WheelPose
-from lhdmap.proprioception.articulated import covered, integrate_motion, interpolate, motion_covariance
+from lhdmap.proprioception.articulated import DriveErrors, covered, drive, motion_covariance, value_at, values_at
 from lhdmap.proprioception.reckoning import DeadReckoning, ReckoningLimits
 from lhdmap.proprioception.samples import SampleBuffer, Warnings
 from lhdmap.settings import setting
@@ -56,6 +57,7 @@ class WheelSettings:
     keep_s: float = setting(60.0, unit="s", minimum=1.0, doc="Samples are kept for this long.")
 
 
+_STRAIGHT = np.zeros(1, dtype=np.int64), np.zeros(1)  # an articulation of zero at any time
 RESOLUTION = 1e-3  # of poses in logs, m and rad
 
 
@@ -81,6 +83,8 @@ class WheelOdometry:
         self._speeds = SampleBuffer("tachometer", 1, keep_s, self.warnings)
         self._angles = SampleBuffer("articulation", 1, keep_s, self.warnings)
         self._gap_ns, self._hold_ns = round(settings.max_gap_s * 1e9), round(settings.max_hold_s * 1e9)
+        self._limits_ns = self._gap_ns, self._hold_ns
+        self._bending, self._straight = self._drive_errors()
         limits = ReckoningLimits(
             settings.max_speed_mps, settings.max_jump_m, round(settings.max_pose_gap_s * 1e9), self._hold_ns
         )
@@ -109,15 +113,16 @@ class WheelOdometry:
 
     def speed_at(self, stamp_ns: int) -> float | None:
         """Return the tachometer's speed as it was measured (m/s, not calibrated), or None where there is none."""
-        if not self._covers(self._speeds, stamp_ns, stamp_ns):
-            return None
-        return float(interpolate(self._speeds.stamps_ns, self._speeds.rows[:, 0], stamp_ns))
+        return self._value(self._speeds, stamp_ns)
 
     def articulation_at(self, stamp_ns: int) -> float | None:
         """Return the articulation angle (rad), or None where there is none."""
-        if not self._covers(self._angles, stamp_ns, stamp_ns):
-            return None
-        return float(interpolate(self._angles.stamps_ns, self._angles.rows[:, 0], stamp_ns))
+        return self._value(self._angles, stamp_ns)
+
+    def articulations_at(self, stamps_ns: npt.NDArray[np.int64]) -> FloatArray:
+        """Return the articulation angles (rad) at many times, shape (N,); NaN where there is none."""
+        angles = self._angles
+        return values_at(angles.stamps_ns, angles.rows[:, 0], stamps_ns, self._limits_ns)
 
     def motion_between(self, start_ns: int, end_ns: int) -> Motion | None:
         """Return the motion between two times, or None where no sensor covers them.
@@ -149,29 +154,32 @@ class WheelOdometry:
             return
         self._angles.append(message.stamp_ns, (angle,))
 
+    def _drive_errors(self) -> tuple[DriveErrors, DriveErrors]:
+        """Return what is believed of motion with known, and with unknown, articulation."""
+        s, (L_f, L_r) = self.settings, self._lengths
+        noise_rad = math.sqrt(2.0) * math.radians(s.articulation_noise_deg) * L_r / (L_f + L_r)
+        known = DriveErrors(
+            math.radians(s.articulation_std_deg), noise_rad, self.scale_std, s.speed_std_mps, s.side_slip_std
+        )
+        return known, known._replace(articulation_rad=math.radians(s.unknown_articulation_deg))
+
+    def _value(self, samples: SampleBuffer, stamp_ns: int) -> float | None:
+        value = value_at(samples.stamps_ns, samples.rows[:, 0], stamp_ns, self._limits_ns)
+        return None if math.isnan(value) else float(value)
+
     def _covers(self, samples: SampleBuffer, start_ns: int, end_ns: int) -> bool:
         """Return whether samples go from start to end without a long gap (the last one may be held for a while)."""
-        return bool(covered(samples.stamps_ns, (start_ns, end_ns), self._gap_ns, self._hold_ns))
+        return bool(covered(samples.stamps_ns, (start_ns, end_ns), *self._limits_ns))
 
     def _driven(self, start_ns: int, end_ns: int, source: Source) -> Motion:
-        L_f, L_r = self._lengths
         speeds, angles = self._speeds, self._angles
         if source == "articulated":
-            angle_stamps, angle_rows = angles.stamps_ns, angles.rows[:, 0]
-        else:  # straight on
-            angle_stamps, angle_rows = np.zeros(1, dtype=np.int64), np.zeros(1)
-        delta, path_m, lever = integrate_motion(
-            (speeds.stamps_ns, speeds.rows[:, 0] * self.scale),
-            (angle_stamps, angle_rows),
-            (start_ns, end_ns),
-            (L_f, L_r),
-        )
-        settings = self.settings
-        error_deg = settings.articulation_std_deg if source == "articulated" else settings.unknown_articulation_deg
-        noise_rad = math.sqrt(2.0) * math.radians(settings.articulation_noise_deg) * L_r / (L_f + L_r)
-        heading = math.hypot(lever * math.radians(error_deg), noise_rad)
-        along = math.hypot(self.scale_std * path_m, settings.speed_std_mps * (end_ns - start_ns) / 1e9)
-        return Motion(delta, motion_covariance(along, settings.side_slip_std * path_m, heading, delta), source)
+            articulation, errors = (angles.stamps_ns, angles.rows[:, 0]), self._bending
+        else:
+            articulation, errors = _STRAIGHT, self._straight
+        errors = errors._replace(scale=self.scale_std)
+        speed = speeds.stamps_ns, speeds.rows[:, 0] * self.scale
+        return Motion(*drive(speed, articulation, (start_ns, end_ns), self._lengths, errors), source)
 
     def _reckoned(self, start_ns: int, end_ns: int) -> Motion | None:
         settings = self.settings

@@ -85,8 +85,17 @@ def test_a_growing_and_a_finished_track_agree() -> None:
     rng = np.random.default_rng(0)
     for k in range(5):
         track.append(START_NS + k * 10**8, np.array([0.3 * k, 0.1 * k, 0.05 * k]), *rng.normal(0.0, 0.01, 2))
-    at = START_NS + 33 * 10**7
-    assert FinalTrack(track.rows()).matrix_at(at) == pytest.approx(track.matrix_at(at))
+    at = START_NS + np.array([33, 0, 39, 31, -5], dtype=np.int64) * 10**7
+    assert FinalTrack(track.rows()).matrices_at(at) == pytest.approx(track.matrices_at(at))
+
+
+def test_matrices_are_those_of_roll_pitch_and_heading() -> None:
+    track = Track()
+    track.append(START_NS, np.array([1.0, 2.0, 0.0]), 0.0, 0.0)
+    track.append(START_NS + 10, np.array([1.0, 2.0, 0.4]), 0.1, -0.2)
+    half, after = track.matrices_at(START_NS + np.array([5, 15], dtype=np.int64))
+    assert half == pytest.approx(se3.from_rpy(0.05, -0.1, 0.2, (1.0, 2.0, 0.5 * track.height_m)))
+    assert after == pytest.approx(se3.from_rpy(0.15, -0.3, 0.6, (1.0, 2.0, 1.5 * track.height_m)))
 
 
 def test_a_trajectory_carries_stamps_and_attitude() -> None:
