@@ -32,11 +32,10 @@ Decoder = Callable[[Cursor], tuple[Message, ...]]
 
 _SCAN_NUMBERS = Layout("7f", 4)
 _VECTOR = Layout("3d", 8)
-_QUATERNION = Layout("4d", 8)
+_IMU = Layout("37d", 8)  # quaternion, angular velocity, acceleration, each with a covariance of nine numbers behind it
 _POSE = Layout("7d", 8)
 _COMMAND = Layout("4d2B", 8)
 _MAX_METRES = 1e9
-_COVARIANCE_3X3 = Layout("9d", 8)
 
 
 def scan_numbers(cursor: Cursor) -> tuple[int, str, tuple[float, ...]]:
@@ -49,7 +48,7 @@ def _laser_scan(cursor: Cursor) -> tuple[Message, ...]:
     stamp, frame, numbers = scan_numbers(cursor)
     angle_min, _, increment, time_increment, _, range_min, range_max = numbers
     ranges = cursor.floats32()
-    cursor.floats32()  # intensities: their length must fit, their values are not used
+    cursor.skip_floats32()  # intensities
     if not (math.isfinite(angle_min) and math.isfinite(increment)):
         raise InputError("angles that are not finite")
     if not math.isfinite(time_increment):
@@ -59,21 +58,18 @@ def _laser_scan(cursor: Cursor) -> tuple[Message, ...]:
 
 def _imu(cursor: Cursor) -> tuple[Message, ...]:
     stamp, frame = cursor.header()
-    quaternion = cursor.numbers(_QUATERNION)
-    covariance = cursor.numbers(_COVARIANCE_3X3)
-    rate = _measured(cursor)
-    acceleration = _measured(cursor)
-    if covariance[0] == -1.0 or not 0.5 < sum(value * value for value in quaternion) < 2.0:
+    numbers = cursor.numbers(_IMU)
+    quaternion, covariance = numbers[:4], numbers[4]
+    if covariance == -1.0 or not 0.5 < sum([value * value for value in quaternion]) < 2.0:
         raise InputError("no orientation in an Imu message")
     roll, pitch = se3.roll_pitch(*quaternion)
-    return (Inclination(stamp, frame, roll, pitch, rate, acceleration),)
+    return (Inclination(stamp, frame, roll, pitch, _measured(numbers[13:17]), _measured(numbers[25:29])),)
 
 
-def _measured(cursor: Cursor) -> np.ndarray[tuple[int], np.dtype[np.float64]] | None:
+def _measured(numbers: tuple[float, ...]) -> np.ndarray[tuple[int], np.dtype[np.float64]] | None:
     """Return a vector with its covariance behind it; None where the first covariance says that it is not measured."""
-    vector = cursor.numbers(_VECTOR)
-    covariance = cursor.numbers(_COVARIANCE_3X3)
-    return None if covariance[0] == -1.0 or not all(map(math.isfinite, vector)) else np.array(vector)
+    x, y, z, covariance = numbers
+    return None if covariance == -1.0 or not math.isfinite(x + y + z) else np.array((x, y, z))
 
 
 def _odometry(cursor: Cursor) -> tuple[Message, ...]:
