@@ -82,13 +82,16 @@ class AttitudeFilter:
         self.settings = settings
         self.warnings = Warnings()
         self._samples = SampleBuffer("inclinometer", 2, settings.keep_s, self.warnings)
-        self._R_sensor_base = None if R_base_sensor is None else np.asarray(R_base_sensor, dtype=float).T
+        turned = R_base_sensor is not None and not np.array_equal(R_base_sensor, np.eye(3))
+        self._R_sensor_base = np.asarray(R_base_sensor, dtype=float).T if turned else None
         self._jump_rad = math.radians(settings.jump_deg)
         self._outliers = 0
         self._same_since_ns: int | None = None
         self._noise_rad = math.radians(settings.std_floor_deg)
         self._taken = 0
         self._finished = False
+        self._asked: tuple[int, int] = (0, -1)
+        self._answer: Attitude | None = None
 
     def update(self, message: Inclination) -> None:
         """Take one message; values that cannot be are left out, with a warning."""
@@ -124,22 +127,31 @@ class AttitudeFilter:
 
     def attitude_at(self, stamp_ns: int) -> Attitude | None:
         """Return the attitude of `base_link` at a time, or None where there are no samples around it."""
-        found = self.attitudes_at(np.array([stamp_ns], dtype=np.int64))
-        if not found.valid[0]:
+        asked = stamp_ns, self._taken
+        if asked != self._asked:  # the stages ask for the same moment one after the other
+            self._answer, self._asked = self._attitude(stamp_ns), asked
+        return self._answer
+
+    def _attitude(self, stamp_ns: int) -> Attitude | None:
+        values, factor = self._fit(np.array([stamp_ns], dtype=np.int64))
+        noise = float(factor[0])
+        if not math.isfinite(noise):
             return None
-        return Attitude(float(found.roll_rad[0]), float(found.pitch_rad[0]), float(found.std_rad[0]))
+        std_rad = math.hypot(self._noise_rad * noise, math.radians(self.settings.std_floor_deg))
+        return Attitude(float(values[0, 0]), float(values[0, 1]), std_rad)
 
     def attitudes_at(self, stamps_ns: npt.NDArray[np.int64]) -> Attitudes:
         """Return the attitudes of `base_link` at many times, shape (N,), in any order."""
-        settings = self.settings
-        delay_s, rate_s = (settings.lag_s, 0.0) if settings.lag_kind == "delay" else (0.0, settings.lag_s)
-        shown_ns = np.asarray(stamps_ns, dtype=np.int64) + round(delay_s * 1e9)
-        samples = self._samples
-        values, factor = fit_at(
-            samples.stamps_ns, samples.rows, shown_ns, settings.half_window_s, settings.max_gap_s, rate_s
-        )
-        std = np.hypot(self._noise_rad * factor, math.radians(settings.std_floor_deg))
+        values, factor = self._fit(np.asarray(stamps_ns, dtype=np.int64))
+        std = np.hypot(self._noise_rad * factor, math.radians(self.settings.std_floor_deg))
         return Attitudes(values[:, 0], values[:, 1], std, np.isfinite(factor))
+
+    def _fit(self, stamps_ns: npt.NDArray[np.int64]) -> tuple[FloatArray, FloatArray]:
+        """Return roll and pitch (N, 2) and how much of the noise is left in them (N,), NaN where there are no samples."""
+        s, samples = self.settings, self._samples
+        delay_s, rate_s = (s.lag_s, 0.0) if s.lag_kind == "delay" else (0.0, s.lag_s)
+        shown_ns = stamps_ns + round(delay_s * 1e9)
+        return fit_at(samples.stamps_ns, samples.rows, shown_ns, s.half_window_s, s.max_gap_s, rate_s)
 
     def _is_outlier(self, stamp_ns: int, roll: float, pitch: float) -> bool:
         newest_ns, last = self._samples.latest_ns, self._samples.latest_row
