@@ -27,6 +27,7 @@ from lhdmap.pipeline.sweeps import SweepIntegration
 from lhdmap.pipeline.track import FinalTrack, Rows, resample, trajectory_of
 from lhdmap.proprioception.wheels import WheelOdometry
 from lhdmap.provenance import source_entry
+from lhdmap.report import charts
 from lhdmap.report.data import ReportData, Summary, TopicRow
 from lhdmap.report.page import write_report
 from lhdmap.report.recording import RecordingWriter, record_run
@@ -73,6 +74,7 @@ def build_map(request: BuildRequest) -> BuildResult:
     given = given_rows(request.poses, request.logs, request.topics) if request.poses else None
     with LogSource(list(request.logs), request.topics) as source, MapFolderWriter(request.target) as folder:
         hashes, pool = _hash_in_background(request.logs)
+        pool.submit(charts.load)
         with (
             pool,
             RecordingWriter(folder.path / "recording.rrd", request.target.name, source.start_ns or 0) as recording,

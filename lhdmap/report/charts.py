@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import base64
+import importlib
 import io
 from typing import TYPE_CHECKING, Any
 
@@ -46,6 +47,12 @@ _SETTINGS: Any = {
     "path.simplify": True,
     "path.simplify_threshold": 0.3,
 }
+
+
+def load() -> None:
+    """Load what drawing needs, which takes a good part of a second: ahead of time, beside other work."""
+    for name in ("matplotlib.backends.backend_svg", "matplotlib.figure", "scipy.spatial"):
+        importlib.import_module(name)
 
 
 def styled() -> Any:

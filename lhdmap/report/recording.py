@@ -7,6 +7,8 @@ The timeline `time` is the duration since the first scan.
 
 from __future__ import annotations
 
+from collections import deque
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
@@ -48,10 +50,7 @@ class RecordingWriter:
     """Writes one `.rrd` file. Scans and texts may come while the run goes on, the rest comes when it is known."""
 
     def __init__(self, path: Path, title: str, start_ns: int, settings: RecordingSettings | None = None) -> None:
-        """Open the file; `start_ns` is the stamp that counts as time zero."""
-        import rerun as rr
-
-        self._rr: Any = rr
+        """Open the file in the background; `start_ns` is the stamp that counts as time zero."""
         self._settings = settings or RecordingSettings()
         self._start_ns = self._end_ns = start_ns
         self._next_scan_ns: dict[str, int] = {}
@@ -59,10 +58,10 @@ class RecordingWriter:
         self._bounds: FloatArray | None = None
         self._drawn: set[str] = set()
         self.curves = RUN_CURVES
-        self._stream = rr.RecordingStream(APPLICATION, recording_id=f"{title} {start_ns}")
-        self._stream.save(path)
-        self._stream.send_recording_name(title)
-        self._stream.log("map", rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
+        self._scans: deque[tuple[int, FloatArray, str]] = deque()
+        loader = ThreadPoolExecutor(max_workers=1, thread_name_prefix="recording")
+        self._opened = loader.submit(_open, path, title, start_ns)  # loading Rerun takes most of a second
+        loader.shutdown(wait=False)
 
     def __enter__(self) -> Self:
         return self
@@ -73,18 +72,34 @@ class RecordingWriter:
         """Close the file; what was recorded before an interruption is kept."""
         self.close()
 
+    @property
+    def _rr(self) -> Any:
+        return self._opened.result()[0]
+
+    @property
+    def _stream(self) -> Any:
+        return self._opened.result()[1]
+
     def wants_scan(self, stamp_ns: int, name: str = "front") -> bool:
         """Return whether a scan of this stamp would be recorded, so that its points need not be made in vain."""
         return stamp_ns >= self._next_scan_ns.get(name, stamp_ns)
 
     def add_scan(self, stamp_ns: int, points_map: FloatArray, name: str = "front") -> None:
-        """Record the points (N, 3) of one scan in map, unless the last one was recorded just before."""
+        """Record the points (N, 3) of one scan in map, unless the last one was recorded just before; they are kept."""
         if not self.wants_scan(stamp_ns, name):
             return
         self._next_scan_ns[name] = stamp_ns + round(self._settings.scan_interval_s * 1e9)
-        self._at(stamp_ns)
-        points = self._rr.Points3D(points_map, colors=0xE69F00FF, radii=self._points_px(2.0))
-        self._stream.log(f"map/scan/{name}", points)
+        self._scans.append((stamp_ns, points_map, name))
+        if self._opened.done():
+            self._log_scans()
+
+    def _log_scans(self) -> None:
+        """Record the scans that have waited for the file to be open."""
+        while self._scans:
+            stamp_ns, points_map, name = self._scans.popleft()
+            self._at(stamp_ns)
+            points = self._rr.Points3D(points_map, colors=0xE69F00FF, radii=self._points_px(2.0))
+            self._stream.log(f"map/scan/{name}", points)
 
     def add_text(self, text: str, stamp_ns: int | None = None, level: str = "WARN") -> None:
         """Record a line of the text log; one without a stamp stands at the start."""
@@ -157,6 +172,7 @@ class RecordingWriter:
 
     def close(self) -> None:
         """Add the layout of the viewer and close the file."""
+        self._log_scans()
         used = tuple(view for view in self.curves if any(self._has(entity) for entity in view[1]))
         self._stream.send_blueprint(blueprint(self._bounds, self._end_ns - self._start_ns, used))
         self._stream.disconnect()
@@ -194,6 +210,17 @@ class RecordingWriter:
         """Widen the bounds that the views are laid out for, so that they hold the points (N, 3) in map."""
         seen = points_m if self._bounds is None else np.vstack([self._bounds, points_m])
         self._bounds = np.array([seen.min(axis=0), seen.max(axis=0)], dtype=float)
+
+
+def _open(path: Path, title: str, start_ns: int) -> tuple[Any, Any]:
+    """Return the module of Rerun, and a stream into the file."""
+    import rerun as rr
+
+    stream = rr.RecordingStream(APPLICATION, recording_id=f"{title} {start_ns}")
+    stream.save(path)
+    stream.send_recording_name(title)
+    stream.log("map", rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
+    return rr, stream
 
 
 def _palette() -> npt.NDArray[np.uint32]:
