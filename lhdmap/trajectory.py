@@ -11,6 +11,8 @@ import numpy.typing as npt
 from lhdmap.errors import InputError
 from lhdmap.messages import FloatArray
 
+_TUM_LINE = "%d.%09d %.6f %.6f %.6f %.9f %.9f %.9f %.9f\n"
+
 
 class Trajectory(NamedTuple):
     """Poses over time: `stamps_ns` (N,) int64, `positions_m` (N, 3), `quaternions_xyzw` (N, 4)."""
@@ -22,13 +24,11 @@ class Trajectory(NamedTuple):
 
 def write_tum(path: Path, trajectory: Trajectory) -> None:
     """Write a TUM file: seconds with 9 decimals (exact nanoseconds), metres with 6."""
-    with path.open("w", encoding="ascii") as file:
-        rows = zip(trajectory.stamps_ns, trajectory.positions_m, trajectory.quaternions_xyzw, strict=True)
-        for stamp_ns, p, q in rows:
-            seconds, nanoseconds = divmod(int(stamp_ns), 1_000_000_000)
-            file.write(
-                f"{seconds}.{nanoseconds:09d} {p[0]:.6f} {p[1]:.6f} {p[2]:.6f} {q[0]:.9f} {q[1]:.9f} {q[2]:.9f} {q[3]:.9f}\n"
-            )
+    seconds, nanoseconds = np.divmod(trajectory.stamps_ns, 1_000_000_000)
+    stamps = zip(seconds.tolist(), nanoseconds.tolist(), strict=True)
+    poses = np.column_stack([trajectory.positions_m, trajectory.quaternions_xyzw]).tolist()  # plain floats print faster
+    lines = [_TUM_LINE % (*stamp, *pose) for stamp, pose in zip(stamps, poses, strict=True)]
+    path.write_text("".join(lines), encoding="ascii")
 
 
 def read_tum(path: Path) -> Trajectory:

@@ -22,7 +22,7 @@ from lhdmap.pipeline.track import FinalTrack, Track
 from lhdmap.proprioception.wheels import WheelOdometry
 
 ScanSink = Callable[[str, int, FloatArray], None]
-_BATCH_POINTS = 20_000  # sweeps are handed over together: switching between threads costs more than a small sweep
+_BATCH_POINTS = 40_000  # sweeps are handed over together: switching between threads costs more than a small sweep
 _MOST_PENDING = 3  # batches handed over and not yet done: bounds the memory
 
 

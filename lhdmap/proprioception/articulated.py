@@ -60,10 +60,15 @@ class DriveErrors(NamedTuple):
 
 @nb.njit(cache=True)
 def drive(
-    speed: Samples, articulation: Samples, span_ns: tuple[int, int], lengths_m: tuple[float, float], errors: DriveErrors
+    speed: Samples,
+    articulation: Samples,
+    span_ns: tuple[int, int],
+    lengths_m: tuple[float, float],
+    scale: float,
+    errors: DriveErrors,
 ) -> tuple[FloatArray, FloatArray]:
     """Return the motion of `integrate_motion`, shape (3,), and its covariance, shape (3, 3)."""
-    delta, path_m, lever = integrate_motion(speed, articulation, span_ns, lengths_m)
+    delta, path_m, lever = integrate_motion(speed, articulation, span_ns, lengths_m, scale)
     heading = math.hypot(lever * errors.articulation_rad, errors.heading_noise_rad)
     along = math.hypot(errors.scale * path_m, errors.speed_mps * (span_ns[1] - span_ns[0]) / 1e9)
     return delta, motion_covariance(along, errors.side_slip * path_m, heading, delta)
@@ -71,7 +76,7 @@ def drive(
 
 @nb.njit(cache=True)
 def integrate_motion(
-    speed: Samples, articulation: Samples, span_ns: tuple[int, int], lengths_m: tuple[float, float]
+    speed: Samples, articulation: Samples, span_ns: tuple[int, int], lengths_m: tuple[float, float], scale: float
 ) -> tuple[FloatArray, float, float]:
     """Return the motion of `base_link` over a span: d theta = (v sin(gamma) dt + L_r d gamma) / (L_f cos(gamma) + L_r).
 
@@ -81,6 +86,7 @@ def integrate_motion(
             same without drift.
         span_ns: start and end.
         lengths_m: L_f and L_r.
+        scale: factor of the speeds.
 
     Returns:
         x, y, heading in the frame at the start, shape (3,); length of the path, m; and the error of the heading for
@@ -94,7 +100,7 @@ def integrate_motion(
     for step in range(steps):
         middle_ns = span_ns[0] + int((step + 0.5) * width_ns)
         next_gamma = interpolate(articulation[0], articulation[1], span_ns[0] + int((step + 1) * width_ns))
-        ds = interpolate(speed[0], speed[1], middle_ns) * width_ns / 1e9
+        ds = scale * interpolate(speed[0], speed[1], middle_ns) * width_ns / 1e9
         c, s = math.cos(0.5 * (gamma + next_gamma)), math.sin(0.5 * (gamma + next_gamma))
         below = L_f * c + L_r
         turn = (ds * s + L_r * (next_gamma - gamma)) / below

@@ -178,8 +178,8 @@ class WheelOdometry:
         else:
             articulation, errors = _STRAIGHT, self._straight
         errors = errors._replace(scale=self.scale_std)
-        speed = speeds.stamps_ns, speeds.rows[:, 0] * self.scale
-        return Motion(*drive(speed, articulation, (start_ns, end_ns), self._lengths, errors), source)
+        speed = speeds.stamps_ns, speeds.rows[:, 0]
+        return Motion(*drive(speed, articulation, (start_ns, end_ns), self._lengths, self.scale, errors), source)
 
     def _reckoned(self, start_ns: int, end_ns: int) -> Motion | None:
         settings = self.settings
