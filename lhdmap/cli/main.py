@@ -7,6 +7,7 @@ is called is imported, so that `lhdmap --help` is quick.
 from __future__ import annotations
 
 import argparse
+import gc
 import importlib
 import os
 import sys
@@ -52,6 +53,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 def entry_point() -> None:
     """Console script: `main` with the process's exit code."""
+    gc.set_threshold(100_000, 20, 20)  # the libraries' hundreds of thousands of lasting objects are walked less often
     exit_code = main()
     if exit_code == EXIT_INTERRUPTED:
         # Where Ctrl-C met Python inside a compiled library, the interpreter would end by the signal and not with our code.

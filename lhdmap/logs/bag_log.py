@@ -2,20 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator
 from pathlib import Path
 from typing import BinaryIO
 
 from lhdmap.errors import InputError
 from lhdmap.logs import bag_records as rec
 from lhdmap.logs.bag_scan import Scan
-from lhdmap.logs.blocks import Block, Loaded, in_time_order
-from lhdmap.logs.compression import decompress
-from lhdmap.logs.container import Contents, survey
+from lhdmap.logs.blocks import Entry
+from lhdmap.logs.container import BlockFile, Contents
 from lhdmap.logs.findings import Findings
 
 
-class BagFile:
+class BagFile(BlockFile):
     """An open bag (a `Container`)."""
 
     format = "ROS 1 bag"
@@ -34,35 +32,8 @@ class BagFile:
         self._blocks = scan.blocks
         self._contents = self._indexed(scan)
 
-    def contents(self) -> Contents:
-        """Return channels, counts and log times, from the index where it is whole."""
-        if self._contents is None:
-            self._blocks, self._contents = survey(self._blocks, self._load, self._channels)
-        return self._contents
-
-    def messages(self, wanted: Collection[int]) -> Iterator[tuple[int, int, bytes]]:
-        """Yield log time, connection id and bytes in log-time order."""
-        self.contents()
-        keep = frozenset(wanted)
-
-        def load(block: Block) -> Loaded:
-            data, entries = self._load(block)
-            return Loaded(data, [entry for entry in entries if entry[1] in keep])
-
-        return in_time_order(self._blocks, load)
-
-    def close(self) -> None:
-        """Close the file."""
-        self._file.close()
-
-    def _load(self, block: Block) -> Loaded:
-        self._file.seek(block.offset)
-        data, problem = decompress(self._file.read(block.length), block.compression, block.size)
-        entries, broken = rec.messages(data, self._channels)
-        problem = problem or broken
-        if problem is not None:
-            self._damage.add_once(f"block at byte {block.offset}: {problem}")
-        return Loaded(data, entries)
+    def _entries(self, data: bytes) -> tuple[list[Entry], str | None]:
+        return rec.messages(data, self._channels)
 
     def _indexed(self, scan: Scan) -> Contents | None:
         """Return the contents that the index states, None where it does not cover all chunks."""

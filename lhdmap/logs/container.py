@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import zlib
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Collection, Iterator
 from pathlib import Path
-from typing import NamedTuple, Protocol
+from typing import BinaryIO, NamedTuple, Protocol
 
 from lhdmap.logs.base import Channel
-from lhdmap.logs.blocks import Block, Loaded
+from lhdmap.logs.blocks import Block, Entry, Loaded, in_time_order
+from lhdmap.logs.compression import decompress
 from lhdmap.logs.findings import Findings
 
 
@@ -33,6 +36,53 @@ class Container(Protocol):
 
     def close(self) -> None:
         """Close the file."""
+
+
+class BlockFile(ABC):
+    """A `Container` that is a sequence of blocks; what opens one sets what it found in the file."""
+
+    _file: BinaryIO
+    _blocks: list[Block]
+    _channels: dict[int, Channel]
+    _contents: Contents | None
+    _damage: Findings
+
+    def contents(self) -> Contents:
+        """Return channels, counts and log times, from the index where it is whole."""
+        if self._contents is None:
+            self._blocks, self._contents = survey(self._blocks, self._load, self._channels)
+        return self._contents
+
+    def messages(self, wanted: Collection[int]) -> Iterator[tuple[int, int, bytes]]:
+        """Yield log time, channel id and bytes in log-time order."""
+        self.contents()
+        keep = frozenset(wanted)
+
+        def load(block: Block) -> Loaded:
+            data, entries = self._load(block)
+            return Loaded(data, [entry for entry in entries if entry[1] in keep])
+
+        return in_time_order(self._blocks, load)
+
+    def close(self) -> None:
+        """Close the file."""
+        self._file.close()
+
+    def _load(self, block: Block) -> Loaded:
+        """Return the content of a block; what is wrong with it is noted as damage."""
+        self._file.seek(block.offset)
+        data, problem = decompress(self._file.read(block.length), block.compression, block.size)
+        entries, broken = self._entries(data)
+        problem = problem or broken
+        if problem is None and block.crc and zlib.crc32(data) != block.crc:
+            problem = "its checksum does not fit; its messages are used as they are"
+        if problem is not None:
+            self._damage.add_once(f"block at byte {block.offset}: {problem}")
+        return Loaded(data, entries)
+
+    @abstractmethod
+    def _entries(self, data: bytes) -> tuple[list[Entry], str | None]:
+        """Return the messages in a block's bytes and what is wrong with them (None: nothing)."""
 
 
 OpenContainer = Callable[[Path, Findings], Container]

@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 import zlib
-from collections.abc import Collection, Iterator
 from pathlib import Path
 from typing import BinaryIO
 
 from lhdmap.errors import InputError
 from lhdmap.logs import mcap_records as rec
-from lhdmap.logs.blocks import Block, Loaded, in_time_order
-from lhdmap.logs.compression import decompress
-from lhdmap.logs.container import Contents, survey
+from lhdmap.logs.blocks import Entry
+from lhdmap.logs.container import BlockFile, Contents
 from lhdmap.logs.findings import Findings
 from lhdmap.logs.mcap_scan import Scan
 
@@ -19,7 +17,7 @@ _FOOTER_BYTES = rec.HEAD.size + 20
 _MAX_SUMMARY_BYTES = 256 << 20
 
 
-class McapFile:
+class McapFile(BlockFile):
     """An open MCAP file (a `Container`)."""
 
     format = "mcap"
@@ -34,42 +32,14 @@ class McapFile:
                 f"{path}: not an MCAP file (its first bytes are not MCAP's); is it another format, or empty?"
             )
         self._tables = rec.Tables()
+        self._channels = self._tables.channels
         scan = Scan(self._file, self._size, damage)
         scan.run()
         self._blocks = scan.blocks
         self._contents = self._summary()
 
-    def contents(self) -> Contents:
-        """Return channels, counts and log times, from the summary where it is whole."""
-        if self._contents is None:
-            self._blocks, self._contents = survey(self._blocks, self._load, self._tables.channels)
-        return self._contents
-
-    def messages(self, wanted: Collection[int]) -> Iterator[tuple[int, int, bytes]]:
-        """Yield log time, channel id and bytes in log-time order."""
-        self.contents()
-        keep = frozenset(wanted)
-
-        def load(block: Block) -> Loaded:
-            data, entries = self._load(block)
-            return Loaded(data, [entry for entry in entries if entry[1] in keep])
-
-        return in_time_order(self._blocks, load)
-
-    def close(self) -> None:
-        """Close the file."""
-        self._file.close()
-
-    def _load(self, block: Block) -> Loaded:
-        self._file.seek(block.offset)
-        data, problem = decompress(self._file.read(block.length), block.compression, block.size)
-        entries, broken = rec.messages(data, self._tables)
-        problem = problem or broken
-        if problem is None and block.crc and zlib.crc32(data) != block.crc:
-            problem = "its checksum does not fit; its messages are used as they are"
-        if problem is not None:
-            self._damage.add_once(f"block at byte {block.offset}: {problem}")
-        return Loaded(data, entries)
+    def _entries(self, data: bytes) -> tuple[list[Entry], str | None]:
+        return rec.messages(data, self._tables)
 
     def _summary(self) -> Contents | None:
         """Return the contents that the summary section states, None where it is absent or broken."""
