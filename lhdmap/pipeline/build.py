@@ -22,6 +22,7 @@ from lhdmap.machine import Machine
 from lhdmap.mapfolder import MapFolderWriter, MapInfo
 from lhdmap.messages import Joints, LaserScan, Message, PointCloud
 from lhdmap.pipeline.given import given_rows
+from lhdmap.pipeline.interruption import Interruption
 from lhdmap.pipeline.mapping import MappingPipeline
 from lhdmap.pipeline.sweeps import SweepIntegration
 from lhdmap.pipeline.track import FinalTrack, Rows, resample, trajectory_of
@@ -94,20 +95,20 @@ def build_map(request: BuildRequest) -> BuildResult:
 
 def _run(pipeline: MappingPipeline, source: LogSource, progress: Progress | None) -> bool:
     """Send all messages through the stages; return whether Ctrl-C ended it: the stages then finish with what they have."""
-    interrupted = False
+    interruption = Interruption()
     messages: Iterable[tuple[str, Message]] = source.messages([role for role in ROLES_READ if role in source.roles])
     if progress is not None:
         messages = progress(messages, source.duration_s)
-    try:
+    with interruption:
         for role, message in messages:
             pipeline.update(role, message)
-    except KeyboardInterrupt:
-        interrupted = True
+            if interruption.asked:
+                break
     pipeline.finish()
     if not len(pipeline.track):
         damage = f" ({source.damage[0]})" if source.damage else ""
         raise InputError(f"{source.paths[0]}: no usable scan in it{damage}; lhdmap doctor tells what is wrong")
-    return interrupted
+    return interruption.asked
 
 
 class _Outcome:

@@ -1,0 +1,44 @@
+"""Ctrl-C is heard between two messages, and only taken over where it is Python's own to handle."""
+
+from __future__ import annotations
+
+import signal
+import threading
+
+import pytest
+from lhdmap.pipeline.interruption import Interruption
+
+
+def test_the_first_ctrl_c_asks_and_the_second_raises() -> None:
+    with Interruption() as interruption:
+        signal.raise_signal(signal.SIGINT)
+        asked = interruption.asked
+        with pytest.raises(KeyboardInterrupt):
+            signal.raise_signal(signal.SIGINT)
+    assert asked
+    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+
+
+def test_a_handler_of_the_caller_stays() -> None:
+    heard: list[int] = []
+    before = signal.signal(signal.SIGINT, lambda number, _: heard.append(number))
+    try:
+        with Interruption() as interruption:
+            signal.raise_signal(signal.SIGINT)
+    finally:
+        signal.signal(signal.SIGINT, before)
+    assert heard == [signal.SIGINT]
+    assert not interruption.asked
+
+
+def test_another_thread_leaves_the_signal_alone() -> None:
+    found: list[object] = []
+
+    def run() -> None:
+        with Interruption():
+            found.append(signal.getsignal(signal.SIGINT))
+
+    thread = threading.Thread(target=run)
+    thread.start()
+    thread.join()
+    assert found == [signal.default_int_handler]
