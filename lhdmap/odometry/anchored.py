@@ -9,8 +9,9 @@ import numpy as np
 from lhdmap.geometry import se2
 from lhdmap.messages import FloatArray
 from lhdmap.odometry.flow_reference import FlowReference, compare, scanner_pyramid
-from lhdmap.odometry.matching import Match, MatchModel, match
+from lhdmap.odometry.matching import Hits, Match, MatchModel, Prior, match
 from lhdmap.odometry.motion import Motion
+from lhdmap.odometry.rear_view import NOTHING_BEHIND, Behind, JointOffset
 from lhdmap.odometry.search import search
 from lhdmap.odometry.settings import AnchorSettings, OdometrySettings, RangeFlowSettings, SearchSettings
 from lhdmap.odometry.steps import BY_DEFINITION, Matched, marginal_information
@@ -48,7 +49,13 @@ class AnchoredMatcher:
         self._first: FlowReference | None = None
         self._motion, self._noise_m, self._anchor, self._wide = motion, settings.range_noise_m, anchor, wide
         self._model = MatchModel(
-            settings.range_noise_m, anchor.cutoff_sigmas, anchor.min_cells, anchor.coarse_noise, anchor.rounds
+            settings.range_noise_m,
+            anchor.cutoff_sigmas,
+            anchor.min_cells,
+            anchor.coarse_noise,
+            anchor.rounds,
+            anchor.lean,
+            anchor.lean_patch_m,
         )
         self._map = empty_map(anchor.cell_m)
         self._recent: list[FloatArray] = []
@@ -59,9 +66,13 @@ class AnchoredMatcher:
         self._noise_scale = 1.0
         self._doubt = 0
         self._jumped = False
+        self._joint = JointOffset()
 
-    def step(self, points: FloatArray, T_base_scanner: FloatArray) -> Matched:
-        """Match points (N, 3), level base frame with absolute heights, at the predicted pose; correct the motion, grow the map."""
+    def step(self, points: FloatArray, T_base_scanner: FloatArray, seen: Behind = NOTHING_BEHIND) -> Matched:
+        """Match points (N, 3), level base frame with absolute heights, at the predicted pose; correct the motion, grow the map.
+
+        What is `seen` behind helps a tilted scanner.
+        """
         self._layered |= len(points) > 0 and bool(np.ptp(points[:, 2]) > _FLAT_M)
         if len(points) < _FEWEST_HITS:
             return Matched(np.zeros((3, 3)), math.nan, 0.0, lost=True)
@@ -70,11 +81,14 @@ class AnchoredMatcher:
         heading = self._young_heading(points, T_base_scanner)
         before, velocity = self._motion.pose, self._motion.velocity
         self._jumped = False
-        result = self._match(points, heading)
+        hits = self._hits(points, seen)
+        result = self._match(hits, heading)
         if result.support < self._anchor.min_support:
             return self._lose(points, T_base_scanner, result.support)
         self._lost_in_a_row = 0
         self._learn_noise(result.residual_sigmas)
+        if len(hits.points) > hits.front:
+            self._joint.update(result, hits, self._model, self._anchor.cell_m, seen.joint_x_m)
         self._motion.correct(result.pose, result.information + heading[1] * _HEADING_AXIS)
         if self._jumped and abs(self._motion.velocity[2]) > _SPINNING_RPS:
             self._motion.distrust_velocity(velocity)
@@ -86,38 +100,46 @@ class AnchoredMatcher:
         residual_m = result.residual_sigmas * self._noise_m
         return Matched(result.information, residual_m, result.support, lost=False, doubtful=doubtful)
 
-    def _match(self, points: FloatArray, heading: tuple[float, float]) -> Match:
+    def _hits(self, points: FloatArray, seen: Behind) -> Hits:
+        """Return what is matched: a level scanner sees the same curve of the walls again by itself."""
+        if not self._layered or not len(seen.points):
+            return Hits(points, len(points), self._layered)
+        return Hits(np.concatenate([points, self._joint.turned(seen)]), len(points), True)
+
+    def _match(self, hits: Hits, heading: tuple[float, float]) -> Match:
         """Match from the prediction (and a heading with its information); where that does not fit, search widely."""
         predicted, motion = self._motion.pose, self._motion.prior_information
-        prior = motion + heading[1] * _HEADING_AXIS
+        information = motion + heading[1] * _HEADING_AXIS
         error = np.array([0.0, 0.0, heading[1] * se2.wrap(heading[0] - predicted[2])])
-        predicted += np.linalg.solve(prior, error)
-        result = match(self._map, points, self._layered, predicted, prior, predicted, self._model)
+        predicted += np.linalg.solve(information, error)
+        prior = Prior(predicted, information)
+        result = match(self._map, hits, prior, predicted, self._model)
         if self._trusted(result):
-            return self._freed(points, result, predicted, prior)
+            return self._freed(hits, result, prior)
+        points = hits.points[: hits.front]
         thin = points[:: max(len(points) // self._wide.beams, 1)]
         starts = search(
             np.concatenate(self._recent),
             thin,
             predicted,
-            prior,
+            information,
             self._reach(),
             self._wide.cell_m,
             math.radians(self._wide.step_deg),
         )
         # A jump contradicts the prior by definition: it must not hold the match back, so it is weakened here.
         for start in starts[(np.abs(starts) < 1e29).all(axis=1)]:
-            found = match(self._map, points, self._layered, predicted, _JUMP_PRIOR * prior, start, self._model)
+            found = match(self._map, hits, _weak(prior), start, self._model)
             if found.support > result.support + 0.02:
                 result, self._doubt, self._jumped = found, _DOUBT_SCANS, True
         return result
 
-    def _freed(self, points: FloatArray, result: Match, predicted: FloatArray, prior: FloatArray) -> Match:
+    def _freed(self, hits: Hits, result: Match, prior: Prior) -> Match:
         """Match again with a weak prior where the scan contradicts it: motion that no model of the past foretells."""
-        error = result.pose - predicted
-        if error @ prior @ error < _SURPRISE**2:
+        error = result.pose - prior.pose
+        if error @ prior.information @ error < _SURPRISE**2:
             return result
-        again = match(self._map, points, self._layered, predicted, _JUMP_PRIOR * prior, result.pose, self._model)
+        again = match(self._map, hits, _weak(prior), result.pose, self._model)
         return again if again.support >= result.support else result
 
     def _reach(self) -> FloatArray:
@@ -185,3 +207,7 @@ class AnchoredMatcher:
         insert_all(self._map, hits, self._anchor.hit_limit)
         self._recent = [*self._recent[1 - _RECENT_SCANS :], hits]
         self._inserted = self._motion.pose
+
+
+def _weak(prior: Prior) -> Prior:
+    return Prior(prior.pose, _JUMP_PRIOR * prior.information)

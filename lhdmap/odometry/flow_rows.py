@@ -12,7 +12,9 @@ import numba as nb
 from lhdmap.odometry.flow_scan import BEND, GAIN, SLOPE, WALL, X, Y
 
 CAUCHY_SIGMAS = 3.0
-GRAZING_WEIGHT = 0.1  # part of the squared slope by which the variance grows: discounts grazing beams and edges
+# Parts of the squared slope and of the mean square about the wall's line by which a residual's variance grows: grazing
+# beams, edges and rough walls count less. Measured (docs/odometry.md): best heading of a pair, and over 10 m of rough walls.
+GRAZING_WEIGHT, BEND_WEIGHT = 0.3, 0.5
 
 # Rows of the table of equations, shape (7, M): residual range (m), direction of the warped point as cosine and sine, slope
 # and range (m) there, variance of the residual (m²), variance of the slope for a range noise of 1 m.
@@ -56,7 +58,7 @@ def warp(T_target_source, source, target, noise_m, places, table, start):  # typ
         table[RESIDUAL, k], table[RANGE, k] = warped - warped * reach, warped
         table[COS, k], table[SIN, k], table[SLOPE_THERE, k] = x * inverse, y * inverse, slope
         bend = max(source[i, BEND], target[j, BEND], target[j + 1, BEND])
-        table[VARIANCE, k] = noise2 * (1.0 + GRAZING_WEIGHT * slope * slope) + bend
+        table[VARIANCE, k] = noise2 * (1.0 + GRAZING_WEIGHT * slope * slope) + BEND_WEIGHT * bend
         table[SLOPE_GAIN, k] = 0.25 * (source[i, GAIN] + min(target[j, GAIN], target[j + 1, GAIN]))
         k += 1
     return k

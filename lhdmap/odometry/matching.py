@@ -9,7 +9,9 @@ import numba as nb
 import numpy as np
 
 from lhdmap.messages import FloatArray
-from lhdmap.odometry.surface_map import fit_line
+from lhdmap.odometry.surface_map import LINE, fit_line
+
+_LINES_HOLD = 0.3  # finest cells that a pose may move before lines are fitted anew: measured, no loss, half the time
 
 
 class MatchModel(NamedTuple):
@@ -20,10 +22,34 @@ class MatchModel(NamedTuple):
     min_cells: float
     coarse_noise: float
     rounds: int
+    lean: float = 0.0
+    lean_patch_m: float = 2.0
+
+
+class Hits(NamedTuple):
+    """Points (N, 3) in the level base frame, heights absolute; `front`: how many come from the front scanner, which are first.
+
+    `layered`: the scanner tilts, heights matter. Other scanners' hits help to place the scan; how well it fits is judged by
+    the front one's alone.
+    """
+
+    points: FloatArray
+    front: int
+    layered: bool
+
+
+class Prior(NamedTuple):
+    """What is known before the match: mean pose (3,) and information (3, 3)."""
+
+    pose: FloatArray
+    information: FloatArray
 
 
 class Match(NamedTuple):
-    """Result: `pose` (3,), `information` (3, 3) of the scan alone in map axes, share of hits with a line, share that agrees."""
+    """Result: `pose` (3,), `information` (3, 3) of the scan alone in map axes, share of hits with a line, share that agrees.
+
+    `lines` (N, LINE): the wall at each hit, as `fit_line` gives it, [6] the cell size of the level that served (0: none).
+    """
 
     pose: FloatArray
     information: FloatArray
@@ -34,66 +60,121 @@ class Match(NamedTuple):
 
 
 @nb.njit(cache=True, nogil=True)
-def lines_at(map_, pose, points, layered, min_cells, lines):  # type: ignore[no-untyped-def]
-    """Fit the wall's line at each scan point; return how many have one.
-
-    `points` (N, 3) in the level base frame, heights absolute; `lines` (N, 7): as `fit_line`, then the cell size of the
-    level that served (0: none).
-    """
+def lines_at(map_, pose, hits, min_cells, lines):  # type: ignore[no-untyped-def]
+    """Fit the wall's line at each hit, lines (N, LINE); return how many of the front scanner's have one."""
     c, s = math.cos(pose[2]), math.sin(pose[2])
+    points, sums = hits.points, np.empty(11)
     found = 0
     for i in range(points.shape[0]):
-        x = pose[0] + c * points[i, 0] - s * points[i, 1]
-        y = pose[1] + s * points[i, 0] + c * points[i, 1]
+        at = (
+            pose[0] + c * points[i, 0] - s * points[i, 1],
+            pose[1] + s * points[i, 0] + c * points[i, 1],
+            points[i, 2],
+        )
         lines[i, 6] = 0.0
-        if fit_line(map_.fine, x, y, points[i, 2], layered, min_cells, lines[i]):
+        if fit_line(map_.fine, at, hits.layered, min_cells, sums, lines[i]):
             lines[i, 6] = map_.fine.cell_m
-        elif fit_line(map_.middle, x, y, points[i, 2], layered, min_cells, lines[i]):
+        elif fit_line(map_.middle, at, hits.layered, min_cells, sums, lines[i]):
             lines[i, 6] = map_.middle.cell_m
-        elif fit_line(map_.coarse, x, y, points[i, 2], layered, min_cells, lines[i]):
+        elif fit_line(map_.coarse, at, hits.layered, min_cells, sums, lines[i]):
             lines[i, 6] = map_.coarse.cell_m
-        found += lines[i, 6] > 0.0
+        found += i < hits.front and lines[i, 6] > 0.0
     return found
 
 
+@nb.njit(cache=True, nogil=True, inline="always")
+def line_weight(line, distance2, incidence2, fine_m, model):  # type: ignore[no-untyped-def]
+    """Return the robust weight (Tukey's) and the weight (1/m²) of a hit at a squared distance (m²) from its line.
+
+    `incidence2`: squared cosine between beam and normal; the range's noise counts across the wall.
+    """
+    coarse_m = model.coarse_noise * (line[6] - fine_m)
+    variance = model.noise_m**2 * incidence2 + line[4] * (1.0 + 1.0 / line[5]) + coarse_m * coarse_m + 1e-6
+    u2 = distance2 / (variance * model.cutoff_sigmas**2)
+    robust = (1.0 - u2) ** 2 if u2 < 1.0 else 0.0
+    return robust, robust / variance
+
+
 @nb.njit(cache=True, nogil=True)
-def normal_equations(pose, points, lines, fine_m, model, H, b):  # type: ignore[no-untyped-def]
+def _eliminate(patch, lean, sums):  # type: ignore[no-untyped-def]
+    """Take the unknown lean of a patch of wall out of the sums of the equations, and begin the next patch.
+
+    Its hits are off by lean x (height over the map's hits), alike for all of them: the Schur complement of that one unknown,
+    with prior N(0, lean²).
+    """
+    pivot = 1.0 / (patch[3] + 1.0 / (lean * lean))
+    g0, g1, g2, gc = patch[0], patch[1], patch[2], patch[4]
+    sums[0] -= g0 * g0 * pivot
+    sums[1] -= g0 * g1 * pivot
+    sums[2] -= g0 * g2 * pivot
+    sums[3] -= g1 * g1 * pivot
+    sums[4] -= g1 * g2 * pivot
+    sums[5] -= g2 * g2 * pivot
+    sums[6] += g0 * gc * pivot
+    sums[7] += g1 * gc * pivot
+    sums[8] += g2 * gc * pivot
+    patch[:] = 0.0
+
+
+@nb.njit(cache=True, nogil=True, inline="always")
+def _add(sums, w, nx, ny, jt, d):  # type: ignore[no-untyped-def]
+    """Add one equation n · shift + jt turn = -d to the sums: upper triangle of H, then b."""
+    wx, wy, wt = w * nx, w * ny, w * jt
+    sums[0] += wx * nx
+    sums[1] += wx * ny
+    sums[2] += wx * jt
+    sums[3] += wy * ny
+    sums[4] += wy * jt
+    sums[5] += wt * jt
+    sums[6] -= wx * d
+    sums[7] -= wy * d
+    sums[8] -= wt * d
+
+
+@nb.njit(cache=True, nogil=True)
+def normal_equations(pose, hits, lines, fine_m, model, H, b):  # type: ignore[no-untyped-def]
     """Fill H (3, 3) and b (3,) of the weighted distances at `pose`; both in the map's axes about the machine.
 
-    Returns (weighted square sum, sum of robust weights).
+    Returns (weighted square sum, sum of robust weights) of the front scanner's hits.
     """
     c, s = math.cos(pose[2]), math.sin(pose[2])
-    h00 = h01 = h02 = h11 = h12 = h22 = b0 = b1 = b2 = total = weights = 0.0
+    points, sums, patch = hits.points, np.zeros(9), np.zeros(5)
+    leaning = hits.layered and model.lean > 0.0
+    patch_x = patch_y = math.inf
+    total = weights = 0.0
     for i in range(points.shape[0]):
         if lines[i, 6] == 0.0:
             continue
         rx, ry = c * points[i, 0] - s * points[i, 1], s * points[i, 0] + c * points[i, 1]
         nx, ny = lines[i, 2], lines[i, 3]
+        towards = nx * rx + ny * ry
+        if towards < 0.0:  # one sign for all normals: a lean moves a patch as a whole
+            nx, ny = -nx, -ny
         d = nx * (pose[0] + rx - lines[i, 0]) + ny * (pose[1] + ry - lines[i, 1])
-        incidence2 = (nx * rx + ny * ry) ** 2 / (rx * rx + ry * ry + 1e-12)
-        coarse_m = model.coarse_noise * (lines[i, 6] - fine_m)
-        variance = model.noise_m**2 * incidence2 + lines[i, 4] * (1.0 + 1.0 / lines[i, 5]) + coarse_m * coarse_m + 1e-6
-        u2 = d * d / (variance * model.cutoff_sigmas**2)
-        if u2 >= 1.0:
+        robust, w = line_weight(lines[i], d * d, towards * towards / (rx * rx + ry * ry + 1e-12), fine_m, model)
+        if w == 0.0:
             continue
-        robust = (1.0 - u2) ** 2
-        w = robust / variance
         jt = -nx * ry + ny * rx
-        h00 += w * nx * nx
-        h01 += w * nx * ny
-        h02 += w * nx * jt
-        h11 += w * ny * ny
-        h12 += w * ny * jt
-        h22 += w * jt * jt
-        b0 -= w * nx * d
-        b1 -= w * ny * d
-        b2 -= w * jt * d
-        total += w * d * d
-        weights += robust
-    H[0, 0], H[0, 1], H[0, 2] = h00, h01, h02
-    H[1, 0], H[1, 1], H[1, 2] = h01, h11, h12
-    H[2, 0], H[2, 1], H[2, 2] = h02, h12, h22
-    b[0], b[1], b[2] = b0, b1, b2
+        _add(sums, w, nx, ny, jt, d)
+        if i < hits.front:
+            total += w * d * d
+            weights += robust
+        if leaning:
+            if (rx - patch_x) ** 2 + (ry - patch_y) ** 2 > model.lean_patch_m**2:
+                _eliminate(patch, model.lean, sums)
+                patch_x, patch_y = rx, ry
+            lag = w * lines[i, 7]
+            patch[0] += lag * nx
+            patch[1] += lag * ny
+            patch[2] += lag * jt
+            patch[3] += lag * lines[i, 7]
+            patch[4] += lag * d
+    if leaning:
+        _eliminate(patch, model.lean, sums)
+    H[0, 0], H[0, 1], H[0, 2] = sums[0], sums[1], sums[2]
+    H[1, 0], H[1, 1], H[1, 2] = sums[1], sums[3], sums[4]
+    H[2, 0], H[2, 1], H[2, 2] = sums[2], sums[4], sums[5]
+    b[:] = sums[6:9]
     return total, weights
 
 
@@ -124,30 +205,29 @@ def solve3(A: FloatArray, b: FloatArray) -> FloatArray:
 
 
 @nb.njit(cache=True, nogil=True)
-def match(map_, points, layered, predicted, prior_information, start, model):  # type: ignore[no-untyped-def]
-    """Return the `Match` of `points` (N, 3), level base frame with absolute heights: maximum a posteriori from `start`.
+def match(map_, hits, prior, start, model):  # type: ignore[no-untyped-def]
+    """Return the `Match` of `hits` with the map: maximum a posteriori from `start` (3,) under the `Prior`.
 
-    `layered`: the scanner tilts, heights matter. The prior has mean `predicted` (3,) and weight `prior_information`
-    (3, 3); lines are fitted anew when the pose has moved.
+    Lines are fitted anew when the pose has moved.
     """
     pose = start.copy()
-    lines = np.zeros((points.shape[0], 7))
+    lines = np.zeros((hits.points.shape[0], LINE))
     H, b = np.zeros((3, 3)), np.zeros(3)
     fine_m = map_.fine.cell_m
     found = 0
     for _ in range(model.rounds):
-        found = lines_at(map_, pose, points, layered, model.min_cells, lines)
+        found = lines_at(map_, pose, hits, model.min_cells, lines)
         moved = 0.0
         for _ in range(3):
-            normal_equations(pose, points, lines, fine_m, model, H, b)
-            step = solve3(H + prior_information, b + prior_information @ (predicted - pose))
+            normal_equations(pose, hits, lines, fine_m, model, H, b)
+            step = solve3(H + prior.information, b + prior.information @ (prior.pose - pose))
             pose += step
             size = abs(step[0]) + abs(step[1]) + 5.0 * abs(step[2])
             moved += size
             if size < 2e-5:
                 break
-        if moved < 2e-3:
+        if moved < _LINES_HOLD * fine_m:
             break
-    total, weights = normal_equations(pose, points, lines, fine_m, model, H, b)
-    n = max(points.shape[0], 1)
+    total, weights = normal_equations(pose, hits, lines, fine_m, model, H, b)
+    n = max(hits.front, 1)
     return Match(pose, H, found / n, weights / n, math.sqrt(total / max(weights, 1e-9)), lines)

@@ -12,19 +12,25 @@ from lhdmap.odometry.anchored import AnchoredMatcher
 from lhdmap.odometry.clock import ScanClock
 from lhdmap.odometry.flow_matcher import FlowMatcher
 from lhdmap.odometry.motion import FORWARD, TURNING, Motion
+from lhdmap.odometry.rear_view import NOTHING_BEHIND, Behind, RearView, behind
 from lhdmap.odometry.scan_points import NO_BOXES, half_sweep_ns, planar_points
 from lhdmap.odometry.settings import AnchorSettings, OdometrySettings, RangeFlowSettings, SearchSettings
 from lhdmap.odometry.steps import Matched, OdometryStep, WheelStep, body_information, marginal_information
 
 _FIRST_SCANS = 10
 _SHORTEST_STEP_S = 1e-3
+_SLOWEST_REAR_MPS = 0.1
 
 
 class View(NamedTuple):
-    """What else is known of a scan's surroundings: `height_m` of `base_link` in `odom`; `boxes_m` (K, 6): own bodies."""
+    """What else is known of a scan's surroundings.
+
+    `height_m` of `base_link` in `odom`; `boxes_m` (K, 6): own bodies; `rear`: what the rear scanner sees at the same time.
+    """
 
     height_m: float = 0.0
     boxes_m: FloatArray = NO_BOXES
+    rear: RearView | None = None
 
 
 _PLAIN = View()
@@ -77,7 +83,17 @@ class PlanarOdometry:
         points = planar_points(scan, T_level_sensor, self._motion.velocity, floor_m, view.boxes_m, self._part(scan))
         points[:, 2] += view.height_m
         self.points = points
-        return self._step(scan, self._matcher.step(points, _planar_mount(T_level_sensor)))
+        mount = _planar_mount(T_level_sensor)
+        if isinstance(self._matcher, FlowMatcher):
+            return self._step(scan, self._matcher.step(points, mount))
+        return self._step(scan, self._matcher.step(points, mount, self._behind(view, floor_m)))
+
+    def _behind(self, view: View, floor_m: float) -> Behind:
+        """Return the rear scanner's hits; at rest they add nothing."""
+        velocity = self._motion.velocity
+        if view.rear is None or abs(velocity[0]) < _SLOWEST_REAR_MPS:
+            return NOTHING_BEHIND
+        return behind(view.rear, velocity, view.height_m, floor_m, self._settings.max_rear_beams)
 
     def _part(self, scan: LaserScan) -> tuple[int, int]:
         """Return first beam and step so that no more than `max_beams` are used, another part each time."""

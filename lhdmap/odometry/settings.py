@@ -39,6 +39,13 @@ class OdometrySettings:
         source="measured: 381 and 761 beams give the same error (docs/odometry.md)",
         doc="A scan with more beams is thinned, each time from another beam on.",
     )
+    max_rear_beams: int = setting(
+        200,
+        unit="beams",
+        minimum=20,
+        source="measured: twice as many gain nothing (docs/odometry.md)",
+        doc="The same for the rear scanner, which helps a tilted front one.",
+    )
     step_deg: float = setting(1.0, unit="deg", doc="... or has turned this far.", minimum=0.0, source="measured")
     step_s: float = setting(0.2, unit="s", doc="... or this time has passed.", minimum=0.0, source="lhdmap")
     forward_acceleration: float = setting(
@@ -142,6 +149,17 @@ class AnchorSettings:
         doc="Travel over which the pose's uncertainty against the map is renewed with the map.",
         minimum=0.05,
         source="measured in smooth walls",
+    )
+    lean: float = setting(
+        0.2,
+        unit="m/m",
+        doc="Lean of the walls, standard deviation: a tilted scanner sees a wall higher up each time (0: walls are upright).",
+        minimum=0.0,
+        maximum=2.0,
+        source="measured in rough 3D drifts (docs/odometry.md)",
+    )
+    lean_patch_m: float = setting(
+        2.0, unit="m", doc="Length of wall that leans alike.", minimum=0.2, maximum=20.0, source="measured, as lean"
     )
     rounds: int = setting(4, doc="Times that lines are fitted anew in one match at most.", minimum=1, maximum=20)
     young_m: float = setting(

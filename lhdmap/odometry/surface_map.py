@@ -18,6 +18,7 @@ import numpy.typing as npt
 from lhdmap.messages import Float32Array, FloatArray
 
 KERNEL_CELLS = 3  # a line is fitted to the cells within this many cells of a point
+LINE = 8  # numbers of a line: see `fit_line`
 KERNEL_SIGMA_CELLS = 2.0
 LAYERS = 8
 LAYER_M = 0.12
@@ -30,11 +31,12 @@ _HEIGHT_FLOOR_M2 = 0.02**2  # spread in height below which no slope is fitted to
 class Level(NamedTuple):
     """One grid of cells.
 
-    `tags` (n, n, LAYERS) int32 (0: empty); `hits` (n, n, LAYERS, 4) float32: count and mean offset x, y, z from the cell's
-    corner, metres.
+    `layers` (n, n) uint8: a bit for each layer that ever held hits; `tags` (n, n, LAYERS) int32 (0: empty); `hits`
+    (n, n, LAYERS, 4) float32: count and mean offset x, y, z from the cell's corner, metres.
     """
 
     cell_m: float
+    layers: npt.NDArray[np.uint8]
     tags: npt.NDArray[np.int32]
     hits: Float32Array
 
@@ -54,7 +56,12 @@ def empty_map(cell_m: float, cells: int = 1024) -> SurfaceMap:
 
 def _level(cell_m: float, cells: int) -> Level:
     # zeros are mapped lazily by the operating system: only pages that walls touch take memory
-    return Level(cell_m, np.zeros((cells, cells, LAYERS), np.int32), np.zeros((cells, cells, LAYERS, 4), np.float32))
+    return Level(
+        cell_m,
+        np.zeros((cells, cells), np.uint8),
+        np.zeros((cells, cells, LAYERS), np.int32),
+        np.zeros((cells, cells, LAYERS, 4), np.float32),
+    )
 
 
 @nb.njit(cache=True, nogil=True, inline="always")
@@ -79,6 +86,7 @@ def insert(level: Level, points_m: FloatArray, count_limit: float) -> None:
         cell = level.hits[jx, jy, jz]
         if level.tags[jx, jy, jz] != tag:
             level.tags[jx, jy, jz] = tag
+            level.layers[jx, jy] |= np.uint8(1 << jz)
             cell[:] = 0.0
         n = min(cell[0] + 1.0, count_limit)
         cell[0] = n
@@ -95,80 +103,99 @@ def insert_all(map_: SurfaceMap, points_m: FloatArray, count_limit: float) -> No
     insert(map_.coarse, points_m, count_limit)
 
 
-@nb.njit(cache=True, nogil=True)
-def fit_line(  # noqa: C901  # one pass over the cells, unrolled for speed
-    level: Level, x: float, y: float, z: float, layered: bool, min_cells: float, line: FloatArray
-) -> bool:
-    """Fit the wall near (x, y) at height z by a line with Gaussian weights; return whether the cells there support one.
+@nb.njit(cache=True, nogil=True, inline="always")
+def _neighbours(level: Level, z: float, layered: bool) -> tuple[int, int]:
+    """Return the first and the last layer to look at: coarse cells serve distant walls, seen at many heights."""
+    own = int(math.floor(z / LAYER_M))
+    if not layered:
+        return own, own
+    if level.cell_m > _FINE_M:
+        return own - 1, own + 1
+    return (own - 1, own) if z / LAYER_M - own < 0.5 else (own, own + 1)
 
-    `layered`: look at the layers above and below, too (a planar scan has one). `line`, shape (6,), receives: centre x, y at
-    that height, normal x, y, scatter across the line (variance, m²), effective number of cells.
+
+@nb.njit(cache=True, nogil=True)
+def _gather(level: Level, x: float, y: float, z: float, layered: bool, sums: FloatArray) -> bool:
+    """Add up the cells around (x, y, z) with Gaussian weights; False where there are none.
+
+    `sums`, shape (11,), receives: weights, squared weights, x, y, z, xx, xy, yy, xz, yz, zz about the point.
     """
     size = level.tags.shape[0]
-    mask, shift = size - 1, int(round(math.log2(size)))
-    cell = level.cell_m
-    cx, cy, cz = int(math.floor(x / cell)), int(math.floor(y / cell)), int(math.floor(z / LAYER_M))
-    z_low = z_high = cz
-    if (
-        layered
-    ):  # fine: the nearer neighbour; coarse cells serve distant walls, which a tilted plane sees at many heights
-        z_low = cz - (1 if cell > _FINE_M or z / LAYER_M - cz < 0.5 else 0)
-        z_high = cz + (1 if cell > _FINE_M or z / LAYER_M - cz >= 0.5 else 0)
+    mask, shift, cell = size - 1, int(round(math.log2(size))), level.cell_m
+    cx, cy = int(math.floor(x / cell)), int(math.floor(y / cell))
+    z_low, z_high = _neighbours(level, z, layered)
     scale, z_scale = -0.5 / (KERNEL_SIGMA_CELLS * cell) ** 2, -0.5 / max(_HEIGHT_SIGMA_M, _HEIGHT_PER_CELL * cell) ** 2
     reach = (KERNEL_CELLS * cell) ** 2
+    wanted = 0
+    for iz in range(z_low, z_high + 1):
+        wanted |= 1 << (iz & (LAYERS - 1))
     s0 = s1 = sx = sy = sz = sxx = sxy = syy = sxz = syz = szz = 0.0
     for ix in range(cx - KERNEL_CELLS, cx + KERNEL_CELLS + 1):
         jx = ix & mask
         for iy in range(cy - KERNEL_CELLS, cy + KERNEL_CELLS + 1):
             jy = iy & mask
+            if level.layers[jx, jy] & wanted == 0:
+                continue
             for iz in range(z_low, z_high + 1):
                 jz = iz & (LAYERS - 1)
                 if level.tags[jx, jy, jz] != _tag(ix, iy, iz, shift):
                     continue
                 dx = ix * cell + level.hits[jx, jy, jz, 1] - x
                 dy = iy * cell + level.hits[jx, jy, jz, 2] - y
-                dz = iz * LAYER_M + level.hits[jx, jy, jz, 3] - z
                 d2 = dx * dx + dy * dy
                 if d2 > reach:
                     continue
+                dz = iz * LAYER_M + level.hits[jx, jy, jz, 3] - z
                 n = level.hits[jx, jy, jz, 0]
                 w = math.exp(scale * d2 + z_scale * dz * dz) * n / (n + 1.0)
-                s0 += w
-                s1 += w * w
-                sx += w * dx
-                sy += w * dy
-                sz += w * dz
-                sxx += w * dx * dx
-                sxy += w * dx * dy
-                syy += w * dy * dy
-                sxz += w * dx * dz
-                syz += w * dy * dz
-                szz += w * dz * dz
-    if s0 <= 1e-9:
+                wx, wy, wz = w * dx, w * dy, w * dz
+                s0, s1, sx, sy, sz = s0 + w, s1 + w * w, sx + wx, sy + wy, sz + wz
+                sxx, sxy, syy = sxx + wx * dx, sxy + wx * dy, syy + wy * dy
+                sxz, syz, szz = sxz + wx * dz, syz + wy * dz, szz + wz * dz
+    sums[0], sums[1], sums[2], sums[3], sums[4] = s0, s1, sx, sy, sz
+    sums[5], sums[6], sums[7], sums[8], sums[9], sums[10] = sxx, sxy, syy, sxz, syz, szz
+    return s0 > 1e-9
+
+
+@nb.njit(cache=True, nogil=True)
+def fit_line(
+    level: Level, at: tuple[float, float, float], layered: bool, min_cells: float, sums: FloatArray, line: FloatArray
+) -> bool:
+    """Fit the wall near `at` (x, y, height) by a line with Gaussian weights; return whether the cells there support one.
+
+    `layered`: look at the layers above and below, too (a planar scan has one). `sums` (11,) is room to work in. `line`,
+    shape (LINE,), receives: centre x, y at that height, normal x, y, scatter across the line (variance, m²), effective number
+    of cells, [6] left to the caller, and by how much the cells lie lower than the point, as far as no lean accounts for it (m).
+    """
+    if not _gather(level, at[0], at[1], at[2], layered, sums):
         return False
-    effective = s0 * s0 / s1
+    s0 = sums[0]
+    effective = s0 * s0 / sums[1]
     # A line wants cells spread along it, and little beside it. Chords between a few sparse hits fit best where those beams
     # hit before: they pull the estimate towards standing still.
     if effective < min_cells:
         return False
-    mx, my, mz = sx / s0, sy / s0, sz / s0
-    cxx, cxy, cyy = sxx / s0 - mx * mx, sxy / s0 - mx * my, syy / s0 - my * my
+    mx, my, mz = sums[2] / s0, sums[3] / s0, sums[4] / s0
+    cxx, cxy, cyy = sums[5] / s0 - mx * mx, sums[6] / s0 - mx * my, sums[7] / s0 - my * my
+    line[7] = 0.0
     if layered:  # the wall leans: take it at the point's own height
-        cxz, cyz = sxz / s0 - mx * mz, syz / s0 - my * mz
-        czz = szz / s0 - mz * mz + _HEIGHT_FLOOR_M2
+        cxz, cyz = sums[8] / s0 - mx * mz, sums[9] / s0 - my * mz
+        czz = sums[10] / s0 - mz * mz + _HEIGHT_FLOOR_M2
         lean_x, lean_y = cxz / czz, cyz / czz
         mx, my = mx - lean_x * mz, my - lean_y * mz
         cxx, cxy, cyy = cxx - lean_x * cxz, cxy - lean_x * cyz, cyy - lean_y * cyz
+        line[7] = -mz * _HEIGHT_FLOOR_M2 / czz
     half_trace, half_difference = 0.5 * (cxx + cyy), 0.5 * (cxx - cyy)
     root = math.sqrt(half_difference * half_difference + cxy * cxy)
     small, large = max(half_trace - root, 0.0), half_trace + root
-    if large < (0.7 * cell) ** 2 or small > 0.3 * large:
+    if large < (0.7 * level.cell_m) ** 2 or small > 0.3 * large:
         return False
-    angle = 0.5 * math.atan2(2.0 * cxy, cxx - cyy)
-    line[0] = x + mx
-    line[1] = y + my
-    line[2] = -math.sin(angle)
-    line[3] = math.cos(angle)
-    line[4] = small
-    line[5] = effective
+    # the normal by half-angle formulas: of the eigenvector of `small`
+    cos2 = half_difference / root
+    along_x, along_y = (
+        math.sqrt(max(0.5 * (1.0 + cos2), 0.0)),
+        math.copysign(math.sqrt(max(0.5 * (1.0 - cos2), 0.0)), cxy),
+    )
+    line[0], line[1], line[2], line[3] = at[0] + mx, at[1] + my, -along_y, along_x
+    line[4], line[5] = small, effective
     return True

@@ -31,6 +31,7 @@ from lhdmap.odometry.scan_points import NO_BOXES, half_sweep_ns
 from lhdmap.odometry.start import ScanInput, starting_velocity
 from lhdmap.odometry.steps import OdometryStep, WheelStep
 from lhdmap.pipeline.mounts import Mounts, level_sensor
+from lhdmap.pipeline.rear import RearScans
 from lhdmap.pipeline.records import ScanRecords
 from lhdmap.pipeline.sweeps import ScanSink, SweepIntegration
 from lhdmap.pipeline.track import Track
@@ -70,6 +71,7 @@ class MappingPipeline:
         self.track = Track(settings.odometry.height_lever_m)
         self.records = ScanRecords()
         self.smoother = Smoother(settings.smoothing)
+        self.rear = RearScans(self.mounts, self.wheels, machine or _DEFAULT_MACHINE)
         self.has_inclinometer = False
         self._newest_ns = self._time_ns = -(2**62)
         self._clock_ns = -(2**62)
@@ -87,6 +89,8 @@ class MappingPipeline:
                 self._process_ready()
             case LaserScan() | PointCloud():
                 self.sweeps.hold(role, message.stamp_ns, message)
+                if isinstance(message, LaserScan) and role == "rear":
+                    self.rear.hold(message)
             case Inclination():
                 self._take_inclination(message)
             case Tachometer() | Joints():
@@ -204,9 +208,9 @@ class MappingPipeline:
         """Return a scan with all that is known of the machine at `time_ns`, the middle of its sweep."""
         roll, pitch = self._attitude_at(time_ns)
         T_level_sensor = level_sensor(self.mounts.of(scan.frame_id, "front"), roll, pitch)
-        return ScanInput(
-            scan, T_level_sensor, self._wheel_step(before_ns, time_ns), View(self.track.height_m, self._boxes)
-        )
+        rear = self.rear.near(time_ns, roll, pitch) if self.has_inclinometer else None
+        view = View(self.track.height_m, self._boxes, rear)
+        return ScanInput(scan, T_level_sensor, self._wheel_step(before_ns, time_ns), view)
 
     def _attitude_at(self, time_ns: int) -> tuple[float, float]:
         """Return roll and pitch; a log without inclinometer, or a gap of it, counts as level."""

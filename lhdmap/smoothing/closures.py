@@ -14,7 +14,7 @@ import numpy as np
 
 from lhdmap.geometry import se2
 from lhdmap.messages import FloatArray
-from lhdmap.odometry.matching import Match, MatchModel, match
+from lhdmap.odometry.matching import Hits, Match, MatchModel, Prior, match
 from lhdmap.odometry.search import search
 from lhdmap.odometry.steps import marginal_information
 from lhdmap.odometry.surface_map import SurfaceMap, empty_map, insert_all
@@ -99,7 +99,8 @@ def _match(key: KeyScan, surroundings: FloatArray, predicted: FloatArray, reach_
     reach = np.array([reach_m, math.radians(25.0)])
     starts = search(flat, thin, predicted, no_prior, reach, 0.15, math.radians(2.5))
     usable = [start for start in starts if (np.abs(start) < 1e29).all()][:_STARTS] or [predicted]
-    tried = [match(place, points, False, start, no_prior, start, _MODEL) for start in usable]
+    hits = Hits(points, len(points), layered=False)
+    tried = [match(place, hits, Prior(start, no_prior), start, _MODEL) for start in usable]
     return max(tried, key=lambda one: one.support)
 
 

@@ -10,10 +10,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from lhdmap.geometry import se2
 from lhdmap.messages import FloatArray
-from lhdmap.odometry.matching import MatchModel, match, solve3
+from lhdmap.odometry.matching import Hits, MatchModel, Prior, match, normal_equations, solve3
 from lhdmap.odometry.scan_points import planar_points
 from lhdmap.odometry.search import search
-from lhdmap.odometry.surface_map import SurfaceMap, empty_map, insert_all
+from lhdmap.odometry.surface_map import LINE, SurfaceMap, empty_map, insert_all
 
 from tests.odometry.planar_drives import LEVEL, drive
 
@@ -24,6 +24,10 @@ NO_PRIOR = np.diag([1e-2, 1e-2, 1e-1])
 
 def hits(index: int) -> FloatArray:
     return planar_points(drive()[1][index], LEVEL, np.zeros(3))
+
+
+def seen(index: int) -> Hits:
+    return Hits(hits(index), len(hits(index)), layered=False)
 
 
 @pytest.fixture(scope="module")
@@ -39,7 +43,7 @@ def walls() -> SurfaceMap:
 def test_matching_ends_at_the_true_pose(walls: SurfaceMap, seed: int) -> None:
     true, rng = drive()[0][LAST], np.random.default_rng(seed)
     start = true + rng.uniform(-1.0, 1.0, 3) * np.array([0.05, 0.05, math.radians(1.0)])
-    found = match(walls, hits(LAST), False, start, NO_PRIOR, start, MODEL)
+    found = match(walls, seen(LAST), Prior(start, NO_PRIOR), start, MODEL)
     error = se2.between(true, found.pose)
     assert np.hypot(error[0], error[1]) < 0.004
     assert abs(math.degrees(error[2])) < 0.05
@@ -47,7 +51,7 @@ def test_matching_ends_at_the_true_pose(walls: SurfaceMap, seed: int) -> None:
 
 
 def test_information_tells_the_errors_size(walls: SurfaceMap) -> None:
-    found = match(walls, hits(LAST), False, drive()[0][LAST], NO_PRIOR, drive()[0][LAST], MODEL)
+    found = match(walls, seen(LAST), Prior(drive()[0][LAST], NO_PRIOR), drive()[0][LAST], MODEL)
     assert np.linalg.eigvalsh(found.information).min() > 0.0
     error = found.pose - drive()[0][LAST]
     assert error @ found.information @ error < 60.0  # three degrees of freedom; the map's own error comes on top
@@ -62,7 +66,7 @@ def test_search_finds_far_starts(walls: SurfaceMap, shift_m: float, turn_deg: fl
     reach = np.array([1.0, math.radians(40.0)])
     starts = search(recent, hits(LAST)[::3], predicted, 1e-3 * np.eye(3), reach, 0.1, math.radians(2.0))
     usable = [start for start in starts if (np.abs(start) < 1e29).all()]
-    tried = [match(walls, hits(LAST), False, start, NO_PRIOR, start, MODEL) for start in usable]
+    tried = [match(walls, seen(LAST), Prior(start, NO_PRIOR), start, MODEL) for start in usable]
     error = se2.between(true, max(tried, key=lambda one: one.support).pose)
     assert np.hypot(error[0], error[1]) < 0.01
     assert abs(math.degrees(error[2])) < 0.1
@@ -78,3 +82,27 @@ def test_the_solver_is_that_of_numpy(values: list[float]) -> None:
 
 def test_the_solver_says_nothing_of_a_singular_system() -> None:
     assert (solve3(np.zeros((3, 3)), np.ones(3)) == 0.0).all()
+
+
+def test_the_lean_of_a_patch_is_one_unknown_more() -> None:
+    """Eliminating the lean gives what a least squares with all unknowns gives."""
+    rng = np.random.default_rng(3)
+    count, pose = 60, np.zeros(3)
+    points = np.column_stack([rng.uniform(3.0, 3.5, (count, 2)), np.zeros(count)])
+    lines = np.zeros((count, LINE))
+    normal = rng.uniform(0.2, 1.0, (count, 2))
+    lines[:, 2:4] = normal / np.linalg.norm(normal, axis=1)[:, None]
+    lines[:, :2] = points[:, :2] + rng.normal(0.0, 0.01, (count, 2))
+    lines[:, 4], lines[:, 5], lines[:, 6] = 1e-4, 8.0, 0.025
+    lines[:, 7] = rng.normal(0.03, 0.02, count)
+    model = MODEL._replace(lean=0.2, lean_patch_m=5.0, cutoff_sigmas=1e6)
+    H, b = np.zeros((3, 3)), np.zeros(3)
+    normal_equations(pose, Hits(points, count, layered=True), lines, 0.025, model, H, b)
+    n = lines[:, 2:4]
+    d = (n * (points[:, :2] - lines[:, :2])).sum(axis=1)
+    beams = (n * points[:, :2]).sum(axis=1) ** 2 / (points[:, :2] ** 2).sum(axis=1)
+    w = 1.0 / (model.noise_m**2 * beams + 1e-4 * (1.0 + 1.0 / 8.0) + 1e-6)
+    J = np.column_stack([n, n[:, 1] * points[:, 0] - n[:, 0] * points[:, 1], -lines[:, 7]])
+    full = J.T @ (w[:, None] * J) + np.diag([0.0, 0.0, 0.0, 1.0 / 0.2**2])
+    expected = np.linalg.solve(full, -J.T @ (w * d))[:3]
+    assert np.linalg.solve(H, b) == pytest.approx(expected, rel=1e-6, abs=1e-9)

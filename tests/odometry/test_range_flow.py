@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from lhdmap.geometry import se2
 from lhdmap.messages import FloatArray, LaserScan
-from lhdmap.odometry.flow_scan import Pyramid
+from lhdmap.odometry.flow_scan import BEND, SLOPE, WALL, Pyramid, Y
 from lhdmap.odometry.range_flow import Flow, flow
 from lhdmap.odometry.scan_points import planar_points
 from lhdmap.odometry.settings import RangeFlowSettings
@@ -116,7 +116,53 @@ def test_invalid_beams_are_left_out_one_by_one() -> None:
 def test_a_scan_without_returns_gives_the_guess_and_no_information(value: float) -> None:
     first = scan_at(PLACE, PlanarScanner())
     blind = first._replace(ranges_m=np.full_like(first.ranges_m, value))
-    assert len(planar_points(blind, LEVEL, np.zeros(3))) == 0
+    for pair in ((first, blind), (blind, first), (blind, blind)):
+        found = between(*pair, guess=MOTION)
+        assert found.T_reference_current == pytest.approx(MOTION)
+        assert not found.information.any()
+        assert found.support == 0.0
+
+
+@pytest.mark.parametrize("hits", [1, 2, 11])
+def test_a_few_hits_give_the_guess_and_no_information(hits: int) -> None:
+    whole = planar_points(scan_at(PLACE, PlanarScanner()), LEVEL, np.zeros(3))
+    few, many = (Pyramid(points, SETTINGS.width_m, 1) for points in (whole[:hits], whole))
+    assert not flow(few, many, MOTION, NO_PRIOR, 0.012).information.any()
+    assert not flow(many, few, MOTION, NO_PRIOR, 0.012).information.any()
+
+
+def test_a_straight_wall_has_its_slope_at_every_level() -> None:
+    """R = d / sin(theta): the slope dR/dtheta / R is -cot(theta), the beams' ends lie on the wall and nothing bends."""
+    angles = np.radians(np.arange(20.0, 160.0, 0.5))
+    pyramid = Pyramid(np.column_stack([2.0 / np.tan(angles), np.full(angles.size, 2.0)]), SETTINGS.width_m, 3)
+    for k in range(3):
+        level, theta = pyramid.level(k), angles[:: 1 << k]
+        assert level[:, SLOPE] == pytest.approx(-1.0 / np.tan(theta), abs=1e-9)
+        assert level[:, Y] == pytest.approx(2.0)
+        assert level[:, BEND] == pytest.approx(0.0, abs=1e-12)
+        assert level[:-1, WALL].all()
+        assert level[-1, WALL] == 0.0
+
+
+def test_a_jump_of_the_range_and_a_missing_beam_part_walls() -> None:
+    angles = np.radians(np.arange(-60.0, 60.0, 0.5))
+    ranges = np.where(angles < 0.0, 3.0, 5.0)
+    kept = np.ones(angles.size, dtype=bool)
+    kept[200:204] = False
+    points = (ranges[:, None] * np.column_stack([np.cos(angles), np.sin(angles)]))[kept]
+    parted = np.flatnonzero(Pyramid(points, SETTINGS.width_m, 1).level(0)[:-1, WALL] == 0.0)
+    assert parted.tolist() == [119, 199]
+
+
+@pytest.mark.parametrize("seed", [0, 1])
+def test_the_order_of_the_hits_does_not_matter(seed: int) -> None:
+    points = planar_points(scan_at(PLACE, PlanarScanner(field_of_view_deg=359.5)), LEVEL, np.zeros(3))
+    mixed = points[np.random.default_rng(seed).permutation(len(points))]
+    levels_of_both = [
+        Pyramid(one, SETTINGS.width_m, 1).level(0) for one in (points, mixed, np.roll(points, 90, axis=0))
+    ]
+    assert np.array_equal(levels_of_both[0], levels_of_both[1])
+    assert np.array_equal(levels_of_both[0], levels_of_both[2])
 
 
 @pytest.mark.parametrize("motion", [(0.3, 0.0, 0.0), (0.5, 0.0, 0.0), (0.2, 0.05, 0.26), (0.0, 0.0, -0.26)])

@@ -9,10 +9,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from lhdmap.messages import FloatArray
-from lhdmap.odometry.surface_map import LAYER_M, SurfaceMap, empty_map, fit_line, insert, insert_all
+from lhdmap.odometry.surface_map import LAYER_M, LINE, SurfaceMap, empty_map, fit_line, insert, insert_all
 
 CELL_M = 0.025
 CELLS = 256
+ROOM = np.zeros(11)
 
 
 def wall(at_m: tuple[float, float], angle_rad: float, height_m: float = 0.01) -> FloatArray:
@@ -39,10 +40,10 @@ def mapped(*walls: FloatArray) -> SurfaceMap:
 )
 def test_a_straight_wall_is_found_as_it_is(x: float, y: float, angle: float, beside: float) -> None:
     map_ = mapped(wall((x, y), angle))
-    line = np.zeros(6)
+    line = np.zeros(LINE)
     normal = np.array([-math.sin(angle), math.cos(angle)])
     at = np.array([x, y]) + beside * normal
-    assert fit_line(map_.fine, at[0], at[1], 0.01, False, 4.0, line)
+    assert fit_line(map_.fine, (at[0], at[1], 0.01), False, 4.0, ROOM, line)
     assert abs(abs(line[2:4] @ normal) - 1.0) < 1e-4
     assert (at - line[:2]) @ line[2:4] == pytest.approx(math.copysign(beside, line[2:4] @ normal * beside), abs=5e-4)
     assert line[4] < 1e-5
@@ -50,31 +51,31 @@ def test_a_straight_wall_is_found_as_it_is(x: float, y: float, angle: float, bes
 
 
 def test_no_line_where_there_are_no_hits_nor_in_a_crowd() -> None:
-    line = np.zeros(6)
-    assert not fit_line(mapped(wall((0.0, 0.0), 0.0)).fine, 3.0, 1.0, 0.01, False, 4.0, line)
+    line = np.zeros(LINE)
+    assert not fit_line(mapped(wall((0.0, 0.0), 0.0)).fine, (3.0, 1.0, 0.01), False, 4.0, ROOM, line)
     crowd = np.column_stack([np.random.default_rng(0).uniform(-0.1, 0.1, (400, 2)), np.full(400, 0.01)])
-    assert not fit_line(mapped(crowd).fine, 0.0, 0.0, 0.01, False, 4.0, line)
+    assert not fit_line(mapped(crowd).fine, (0.0, 0.0, 0.01), False, 4.0, ROOM, line)
 
 
 @pytest.mark.parametrize(("windows_x", "windows_y"), [(1, 0), (0, 1), (-1, 1), (3, -2)])
 def test_places_one_window_apart_do_not_mix(windows_x: int, windows_y: int) -> None:
     window_m = CELL_M * CELLS
-    map_, line = empty_map(CELL_M, CELLS), np.zeros(6)
+    map_, line = empty_map(CELL_M, CELLS), np.zeros(LINE)
     insert(map_.fine, wall((0.5, 0.5), 0.0), 50.0)
     away = (0.5 + windows_x * window_m, 0.5 + windows_y * window_m)
-    assert not fit_line(map_.fine, *away, 0.01, False, 4.0, line)
+    assert not fit_line(map_.fine, (*away, 0.01), False, 4.0, ROOM, line)
     insert(map_.fine, wall(away, math.pi / 2), 50.0)
-    assert fit_line(map_.fine, *away, 0.01, False, 4.0, line)
+    assert fit_line(map_.fine, (*away, 0.01), False, 4.0, ROOM, line)
     assert abs(line[2]) > 0.999  # the new wall's normal; none of the old one's hits is in it
     assert (line[:2] - away) @ line[2:4] == pytest.approx(0.0, abs=1e-3)
 
 
 def test_heights_a_layer_apart_are_walls_of_their_own() -> None:
     low, high = 0.5 * LAYER_M, 3.5 * LAYER_M
-    map_, line = mapped(wall((0.0, 0.0), 0.0, low), wall((0.0, 0.04), 0.0, high)), np.zeros(6)
-    assert fit_line(map_.fine, 0.0, 0.0, low, True, 4.0, line)
+    map_, line = mapped(wall((0.0, 0.0), 0.0, low), wall((0.0, 0.04), 0.0, high)), np.zeros(LINE)
+    assert fit_line(map_.fine, (0.0, 0.0, low), True, 4.0, ROOM, line)
     assert line[1] == pytest.approx(0.0, abs=1e-3)
-    assert fit_line(map_.fine, 0.0, 0.04, high, True, 4.0, line)
+    assert fit_line(map_.fine, (0.0, 0.04, high), True, 4.0, ROOM, line)
     assert line[1] == pytest.approx(0.04, abs=1e-3)
 
 
@@ -82,13 +83,13 @@ def test_a_leaning_wall_is_taken_at_the_points_height() -> None:
     lean = 0.2
     heights = np.linspace(-0.1, 0.4, 60)
     hits = np.concatenate([wall((0.0, lean * z), 0.0, z) for z in heights])
-    map_, line = mapped(hits), np.zeros(6)
+    map_, line = mapped(hits), np.zeros(LINE)
     for z in (0.06, 0.12, 0.2):
-        assert fit_line(map_.fine, 0.0, lean * z, z, True, 4.0, line)
+        assert fit_line(map_.fine, (0.0, lean * z, z), True, 4.0, ROOM, line)
         assert (line[1] - lean * z) * line[3] == pytest.approx(0.0, abs=2e-3)
 
 
 def test_hits_that_are_not_numbers_stay_out() -> None:
-    map_, line = mapped(wall((0.0, 0.0), 0.0), np.array([[np.nan, 0.0, 0.0], [np.inf, 0.0, 0.0]])), np.zeros(6)
-    assert fit_line(map_.fine, 0.0, 0.0, 0.01, False, 4.0, line)
+    map_, line = mapped(wall((0.0, 0.0), 0.0), np.array([[np.nan, 0.0, 0.0], [np.inf, 0.0, 0.0]])), np.zeros(LINE)
+    assert fit_line(map_.fine, (0.0, 0.0, 0.01), False, 4.0, ROOM, line)
     assert np.isfinite(map_.fine.hits).all()

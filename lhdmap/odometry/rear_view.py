@@ -1,0 +1,106 @@
+"""The rear scanner as a help of the odometry: it sees again the walls that the front scanner mapped, at the same heights.
+
+A tilted scanner that drives forward sees each wall at rising heights and never the same curve twice, so that a wall that leans
+and a wrong speed look alike. Looking back, the same curve is seen once more, metres later: that ends the ambiguity. The rear
+scanner sits behind the joint; an offset of its encoder is learned on the way.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numba as nb
+import numpy as np
+
+from lhdmap.messages import FloatArray, LaserScan
+from lhdmap.odometry.matching import Hits, Match, MatchModel, line_weight
+from lhdmap.odometry.scan_points import planar_points
+
+NO_POINTS = np.zeros((0, 3))
+_FIRST_STD_RAD = math.radians(0.2)
+_SPREAD_RAD = 0.01  # of one comparison of joint and map: the map's own bend, alike for many scans, not the scan's noise
+_WANDER_RAD = 1e-4
+_FEWEST_INFORMATION = 1e4  # 1/rad²
+
+
+class RearView(NamedTuple):
+    """The rear scan nearest in time.
+
+    `T_level_sensor` (4, 4) in the level frame of `base_link` when it was taken, `late_s` after the front scan's middle; the
+    joint is at (`joint_x_m`, 0) in `base_link`.
+    """
+
+    scan: LaserScan
+    T_level_sensor: FloatArray
+    late_s: float
+    joint_x_m: float
+
+
+class Behind(NamedTuple):
+    """Hits of the rear scanner, points (N, 3), level base frame, absolute heights; x of the joint in that frame (m)."""
+
+    points: FloatArray
+    joint_x_m: float
+
+
+NOTHING_BEHIND = Behind(NO_POINTS, 0.0)
+
+
+def behind(view: RearView, velocity: FloatArray, height_m: float, floor_m: float, most: int) -> Behind:
+    """Return the rear hits, `most` at the most, where `base_link` is in the middle of the front scanner's sweep.
+
+    `velocity` (3,): forward, lateral, turning speed; `height_m` of `base_link` in `odom`; hits below `floor_m` are left out.
+    """
+    every = -(-view.scan.ranges_m.size // most)
+    points = planar_points(view.scan, view.T_level_sensor, velocity, floor_m, every=(0, every))
+    turn = velocity[2] * view.late_s
+    c, s = math.cos(turn), math.sin(turn)
+    moved = np.empty_like(points)
+    moved[:, 0] = c * points[:, 0] - s * points[:, 1] + velocity[0] * view.late_s
+    moved[:, 1] = s * points[:, 0] + c * points[:, 1] + velocity[1] * view.late_s
+    moved[:, 2] = points[:, 2] + height_m
+    return Behind(moved, view.joint_x_m)
+
+
+class JointOffset:
+    """Learns by how much the joint's encoder is off, from what the map says of the rear hits."""
+
+    def __init__(self) -> None:
+        self.offset_rad = 0.0
+        self._variance = _FIRST_STD_RAD**2
+
+    def turned(self, seen: Behind) -> FloatArray:
+        """Return the rear hits (N, 3) with the offset applied: turned about the joint."""
+        c, s = math.cos(self.offset_rad), math.sin(self.offset_rad)
+        x, y = seen.points[:, 0] - seen.joint_x_m, seen.points[:, 1]
+        return np.column_stack([c * x - s * y + seen.joint_x_m, s * x + c * y, seen.points[:, 2]])
+
+    def update(self, found: Match, hits: Hits, model: MatchModel, fine_m: float, joint_x_m: float) -> None:
+        """Learn from one match."""
+        slope, information = _joint_equation(found, hits, model, fine_m, joint_x_m)
+        if information < _FEWEST_INFORMATION:
+            return
+        gain = self._variance / (self._variance + _SPREAD_RAD**2 + 1.0 / information)
+        self.offset_rad += gain * slope / information
+        self._variance = (1.0 - gain) * self._variance + _WANDER_RAD**2
+
+
+@nb.njit(cache=True, nogil=True)
+def _joint_equation(found, hits, model, fine_m, joint_x_m):  # type: ignore[no-untyped-def]
+    """Return right side and information (1/rad²) of the least squares for a turn of the rear hits about the joint."""
+    pose, points, lines = found.pose, hits.points, found.lines
+    c, s = math.cos(pose[2]), math.sin(pose[2])
+    slope = information = 0.0
+    for i in range(hits.front, points.shape[0]):
+        if lines[i, 6] == 0.0:
+            continue
+        rx, ry = c * points[i, 0] - s * points[i, 1], s * points[i, 0] + c * points[i, 1]
+        nx, ny = lines[i, 2], lines[i, 3]
+        d = nx * (pose[0] + rx - lines[i, 0]) + ny * (pose[1] + ry - lines[i, 1])
+        incidence2 = (nx * rx + ny * ry) ** 2 / (rx * rx + ry * ry + 1e-12)
+        w = line_weight(lines[i], d * d, incidence2, fine_m, model)[1]
+        jt = -nx * (ry - s * joint_x_m) + ny * (rx - c * joint_x_m)
+        slope -= w * jt * d
+        information += w * jt * jt
+    return slope, information
