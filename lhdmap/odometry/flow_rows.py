@@ -13,7 +13,7 @@ from lhdmap.odometry.flow_scan import BEND, GAIN, SLOPE, WALL, X, Y
 
 CAUCHY_SIGMAS = 3.0
 # Parts of the squared slope and of the mean square about the wall's line by which a residual's variance grows: grazing
-# beams, edges and rough walls count less. Measured (docs/odometry.md): best heading of a pair, and over 10 m of rough walls.
+# beams, edges and rough walls count less. Measured: best heading of a pair and best over 10 m in rough walls (tools/evaluate).
 GRAZING_WEIGHT, BEND_WEIGHT = 0.3, 0.5
 
 # Rows of the table of equations, shape (7, M): residual range (m), direction of the warped point as cosine and sine, slope
