@@ -16,7 +16,7 @@ from lhdmap.messages import FloatArray
 SIZE = 7
 
 
-@nb.njit(cache=True, nogil=True)
+@nb.njit(cache=True)
 def initial(pose: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return state (7,) and covariance (7, 7) at the start: pose known by definition, velocity not."""
     state = np.zeros(SIZE)
@@ -26,7 +26,7 @@ def initial(pose: FloatArray) -> tuple[FloatArray, FloatArray]:
     return state, np.diag(variances)
 
 
-@nb.njit(cache=True, nogil=True)
+@nb.njit(cache=True)
 def predict(state: FloatArray, P: FloatArray, dt_s: float, acceleration: FloatArray) -> None:
     """Move state and covariance on by `dt_s` at constant body velocity, in place.
 
@@ -58,7 +58,7 @@ def predict(state: FloatArray, P: FloatArray, dt_s: float, acceleration: FloatAr
     P[6, 6] += 1e-7 * dt_s
 
 
-@nb.njit(cache=True, nogil=True)
+@nb.njit(cache=True)
 def update_speed(
     state: FloatArray, P: FloatArray, axis: int, measured: float, variance: float, scaled: bool, gate: float
 ) -> float:
@@ -81,7 +81,7 @@ def update_speed(
     return nis
 
 
-@nb.njit(cache=True, nogil=True)
+@nb.njit(cache=True)
 def update_pose(state: FloatArray, P: FloatArray, matched: FloatArray, information: FloatArray) -> None:
     """Fuse the matched pose in place: `matched` is the maximum a posteriori pose (prior and scan), `information` the scan's own.
 
@@ -98,7 +98,7 @@ def update_pose(state: FloatArray, P: FloatArray, matched: FloatArray, informati
     P[:, :] = 0.5 * (P + P.T)
 
 
-@nb.njit(cache=True, nogil=True)
+@nb.njit(cache=True)
 def forget_pose(P: FloatArray, share: float) -> None:
     """Shrink the pose's uncertainty by `share`: the map that it is relative to is renewed at the pose itself."""
     keep = math.sqrt(max(1.0 - share, 0.0))

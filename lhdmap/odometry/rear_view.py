@@ -21,6 +21,7 @@ NO_POINTS = np.zeros((0, 3))
 _FIRST_STD_RAD = math.radians(0.2)
 _SPREAD_RAD = 0.01  # of one comparison of joint and map: the map's own bend, alike for many scans, not the scan's noise
 _WANDER_RAD = 1e-4
+_OWN_ZERO = 0.1
 _FEWEST_INFORMATION = 1e4  # 1/rad²
 
 
@@ -82,11 +83,12 @@ class JointOffset:
         if information < _FEWEST_INFORMATION:
             return
         gain = self._variance / (self._variance + _SPREAD_RAD**2 + 1.0 / information)
-        self.offset_rad += gain * slope / information
+        # The encoder's own zero counts, too: a map that bends by the odometry's drift looks like an offset.
+        self.offset_rad += gain * (slope / information - _OWN_ZERO * self.offset_rad)
         self._variance = (1.0 - gain) * self._variance + _WANDER_RAD**2
 
 
-@nb.njit(cache=True, nogil=True)
+@nb.njit(cache=True)
 def _joint_equation(found, hits, model, fine_m, joint_x_m):  # type: ignore[no-untyped-def]
     """Return right side and information (1/rad²) of the least squares for a turn of the rear hits about the joint."""
     pose, points, lines = found.pose, hits.points, found.lines

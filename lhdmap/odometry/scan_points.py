@@ -51,7 +51,7 @@ def half_sweep_ns(scan: LaserScan) -> int:
     return round(0.5e9 * scan.time_increment_s * max(scan.ranges_m.size - 1, 0))
 
 
-@nb.njit(cache=True, nogil=True)
+@nb.njit(cache=True)
 def _points(ranges, sweep, limits, T, velocity, min_height, boxes, every, out):  # type: ignore[no-untyped-def]
     angle_min, increment, beam_s = sweep
     middle_s = 0.5 * beam_s * max(ranges.size - 1, 0)
@@ -78,7 +78,7 @@ def _points(ranges, sweep, limits, T, velocity, min_height, boxes, every, out): 
     return count
 
 
-@nb.njit(cache=True, nogil=True)
+@nb.njit(cache=True)
 def _inside(x, y, z, boxes):  # type: ignore[no-untyped-def]
     for k in range(boxes.shape[0]):
         b = boxes[k]

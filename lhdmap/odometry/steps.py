@@ -63,7 +63,7 @@ class OdometryStep(NamedTuple):
     lost: bool
 
 
-@nb.njit(cache=True, nogil=True)
+@nb.njit(cache=True)
 def body_information(H_map: FloatArray, heading_rad: float) -> FloatArray:
     """Return H (3, 3) in the body's axes."""
     c, s = math.cos(heading_rad), math.sin(heading_rad)
@@ -71,7 +71,7 @@ def body_information(H_map: FloatArray, heading_rad: float) -> FloatArray:
     return np.ascontiguousarray(R.T) @ np.ascontiguousarray(H_map) @ R
 
 
-@nb.njit(cache=True, nogil=True)
+@nb.njit(cache=True)
 def marginal_information(H: FloatArray) -> FloatArray:
     """Return for each axis the information left when the other two are unknown: 1 / diag(H^-1), shape (3,).
 
