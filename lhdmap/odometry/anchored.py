@@ -67,6 +67,7 @@ class AnchoredMatcher:
         self._doubt = 0
         self._jumped = False
         self._joint = JointOffset()
+        self._turn = 0
 
     def step(self, points: FloatArray, T_base_scanner: FloatArray, seen: Behind = NOTHING_BEHIND) -> Matched:
         """Match points (N, 3), level base frame with absolute heights, at the predicted pose; correct the motion, grow the map.
@@ -104,7 +105,9 @@ class AnchoredMatcher:
         """Return what is matched: a level scanner sees the same curve of the walls again by itself."""
         if not self._layered or not len(seen.points):
             return Hits(points, len(points), self._layered)
-        return Hits(np.concatenate([points, self._joint.turned(seen)]), len(points), True)
+        self._turn = 1 - self._turn  # every other hit of the front scanner: as exact with the rear one's, and faster
+        front = points[self._turn :: 2]
+        return Hits(np.concatenate([front, self._joint.turned(seen)]), len(front), True)
 
     def _match(self, hits: Hits, heading: tuple[float, float]) -> Match:
         """Match from the prediction (and a heading with its information); where that does not fit, search widely."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
@@ -25,12 +26,13 @@ _SLOWEST_REAR_MPS = 0.1
 class View(NamedTuple):
     """What else is known of a scan's surroundings.
 
-    `height_m` of `base_link` in `odom`; `boxes_m` (K, 6): own bodies; `rear`: what the rear scanner sees at the same time.
+    `height_m` of `base_link` in `odom`; `boxes_m` (K, 6): own bodies; `rear`: tells what the rear scanner sees at the same
+    time, asked for the scans that are processed only.
     """
 
     height_m: float = 0.0
     boxes_m: FloatArray = NO_BOXES
-    rear: RearView | None = None
+    rear: Callable[[], RearView | None] | None = None
 
 
 _PLAIN = View()
@@ -91,9 +93,10 @@ class PlanarOdometry:
     def _behind(self, view: View, floor_m: float) -> Behind:
         """Return the rear scanner's hits; at rest they add nothing."""
         velocity = self._motion.velocity
-        if view.rear is None or abs(velocity[0]) < _SLOWEST_REAR_MPS:
+        rear = view.rear() if view.rear is not None and abs(velocity[0]) >= _SLOWEST_REAR_MPS else None
+        if rear is None:
             return NOTHING_BEHIND
-        return behind(view.rear, velocity, view.height_m, floor_m, self._settings.max_rear_beams)
+        return behind(rear, velocity, view.height_m, floor_m, self._settings.max_rear_beams)
 
     def _part(self, scan: LaserScan) -> tuple[int, int]:
         """Return first beam and step so that no more than `max_beams` are used, another part each time."""

@@ -29,13 +29,14 @@ _HEIGHT_FLOOR_M2 = 0.02**2  # spread in height below which no slope is fitted to
 
 
 class Level(NamedTuple):
-    """One grid of cells.
+    """One grid of `size` x `size` columns of cells, kept in tiles of 8 x 8: what a fit reads lies close together in memory.
 
-    `layers` (n, n) uint8: a bit for each layer that ever held hits; `tags` (n, n, LAYERS) int32 (0: empty); `hits`
-    (n, n, LAYERS, 4) float32: count and mean offset x, y, z from the cell's corner, metres.
+    `layers` (tiles, 64) uint8: a bit for each layer of a column that ever held hits; `tags` (tiles, LAYERS, 64) int32 (0: empty);
+    `hits` (tiles, LAYERS, 64, 4) float32: count and mean offset x, y, z from the cell's corner, metres.
     """
 
     cell_m: float
+    size: int
     layers: npt.NDArray[np.uint8]
     tags: npt.NDArray[np.int32]
     hits: Float32Array
@@ -56,11 +57,13 @@ def empty_map(cell_m: float, cells: int = 1024) -> SurfaceMap:
 
 def _level(cell_m: float, cells: int) -> Level:
     # zeros are mapped lazily by the operating system: only pages that walls touch take memory
+    tiles = (cells // 8) ** 2
     return Level(
         cell_m,
-        np.zeros((cells, cells), np.uint8),
-        np.zeros((cells, cells, LAYERS), np.int32),
-        np.zeros((cells, cells, LAYERS, 4), np.float32),
+        cells,
+        np.zeros((tiles, 64), np.uint8),
+        np.zeros((tiles, LAYERS, 64), np.int32),
+        np.zeros((tiles, LAYERS, 64, 4), np.float32),
     )
 
 
@@ -70,23 +73,30 @@ def _tag(ix: int, iy: int, iz: int, shift: int) -> int:
     return (((ix >> shift) & 0x7FF) << 20 | ((iy >> shift) & 0xFFF) << 8 | ((iz >> 3) & 0xFF)) + 1
 
 
+@nb.njit(cache=True, nogil=True, inline="always")
+def _column(ix: int, iy: int, size: int) -> tuple[int, int]:
+    """Return tile and place in it of the column (ix, iy) in a window of `size`."""
+    jx, jy = ix & (size - 1), iy & (size - 1)
+    return (jx >> 3) * (size >> 3) + (jy >> 3), (jx & 7) << 3 | (jy & 7)
+
+
 @nb.njit(cache=True, nogil=True)
 def insert(level: Level, points_m: FloatArray, count_limit: float) -> None:
     """Average points, shape (N, 3), map frame, into their cells; beyond `count_limit` hits the mean forgets the oldest."""
-    size = level.tags.shape[0]
-    mask, shift = size - 1, int(round(math.log2(size)))
+    shift = int(round(math.log2(level.size)))
     inverse = 1.0 / level.cell_m
     for i in range(points_m.shape[0]):
         fx, fy, fz = points_m[i, 0] * inverse, points_m[i, 1] * inverse, points_m[i, 2] / LAYER_M
         if not (abs(fx) < 1e8 and abs(fy) < 1e8 and abs(fz) < 1e6):
             continue
         ix, iy, iz = int(math.floor(fx)), int(math.floor(fy)), int(math.floor(fz))
-        jx, jy, jz = ix & mask, iy & mask, iz & (LAYERS - 1)
+        tile, place = _column(ix, iy, level.size)
+        layer = iz & (LAYERS - 1)
         tag = _tag(ix, iy, iz, shift)
-        cell = level.hits[jx, jy, jz]
-        if level.tags[jx, jy, jz] != tag:
-            level.tags[jx, jy, jz] = tag
-            level.layers[jx, jy] |= np.uint8(1 << jz)
+        cell = level.hits[tile, layer, place]
+        if level.tags[tile, layer, place] != tag:
+            level.tags[tile, layer, place] = tag
+            level.layers[tile, place] |= np.uint8(1 << layer)
             cell[:] = 0.0
         n = min(cell[0] + 1.0, count_limit)
         cell[0] = n
@@ -120,8 +130,7 @@ def _gather(level: Level, x: float, y: float, z: float, layered: bool, sums: Flo
 
     `sums`, shape (11,), receives: weights, squared weights, x, y, z, xx, xy, yy, xz, yz, zz about the point.
     """
-    size = level.tags.shape[0]
-    mask, shift, cell = size - 1, int(round(math.log2(size))), level.cell_m
+    shift, cell = int(round(math.log2(level.size))), level.cell_m
     cx, cy = int(math.floor(x / cell)), int(math.floor(y / cell))
     z_low, z_high = _neighbours(level, z, layered)
     scale, z_scale = -0.5 / (KERNEL_SIGMA_CELLS * cell) ** 2, -0.5 / max(_HEIGHT_SIGMA_M, _HEIGHT_PER_CELL * cell) ** 2
@@ -131,22 +140,22 @@ def _gather(level: Level, x: float, y: float, z: float, layered: bool, sums: Flo
         wanted |= 1 << (iz & (LAYERS - 1))
     s0 = s1 = sx = sy = sz = sxx = sxy = syy = sxz = syz = szz = 0.0
     for ix in range(cx - KERNEL_CELLS, cx + KERNEL_CELLS + 1):
-        jx = ix & mask
         for iy in range(cy - KERNEL_CELLS, cy + KERNEL_CELLS + 1):
-            jy = iy & mask
-            if level.layers[jx, jy] & wanted == 0:
+            tile, place = _column(ix, iy, level.size)
+            if level.layers[tile, place] & wanted == 0:
                 continue
             for iz in range(z_low, z_high + 1):
-                jz = iz & (LAYERS - 1)
-                if level.tags[jx, jy, jz] != _tag(ix, iy, iz, shift):
+                layer = iz & (LAYERS - 1)
+                if level.tags[tile, layer, place] != _tag(ix, iy, iz, shift):
                     continue
-                dx = ix * cell + level.hits[jx, jy, jz, 1] - x
-                dy = iy * cell + level.hits[jx, jy, jz, 2] - y
+                hit = level.hits[tile, layer, place]
+                dx = ix * cell + hit[1] - x
+                dy = iy * cell + hit[2] - y
                 d2 = dx * dx + dy * dy
                 if d2 > reach:
                     continue
-                dz = iz * LAYER_M + level.hits[jx, jy, jz, 3] - z
-                n = level.hits[jx, jy, jz, 0]
+                dz = iz * LAYER_M + hit[3] - z
+                n = hit[0]
                 w = math.exp(scale * d2 + z_scale * dz * dz) * n / (n + 1.0)
                 wx, wy, wz = w * dx, w * dy, w * dz
                 s0, s1, sx, sy, sz = s0 + w, s1 + w * w, sx + wx, sy + wy, sz + wz

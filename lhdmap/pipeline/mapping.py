@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from collections import deque
+from functools import partial
 from typing import Literal
 
 from lhdmap.config import Settings
@@ -208,7 +209,7 @@ class MappingPipeline:
         """Return a scan with all that is known of the machine at `time_ns`, the middle of its sweep."""
         roll, pitch = self._attitude_at(time_ns)
         T_level_sensor = level_sensor(self.mounts.of(scan.frame_id, "front"), roll, pitch)
-        rear = self.rear.near(time_ns, roll, pitch) if self.has_inclinometer else None
+        rear = partial(self.rear.near, time_ns, roll, pitch) if self.has_inclinometer else None
         view = View(self.track.height_m, self._boxes, rear)
         return ScanInput(scan, T_level_sensor, self._wheel_step(before_ns, time_ns), view)
 

@@ -36,7 +36,7 @@ class RearScans:
         """Return the scan nearest to `time_ns`, or None where there is none or the joint's angle is not known."""
         if not self._scans:
             return None
-        scan_ns, scan = min(self._scans, key=lambda one: abs(one[0] - time_ns))
+        scan_ns, scan = self._nearest(time_ns)
         angle_rad = self._articulation(scan_ns)
         if abs(scan_ns - time_ns) > _FARTHEST_NS or angle_rad is None:
             return None
@@ -47,6 +47,15 @@ class RearScans:
         T_level_sensor = T_level_base @ T_base_rear(angle_rad, self._machine) @ mount.T_parent_child
         joint_x_m = -self._machine.dimensions.joint_to_front_axle_m
         return RearView(scan, T_level_sensor, (scan_ns - time_ns) * 1e-9, joint_x_m)
+
+    def _nearest(self, time_ns: int) -> tuple[int, LaserScan]:
+        """Return the scan nearest in time: among the newest, so the search goes backwards while it gets nearer."""
+        best = self._scans[-1]
+        for one in reversed(self._scans):
+            if abs(one[0] - time_ns) > abs(best[0] - time_ns):
+                break
+            best = one
+        return best
 
     def _articulation(self, time_ns: int) -> float | None:
         angles = self._wheels.articulations_at(time_ns + _AVERAGED_NS)
