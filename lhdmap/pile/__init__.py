@@ -1,0 +1,1 @@
+"""The ore pile: found, measured and judged while the machine drives at it."""
