@@ -12,6 +12,7 @@ import importlib
 from lhdmap.cli.console import Console
 
 SUBJECTS = {
+    "pile": "width, inclination and status of piles, as in Table 6 of the autonomous loading paper",
     "trajectory": "absolute, relative and segment errors of a trajectory, and relations",
 }
 
