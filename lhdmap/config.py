@@ -13,6 +13,7 @@ from lhdmap.errors import ConfigError
 from lhdmap.integration.integrator import IntegrationSettings
 from lhdmap.odometry.cloud_settings import CloudOdometrySettings
 from lhdmap.odometry.settings import AnchorSettings, OdometrySettings, RangeFlowSettings, SearchSettings
+from lhdmap.pile.settings import PileSettings
 from lhdmap.proprioception.attitude import AttitudeSettings
 from lhdmap.proprioception.slip import SlipSettings
 from lhdmap.proprioception.wheels import WheelSettings
@@ -40,6 +41,7 @@ class Settings:
     slip: SlipSettings = field(default_factory=SlipSettings)
     integration: IntegrationSettings = field(default_factory=IntegrationSettings)
     smoothing: SmoothingSettings = field(default_factory=SmoothingSettings)
+    pile: PileSettings = field(default_factory=PileSettings)
     recording: RecordingSettings = field(default_factory=RecordingSettings)
 
 

@@ -28,3 +28,26 @@ class PileSettings:
     sure: float = setting(
         0.97, minimum=0.5, maximum=1.0, doc="Probability of a status at which it is decided earlier than that."
     )
+    likely: float = setting(
+        0.5, minimum=0.0, maximum=1.0, doc="Probability that is enough at the deadline; below it: not identified."
+    )
+    closest_m: float = setting(
+        4.0,
+        unit="m",
+        minimum=0.0,
+        doc="Nearer to the toe than this the last estimate stands: the bucket hides the face.",
+    )
+    scale_std: float = setting(
+        0.0015,
+        unit="m/m",
+        minimum=0.0,
+        doc="Scale error of the odometry, standard deviation.",
+        source="evaluation/odometry.md",
+    )
+    pitch_std_deg: float = setting(
+        0.05,
+        unit="deg",
+        minimum=0.0,
+        doc="Constant error of pitch and mounting tilt, standard deviation.",
+        source="inclinometer filtered; findings, section 1",
+    )

@@ -11,6 +11,8 @@ from collections import deque
 from functools import partial
 from typing import Literal
 
+import numpy as np
+
 from lhdmap.config import Settings
 from lhdmap.geometry import se3
 from lhdmap.machine import Machine
@@ -31,7 +33,9 @@ from lhdmap.odometry.planar import PlanarOdometry, View
 from lhdmap.odometry.scan_points import NO_BOXES, half_sweep_ns
 from lhdmap.odometry.start import ScanInput, starting_velocity
 from lhdmap.odometry.steps import OdometryStep, WheelStep
+from lhdmap.pile.stage import PileStage
 from lhdmap.pipeline.mounts import Mounts, level_sensor
+from lhdmap.pipeline.pile import scan_hits
 from lhdmap.pipeline.rear import RearScans
 from lhdmap.pipeline.records import ScanRecords
 from lhdmap.pipeline.sweeps import ScanSink, SweepIntegration
@@ -49,7 +53,7 @@ _QUEUE_SCANS = 2000  # a sensor that stops must not hold back scans without boun
 class MappingPipeline:
     """Takes messages by role in time order; `finish` ends the stream. Trajectory and cloud are there at any time.
 
-    `primary`: the sensor that the odometry runs on, the front scanner or a 3D scanner.
+    `primary`: the sensor that the odometry runs on, the front scanner or a 3D scanner; `cloud`: whether sweeps are integrated.
     """
 
     def __init__(
@@ -58,6 +62,8 @@ class MappingPipeline:
         machine: Machine | None = None,
         on_sweep: ScanSink | None = None,
         primary: Literal["front", "points"] = "front",
+        *,
+        cloud: bool = True,
     ) -> None:
         self.settings = settings
         self.machine = machine
@@ -72,6 +78,8 @@ class MappingPipeline:
         self.track = Track(settings.odometry.height_lever_m)
         self.records = ScanRecords()
         self.smoother = Smoother(settings.smoothing)
+        self.pile = PileStage(settings.pile) if settings.pile.method != "off" and primary == "front" else None
+        self._cloud = cloud
         self.rear = RearScans(self.mounts, self.wheels, machine or _DEFAULT_MACHINE)
         self.has_inclinometer = False
         self._newest_ns = self._time_ns = -(2**62)
@@ -89,7 +97,7 @@ class MappingPipeline:
                 self._waiting.append((message, self._rising(message.stamp_ns)))
                 self._process_ready()
             case LaserScan() | PointCloud():
-                self.sweeps.hold(role, message.stamp_ns, message)
+                self._hold(role, message.stamp_ns, message)
                 if isinstance(message, LaserScan) and role == "rear":
                     self.rear.hold(message)
             case Inclination():
@@ -176,15 +184,27 @@ class MappingPipeline:
         if self.odometry is None:
             self.odometry = self._begin((scan, stamp_ns))
         time_ns = max(stamp_ns + half_sweep_ns(scan), self._time_ns + 1)
-        step = self.odometry.update(*self._input(scan, self._time_ns, time_ns))
+        given = self._input(scan, self._time_ns, time_ns)
+        step = self.odometry.update(*given)
         self._time_ns = time_ns
         self.records.add_scan(scan.stamp_ns, stamp_ns)
-        self.sweeps.hold("front", stamp_ns, scan)
+        self._hold("front", stamp_ns, scan)
         if step.processed:
             self.track.append(time_ns, step.T_odom_base, *self._attitude_at(time_ns))
             self.smoother.keys.update(time_ns, step.T_odom_base, self.odometry.points, weak=step.degenerate)
             self._record(scan.stamp_ns, time_ns, step)
+            self._look_for_pile(scan, given.T_level_sensor, step)
             self.sweeps.advance(self.track, self.wheels)
+
+    def _look_for_pile(self, scan: LaserScan, T_level_sensor: FloatArray, step: OdometryStep) -> None:
+        if self.pile is not None and self.has_inclinometer:
+            x, y, heading = step.T_odom_base
+            pose = np.array([x, y, self.track.height_m, heading])
+            self.pile.update(scan_hits(scan, T_level_sensor, step.velocity, self._boxes, pose))
+
+    def _hold(self, role: str, time_ns: int, sweep: LaserScan | PointCloud) -> None:
+        if self._cloud:
+            self.sweeps.hold(role, time_ns, sweep)
 
     def _process_cloud(self, odometry: CloudOdometry, cloud: PointCloud, stamp_ns: int) -> None:
         """Run one cloud of a 3D scanner through all stages."""
@@ -199,7 +219,7 @@ class MappingPipeline:
         step = odometry.update(cloud._replace(stamp_ns=time_ns), T_base_sensor, prior, T_level_base, self._boxes)
         self._time_ns = time_ns
         self.records.add_scan(cloud.stamp_ns, time_ns)
-        self.sweeps.hold("points", time_ns, cloud)
+        self._hold("points", time_ns, cloud)
         if step.processed:
             self.track.append_space(time_ns, step.T_odom_base)
             self._record(cloud.stamp_ns, time_ns, step)

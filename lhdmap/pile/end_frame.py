@@ -1,0 +1,81 @@
+"""The end of the drift as a frame: x along the last metres of its walls, y to the left, z up; and the floor before the toe."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from lhdmap.messages import FloatArray
+from lhdmap.pile.corridor import BIN_M, Corridor
+
+_WALLS_M = 7.0  # length of wall before the face that its heading is taken from
+_FEWEST_BINS = 4
+_MOST_TURN = 0.35
+
+
+class Frame2(NamedTuple):
+    """A frame turned about the upright axis: origin (3,), heading (rad), in the map."""
+
+    origin_m: FloatArray
+    heading_rad: float
+
+    def local(self, hits: FloatArray) -> FloatArray:
+        """Return rows x, y, z, travelled of hits (N, 4) of the map in this frame."""
+        c, s = math.cos(self.heading_rad), math.sin(self.heading_rad)
+        d = hits[:, :3] - self.origin_m
+        return np.column_stack([c * d[:, 0] + s * d[:, 1], -s * d[:, 0] + c * d[:, 1], d[:, 2], hits[:, 3]])
+
+    def map(self, points: FloatArray) -> FloatArray:
+        """Return points (..., 3) of this frame in the map."""
+        c, s = math.cos(self.heading_rad), math.sin(self.heading_rad)
+        x, y = points[..., 0], points[..., 1]
+        return np.stack([c * x - s * y, s * x + c * y, points[..., 2]], axis=-1) + self.origin_m
+
+    def turned(self, at: FloatArray, turn_rad: float) -> Frame2:
+        """Return the frame with its origin at a point (3,) of this one, turned left."""
+        return Frame2(self.map(at), self.heading_rad + turn_rad)
+
+
+def end_turn(corridor: Corridor, face_x_m: float) -> tuple[float, float] | None:
+    """Return how far (rad) the drift's end turns left of the frame's x axis, and y of its middle at the face; None: no walls."""
+    last = (corridor.x_m < face_x_m - 0.3) & (corridor.x_m > face_x_m - _WALLS_M)
+    slopes, middles, weights = [], [], []
+    for wall in (corridor.left_m, corridor.right_m):
+        seen = last & np.isfinite(wall)
+        if seen.sum() < _FEWEST_BINS:
+            continue
+        slope, offset = _line(corridor.x_m[seen], wall[seen])
+        slopes.append(slope)
+        weights.append(float(seen.sum()))
+        middles.append(offset + slope * face_x_m)
+    if len(slopes) < 2:
+        if not slopes:
+            return None
+        return math.atan(float(np.clip(slopes[0], -_MOST_TURN, _MOST_TURN))), float(
+            corridor.centre_at(np.array([face_x_m]))[0]
+        )
+    slope = float(np.clip(np.average(slopes, weights=weights), -_MOST_TURN, _MOST_TURN))
+    return math.atan(slope), 0.5 * (middles[0] + middles[1])
+
+
+def _line(x: FloatArray, y: FloatArray) -> tuple[float, float]:
+    """Return slope and offset by Theil and Sen: the median of the slopes of all pairs that are metres apart."""
+    i, j = np.triu_indices(len(x), 1)
+    far = x[j] - x[i] > 2.0 * BIN_M
+    if not far.any():
+        return 0.0, float(np.median(y))
+    slope = float(np.median((y[j] - y[i])[far] / (x[j] - x[i])[far]))
+    return slope, float(np.median(y - slope * x))
+
+
+def floor_before(points: FloatArray, toe_x_m: float, half_m: float) -> float | None:
+    """Return z of the floor in the metres before a toe, from hits (N, 3+) in the end frame; None where it was not seen."""
+    x, y, z = points[:, 0], points[:, 1], points[:, 2]
+    before = (x > toe_x_m - 5.0) & (x < toe_x_m - 0.4) & (np.abs(y) < half_m - 0.6)
+    if before.sum() < 12:
+        return None
+    low = np.percentile(z[before], 20.0)
+    flat = z[before & (z < low + 0.25)]
+    return float(np.median(flat)) if flat.size >= 12 else None

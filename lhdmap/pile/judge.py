@@ -1,0 +1,58 @@
+"""The status with its probabilities.
+
+The inclination is a normal distribution with its deviation; each status owns a range of it, and what the distribution has of
+the range is its probability. A surface as steep as a wall is one where it is smooth and upright and a hang-up where it is rough
+or bent; what does not close the drift from wall to wall, or was hardly seen, gives its probability to `none`.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+from lhdmap.pile.result import STATUSES
+
+# bounds of |inclination| in degrees: findings, section 1
+SHALLOW_DEG, STEEP_DEG, UPRIGHT_DEG, OVERHANG_DEG = 28.0, 60.0, 81.0, 98.0
+_MODEL_STD_DEG = 1.5  # rubble over the height that is seen
+_ROUGH_M = 0.12
+
+
+class Evidence(NamedTuple):
+    """What the status follows from.
+
+    Inclination and deviation (deg, sign of Table 6), spread of the residuals along the normal (m), share of the width that the
+    face covers, share of it on which hits lie beyond the face.
+    """
+
+    inclination_deg: float
+    std_deg: float
+    spread_m: float
+    covered: float
+    beyond: float
+
+
+def probabilities(evidence: Evidence) -> dict[str, float]:
+    """Return the probability of each status."""
+    angle = -evidence.inclination_deg
+    std = math.hypot(evidence.std_deg, _MODEL_STD_DEG)
+
+    def below(bound_deg: float) -> float:
+        return 0.5 * math.erfc((angle - bound_deg) / (std * math.sqrt(2.0)))
+
+    rough = _ramp(evidence.spread_m, 0.8 * _ROUGH_M, 1.6 * _ROUGH_M)
+    upright = below(OVERHANG_DEG) - below(UPRIGHT_DEG)
+    share = {
+        "too_shallow": below(SHALLOW_DEG),
+        "loadable": below(STEEP_DEG) - below(SHALLOW_DEG),
+        "hang_up": below(UPRIGHT_DEG) - below(STEEP_DEG) + 1.0 - below(OVERHANG_DEG) + upright * rough,
+        "wall": upright * (1.0 - rough),
+    }
+    closes = _ramp(evidence.covered, 0.4, 0.7) * (1.0 - _ramp(evidence.beyond, 0.1, 0.3))
+    result = {name: share.get(name, 0.0) * closes for name in STATUSES}
+    result["none"] = max(1.0 - sum(result.values()), 0.0)
+    return result
+
+
+def _ramp(value: float, low: float, high: float) -> float:
+    return min(max((value - low) / (high - low), 0.0), 1.0)

@@ -1,0 +1,103 @@
+"""From a scene to an estimate: width, inclination, status, boulders, volume and where to attack."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from lhdmap.messages import FloatArray
+from lhdmap.pile.judge import Evidence, probabilities
+from lhdmap.pile.relief import Relief, boulders, relief
+from lhdmap.pile.result import AttackPoint, PileEstimate
+from lhdmap.pile.surface import Scene
+
+_DEFINITION_DEG = 0.4  # rubble within the height that the inclination is defined over
+_WIDTH_DEFINITION_M = 0.04
+_BEYOND_M = 1.5
+_MACHINE_HALF_M = 1.3
+
+
+def measure(scene: Scene) -> PileEstimate:
+    """Return the estimate of a scene, in the map."""
+    face, limits = scene.face, scene.limits
+    seen = relief(scene)
+    std_deg = math.hypot(face.inclination_std_deg, _DEFINITION_DEG)
+    covered, beyond = _closure(scene)
+    spread = face.spread_m / math.sqrt(1.0 + face.c**2)
+    share = probabilities(Evidence(face.inclination_deg, std_deg, spread, covered, beyond))
+    on = scene.points[scene.on_face]
+    off = (face.x_at(on[:, 1], on[:, 2]) - on[:, 0]) / math.sqrt(1.0 + face.b**2 + face.c**2)
+    toe = _toe(scene, np.linspace(limits.left_m, limits.right_m, 15))
+    volume, volume_std = _volume(scene, seen)
+    middle = np.array([0.0, 0.5 * (limits.left_m + limits.right_m), float(np.median(on[:, 2]))])
+    middle[0] = float(face.x_at(middle[1:2], middle[2:3])[0])
+    return PileEstimate(
+        status=max(share, key=lambda name: share[name]),
+        probabilities=share,
+        center_m=scene.frame.map(middle),
+        left_limit_m=scene.frame.map(toe[0]),
+        right_limit_m=scene.frame.map(toe[-1]),
+        width_m=limits.left_m - limits.right_m,
+        width_std_m=math.sqrt(limits.left_std_m**2 + limits.right_std_m**2 + _WIDTH_DEFINITION_M**2),
+        inclination_deg=face.inclination_deg,
+        inclination_std_deg=std_deg,
+        volume_m3=volume,
+        volume_std_m3=volume_std,
+        boulders=boulders(scene, seen),
+        attack=_attack(scene, seen),
+        toe_m=scene.frame.map(toe),
+        face_m=scene.frame.map(on[:, :3]),
+        residuals_m=off,
+    )
+
+
+def _toe(scene: Scene, y: FloatArray) -> FloatArray:
+    """Return the toe at y (K,), where the face meets the floor, end frame, shape (K, 3)."""
+    z = np.full_like(y, scene.floor_m)
+    return np.column_stack([scene.face.x_at(y, z), y, z])
+
+
+def _closure(scene: Scene) -> tuple[float, float]:
+    """Return the share of the width on which the face was seen, and the share on which hits lie well beyond it."""
+    points, face, limits = scene.points, scene.face, scene.limits
+    count = max(int((limits.right_m - limits.left_m) / -0.2), 1)
+    edges = np.linspace(limits.right_m, limits.left_m, count + 1)
+    on = np.histogram(points[scene.on_face, 1], edges)[0] >= 3
+    height = points[:, 2] - scene.floor_m
+    behind = points[:, 0] - face.x_at(points[:, 1], points[:, 2]) > _BEYOND_M * max(1.0, 0.5 * abs(face.c))
+    behind &= (height > 0.3) & (height < 1.6)
+    past = np.histogram(points[behind, 1], edges)[0] >= 3
+    return float(on.mean()), float(past.mean())
+
+
+def _volume(scene: Scene, seen: Relief) -> tuple[float, float]:
+    """Return the ore between floor and face as far up as it was seen (m³), with its standard deviation."""
+    face, width = scene.face, scene.limits.left_m - scene.limits.right_m
+    rows = np.isfinite(seen.proud_m).mean(axis=1) > 0.3
+    if not rows.any() or face.c <= 0.05:
+        return 0.0, 0.0
+    top = float(seen.z_m[rows].max()) + 0.05 - scene.floor_m
+    rock = float(np.nanmean(seen.proud_m[rows])) * math.sqrt(1.0 + face.c**2)
+    volume = width * top * (0.5 * face.c * top + rock)
+    slope_std = math.sqrt(max(face.covariance[2, 2], 0.0))
+    relative = math.sqrt((slope_std / face.c) ** 2 + (0.1 / width) ** 2 + (2.0 * 0.05 / max(top, 0.1)) ** 2)
+    return volume, volume * relative
+
+
+def _attack(scene: Scene, seen: Relief) -> AttackPoint | None:
+    """Return where the bucket meets rock on both sides: the middle, drawn to where the face stands out, clear of walls."""
+    limits = scene.limits
+    left, right = limits.left_m - _MACHINE_HALF_M - 0.2, limits.right_m + _MACHINE_HALF_M + 0.2
+    middle = 0.5 * (limits.left_m + limits.right_m)
+    columns = (
+        np.nan_to_num(np.nanmean(np.where(np.isfinite(seen.proud_m), seen.proud_m, np.nan), axis=0), nan=0.0)
+        if np.isfinite(seen.proud_m).any()
+        else np.zeros_like(seen.y_m)
+    )
+    weight = np.clip(0.3 + columns, 0.05, 1.0)
+    y = float(np.clip(np.average(seen.y_m, weights=weight), min(right, middle), max(left, middle)))
+    point = _toe(scene, np.array([y]))[0]
+    # at right angles to the face, as far as the drift's walls let the machine turn
+    turn = float(np.clip(math.atan(-scene.face.b), -math.radians(10.0), math.radians(10.0)))
+    return AttackPoint(scene.frame.map(point), scene.frame.heading_rad + turn)

@@ -1,0 +1,64 @@
+"""Pile identification of a log, alone: the stages of the mapping pipeline without cloud, report and recording."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from lhdmap.config import Settings
+from lhdmap.errors import InputError
+from lhdmap.geometry import se3
+from lhdmap.logs.source import LogSource
+from lhdmap.machine import Machine
+from lhdmap.messages import LaserScan, Mount
+from lhdmap.odometry.scan_points import half_sweep_ns
+from lhdmap.pile.face import Registration
+from lhdmap.pile.result import PileReport
+from lhdmap.pile.stage import PileStage
+from lhdmap.pipeline.given import given_rows
+from lhdmap.pipeline.mapping import MappingPipeline, own_boxes
+from lhdmap.pipeline.mounts import Mounts, level_sensor
+from lhdmap.pipeline.pile import scan_hits
+from lhdmap.pipeline.track import FinalTrack
+
+_ROLES = ("tf_static", "front", "rear", "inclinometer", "joints", "tachometer", "wheel_odometry")
+_GIVEN_POSES = Registration(scale=2e-4, pitch_rad=2e-4)
+
+
+def identify(log: Path, settings: Settings, poses: str = "", machine: Machine | None = None) -> PileReport:
+    """Find and measure the pile at the end of the drive in `log`; `poses`: as for `build-map`.
+
+    Raises:
+        InputError: the log holds no scan of a front scanner.
+    """
+    if poses:
+        return _with_poses(log, settings, poses, machine or Machine())
+    with LogSource([log]) as source:
+        pipeline = MappingPipeline(settings, machine or Machine(), cloud=False)
+        for role, message in source.messages([role for role in _ROLES if role in source.roles]):
+            pipeline.update(role, message)
+        pipeline.finish()
+    if pipeline.pile is None or not len(pipeline.track):
+        raise InputError(f"{log}: no scan of a front scanner in it; lhdmap doctor tells what is in it")
+    return pipeline.pile.report()
+
+
+def _with_poses(log: Path, settings: Settings, poses: str, machine: Machine) -> PileReport:
+    """Run the pile stage alone, on poses that are known."""
+    track, mounts = FinalTrack(given_rows(poses, [log], {})), Mounts(machine)
+    stage, boxes = PileStage(settings.pile, _GIVEN_POSES), own_boxes(machine, settings.integration.body_margin_m)
+    with LogSource([log]) as source:
+        for _, message in source.messages([role for role in ("tf_static", "front") if role in source.roles]):
+            if isinstance(message, Mount):
+                mounts.update(message)
+            elif isinstance(message, LaserScan):
+                time_ns = message.stamp_ns + half_sweep_ns(message)
+                if not track.covers(time_ns):
+                    continue
+                T = track.matrices_at(np.array([time_ns]))[0]
+                roll, pitch, heading = se3.to_rpy(T)
+                pose = np.array([*T[:3, 3], heading])
+                T_level_sensor = level_sensor(mounts.of(message.frame_id, "front"), roll, pitch)
+                stage.update(scan_hits(message, T_level_sensor, np.zeros(3), boxes, pose))
+    return stage.report()

@@ -1,0 +1,103 @@
+"""The pile as a stage: hits in, estimates and one decision out, while the machine drives."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from lhdmap.messages import FloatArray
+from lhdmap.pile.end_frame import Frame2
+from lhdmap.pile.face import Registration
+from lhdmap.pile.measure import measure
+from lhdmap.pile.result import PileEstimate, PileReport, Snapshot
+from lhdmap.pile.settings import PileSettings
+from lhdmap.pile.surface import look
+from lhdmap.pile.window import HitWindow
+
+_MOST_HISTORY = 400
+_LONGEST_BACK_M = 3.0
+_SURE_STD_DEG = 2.5
+
+
+class ScanHits(NamedTuple):
+    """One scan of the front scanner in the map: hits (N, 3) in the order of the beams, and the machine then.
+
+    `T_map_base`: x, y, z (m), heading (rad), shape (4,).
+    """
+
+    stamp_ns: int
+    points_map: FloatArray
+    T_map_base: FloatArray
+
+
+class PileStage:
+    """`update` with each scan; `report` at any time. The cost of an update does not grow with the drive."""
+
+    def __init__(self, settings: PileSettings, registration: Registration | None = None) -> None:
+        self._settings = settings
+        self._registration = registration or Registration(settings.scale_std, math.radians(settings.pitch_std_deg))
+        self._window = HitWindow(settings.reach_m)
+        self._travelled_m = 0.0
+        self._position: FloatArray | None = None
+        self._estimated_m = -math.inf
+        self._history: list[Snapshot] = []
+        self._decision: Snapshot | None = None
+        self._best: Snapshot | None = None
+
+    def update(self, scan: ScanHits) -> Snapshot | None:
+        """Take one scan; return the new estimate where the machine has moved far enough for one."""
+        position = scan.T_map_base[:3]
+        if self._position is not None:
+            self._travelled_m += _forward(position - self._position, float(scan.T_map_base[3]))
+        self._position = position
+        self._window.add(scan.points_map, position, self._travelled_m)
+        if abs(self._travelled_m - self._estimated_m) < self._settings.update_m:
+            return None
+        self._estimated_m = self._travelled_m
+        return self._estimate(scan)
+
+    def report(self) -> PileReport:
+        """Return what there is so far."""
+        return PileReport(self._decision, self._best, tuple(self._history), self._settings.method)
+
+    def _estimate(self, scan: ScanHits) -> Snapshot | None:
+        base = Frame2(scan.T_map_base[:3], float(scan.T_map_base[3]))
+        hits = self._window.hits(self._travelled_m)
+        rng = np.random.default_rng(len(hits))
+        scene = look(hits, base, self._registration, self._settings.reach_m, rng)
+        if scene is None:
+            return self._take(Snapshot(scan.stamp_ns, math.nan, PileEstimate()))
+        estimate = measure(scene)
+        distance = float(np.linalg.norm(estimate.toe_m - scan.T_map_base[:3], axis=1).min())
+        return self._take(Snapshot(scan.stamp_ns, distance, estimate))
+
+    def _take(self, snapshot: Snapshot) -> Snapshot:
+        """Keep the estimate, and decide: when sure enough, at the latest at the deadline."""
+        self._history.append(snapshot)
+        if len(self._history) > _MOST_HISTORY:
+            del self._history[1::2]
+        estimate = snapshot.estimate
+        if not estimate.found:
+            return snapshot
+        if snapshot.distance_m >= self._settings.closest_m:
+            self._best = snapshot
+        if self._decision is None and self._sure(snapshot):
+            self._decision = snapshot
+        return snapshot
+
+    def _sure(self, snapshot: Snapshot) -> bool:
+        estimate, settings = snapshot.estimate, self._settings
+        if estimate.status == "none":
+            return False
+        chance = estimate.probabilities[estimate.status]
+        if snapshot.distance_m <= settings.deadline_m:
+            return chance >= settings.likely
+        return chance >= settings.sure and estimate.inclination_std_deg <= _SURE_STD_DEG
+
+
+def _forward(step: FloatArray, heading_rad: float) -> float:
+    """Return the travel of a step (3,), negative in reverse."""
+    length = float(np.hypot(step[0], step[1]))
+    return math.copysign(length, math.cos(heading_rad) * step[0] + math.sin(heading_rad) * step[1])

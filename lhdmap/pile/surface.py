@@ -1,0 +1,153 @@
+"""The default method: the drift's end from its walls, the face by a robust fit, everything else from these two.
+
+1. the corridor's walls are followed ahead; 2. what closes it is found by RANSAC; 3. the last metres of wall give the end's
+frame; 4. there the face is fitted with the odometry's drift as an unknown; 5. limits and width come from the walls just before
+the face, boulders from what stands out of it, the status from the inclination and its deviation.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from lhdmap.messages import FloatArray
+from lhdmap.pile.corridor import trace
+from lhdmap.pile.end_frame import Frame2, end_turn, floor_before
+from lhdmap.pile.face import Face, Registration, find, fit
+
+Mask = npt.NDArray[np.bool_]
+LOW_M, HIGH_M = 0.2, 1.6  # heights over the floor at the toe that the inclination is defined over
+_WALL_GAP_M = 0.3
+_CLEAR_M = 0.08
+_FEWEST_HITS = 40
+_FEWEST_BLOCKS = 6
+
+
+class Limits(NamedTuple):
+    """Left and right wall at the face, y in the end frame (m), with standard deviations; whether the drift opens before it."""
+
+    left_m: float
+    right_m: float
+    left_std_m: float
+    right_std_m: float
+    opens: bool
+
+
+class Scene(NamedTuple):
+    """What was found: `frame` at the face's foot, all hits in it (N, 4), the face, those on it (mask), floor, limits."""
+
+    frame: Frame2
+    points: FloatArray
+    face: Face
+    on_face: Mask
+    floor_m: float
+    floor_seen: bool
+    limits: Limits
+
+    @property
+    def toe_x_m(self) -> float:
+        """X of the toe in the middle."""
+        y = 0.5 * (self.limits.left_m + self.limits.right_m)
+        return self.face.a + self.face.b * y + self.face.c * self.floor_m
+
+
+def look(
+    hits: FloatArray, base: Frame2, registration: Registration, reach_m: float, rng: np.random.Generator
+) -> Scene | None:
+    """Return what closes the drift ahead of `base`, or None; hits rows x, y, z (map, m), travelled (m)."""
+    local = base.local(hits)
+    local = local[(local[:, 0] > 1.0) & (np.abs(local[:, 1]) < 12.0)]
+    corridor = trace(local, reach_m)
+    inside = np.abs(local[:, 1] - corridor.centre_at(local[:, 0])) < corridor.half_at(local[:, 0]) - _WALL_GAP_M
+    seed = find(local[inside], rng) if inside.sum() >= _FEWEST_HITS else None
+    if seed is None:
+        return None
+    face_x = _crossing(seed, corridor.centre_at)
+    end = end_turn(corridor, face_x)
+    if end is None:
+        return None
+    frame = base.turned(np.array([face_x, end[1], 0.0]), end[0])
+    return _refined(
+        frame, frame.local(hits), end[0], seed, registration, half_m=float(corridor.half_at(np.array([face_x]))[0])
+    )
+
+
+def _crossing(seed: FloatArray, centre_at) -> float:  # type: ignore[no-untyped-def]
+    """Return x where the corridor's middle meets the face, at the height of the machine's floor."""
+    x = float(seed[0])
+    for _ in range(3):
+        x = float(seed[0] + seed[1] * centre_at(np.array([x]))[0])
+    return x
+
+
+def _refined(
+    frame: Frame2, points: FloatArray, turn: float, seed: FloatArray, registration: Registration, half_m: float
+) -> Scene | None:
+    """Fit the face in the end frame, with the floor and the walls that the fit itself shows."""
+    c, s = math.cos(turn), math.sin(turn)
+    # x = a + b y + c z turned into the end frame, through the same point
+    slope_y = (seed[1] * c - s) / max(c + seed[1] * s, 0.3)
+    model = np.array([0.0, slope_y, seed[2] / max(c + seed[1] * s, 0.3)])
+    left, right = half_m, -half_m
+    face, floor, floor_seen, used = None, 0.0, False, np.zeros(0, dtype=bool)
+    for _ in range(3):
+        near = np.abs(points[:, 0] - (model[0] + model[1] * points[:, 1] + model[2] * points[:, 2]))
+        band = (points[:, 1] < left - _CLEAR_M) & (points[:, 1] > right + _CLEAR_M)
+        band &= near < 0.8 * max(1.0, abs(model[2]))
+        on = points[band]
+        if len(on) < _FEWEST_HITS:
+            return None
+        seen = floor_before(points, float(model[0] + model[2] * floor), 0.5 * (left - right))
+        floor_seen = seen is not None
+        floor = seen if seen is not None else float(np.percentile(on[:, 2], 2.0))
+        used = band & (points[:, 2] > floor + LOW_M) & (points[:, 2] < floor + HIGH_M)
+        if used.sum() < _FEWEST_HITS:
+            return None
+        face = fit(points[used], model, registration)
+        model = np.array([face.a, face.b, face.c])
+        limits = _limits(points, face, floor, half_m)
+        left, right = limits.left_m, limits.right_m
+    if face is None or face.blocks < _FEWEST_BLOCKS:
+        return None
+    return Scene(frame, points, face, used, floor, floor_seen, limits)
+
+
+def _limits(points: FloatArray, face: Face, floor_m: float, half_m: float) -> Limits:
+    """Return the walls in the last metre before the face; where the drift opens there, its mouth."""
+    before = points[:, 0] - face.x_at(points[:, 1], points[:, 2])
+    height = points[:, 2] - floor_m
+    at_face = (before > -0.9) & (before < -0.15) & (height > 0.3) & (height < 1.5)
+    sides = [_wall(points, at_face, side, half_m) for side in (1.0, -1.0)]
+    opens = any(side is None for side in sides)
+    if opens:
+        drift = (before > -8.0) & (before < -0.15) & (height > 0.0) & (height < 2.2)
+        sides = [_mouth(points, drift, side, half_m) for side in (1.0, -1.0)]
+    (left, left_std), (right, right_std) = (one if one is not None else (half_m, 0.5) for one in sides)
+    return Limits(left, -right, left_std, right_std, opens)
+
+
+def _wall(points: FloatArray, at_face: Mask, side: float, half_m: float) -> tuple[float, float] | None:
+    """Return the distance of a wall from the middle and its standard deviation; None where none is near."""
+    y = side * points[at_face, 1]
+    y = y[(y > half_m - 0.9) & (y < half_m + 0.6)]
+    if y.size < 8:
+        return None
+    return float(np.median(y)), _deviation(y)
+
+
+def _mouth(points: FloatArray, drift: Mask, side: float, half_m: float) -> tuple[float, float] | None:
+    """Return how far to a side one can look past the drift's last metres."""
+    y = side * points[drift, 1]
+    y = y[(y > half_m - 0.9) & (y < half_m + 0.6)]
+    if y.size < 8:
+        return None
+    return float(np.percentile(y, 10.0)), _deviation(y) + 0.05
+
+
+def _deviation(y: FloatArray) -> float:
+    """Return the standard deviation of the middle of rough rock: few independent bumps in a metre."""
+    spread = 1.4826 * float(np.median(np.abs(y - np.median(y))))
+    return max(spread / math.sqrt(4.0), 0.03)

@@ -1,0 +1,52 @@
+"""The hits that the pile is looked for in: those of the last stretch of the drive, thinned, in a ring of fixed size."""
+
+from __future__ import annotations
+
+import numba as nb
+import numpy as np
+
+from lhdmap.messages import FloatArray
+
+_ROOM = 120_000  # hits: 45 m at a scan each 0.1 m
+_APART_M = 0.05  # hits of one scan nearer to each other than this are one
+_STEP_M = 0.06
+
+
+class HitWindow:
+    """Hits in the map with the place of the machine, along its path, from where they were seen.
+
+    `hits()` gives rows x, y, z (m), travelled (m). Memory and cost do not grow with the drive.
+    """
+
+    def __init__(self, reach_m: float) -> None:
+        self._reach_m = reach_m
+        self._rows = np.full((_ROOM, 4), np.nan)
+        self._next = 0
+        self._last_m = -np.inf
+
+    def add(self, points_map: FloatArray, position_map: FloatArray, travelled_m: float) -> None:
+        """Take one scan's hits, shape (N, 3), in the order of the beams, unless the machine has hardly moved since the last."""
+        if abs(travelled_m - self._last_m) < _STEP_M:
+            return
+        self._last_m = travelled_m
+        self._next = _append(self._rows, self._next, points_map, position_map, (travelled_m, self._reach_m, _APART_M))
+
+    def hits(self, travelled_m: float) -> FloatArray:
+        """Return the rows of the last `reach_m` of travel, shape (N, 4)."""
+        return self._rows[np.abs(self._rows[:, 3] - travelled_m) < self._reach_m]
+
+
+@nb.njit(cache=True)
+def _append(rows, at, points, position, limits):  # type: ignore[no-untyped-def]
+    """Write the thinned hits at `at`, round and round; return the next place."""
+    travelled, reach, apart = limits
+    last_x, last_y = np.inf, np.inf
+    for i in range(points.shape[0]):
+        x, y = points[i, 0], points[i, 1]
+        far = (x - position[0]) ** 2 + (y - position[1]) ** 2 > reach * reach
+        if far or (x - last_x) ** 2 + (y - last_y) ** 2 < apart * apart:
+            continue
+        rows[at, 0], rows[at, 1], rows[at, 2], rows[at, 3] = x, y, points[i, 2], travelled
+        last_x, last_y = x, y
+        at = (at + 1) % rows.shape[0]
+    return at
