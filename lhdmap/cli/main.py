@@ -26,6 +26,7 @@ COMMANDS = {
     "demo": "generate the sample drive, build its map, evaluate it, write report and recording",
     "doctor": "what is in a log and what is wrong with it",
     "build-map": "the main job: log in, map folder out",
+    "pile": "find and measure the ore pile at the end of a drive",
     "simulate": "write a simulated log and its truth",
     "eval": "compare results with ground truth",
     "view": "open a map, log or run in Rerun",

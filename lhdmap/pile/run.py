@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
@@ -26,15 +27,21 @@ _ROLES = ("tf_static", "front", "rear", "inclinometer", "joints", "tachometer", 
 _GIVEN_POSES = Registration(scale=2e-4, pitch_rad=2e-4)
 
 
-def identify(log: Path, settings: Settings, poses: str = "", machine: Machine | None = None) -> PileReport:
-    """Find and measure the pile at the end of the drive in `log`; `poses`: as for `build-map`.
+def identify(
+    log: Path,
+    settings: Settings,
+    poses: str = "",
+    machine: Machine | None = None,
+    topics: Mapping[str, str] | None = None,
+) -> PileReport:
+    """Find and measure the pile at the end of the drive in `log`; `poses`, `machine`, `topics`: as for `build-map`.
 
     Raises:
         InputError: the log holds no scan of a front scanner.
     """
     if poses:
-        return _with_poses(log, settings, poses, machine or Machine())
-    with LogSource([log]) as source:
+        return _with_poses(log, settings, poses, machine or Machine(), topics or {})
+    with LogSource([log], topics) as source:
         pipeline = MappingPipeline(settings, machine or Machine(), cloud=False)
         for role, message in source.messages([role for role in _ROLES if role in source.roles]):
             pipeline.update(role, message)
@@ -44,11 +51,11 @@ def identify(log: Path, settings: Settings, poses: str = "", machine: Machine | 
     return pipeline.pile.report()
 
 
-def _with_poses(log: Path, settings: Settings, poses: str, machine: Machine) -> PileReport:
+def _with_poses(log: Path, settings: Settings, poses: str, machine: Machine, topics: Mapping[str, str]) -> PileReport:
     """Run the pile stage alone, on poses that are known."""
-    track, mounts = FinalTrack(given_rows(poses, [log], {})), Mounts(machine)
+    track, mounts = FinalTrack(given_rows(poses, [log], topics)), Mounts(machine)
     stage, boxes = PileStage(settings.pile, _GIVEN_POSES), own_boxes(machine, settings.integration.body_margin_m)
-    with LogSource([log]) as source:
+    with LogSource([log], topics) as source:
         for _, message in source.messages([role for role in ("tf_static", "front") if role in source.roles]):
             if isinstance(message, Mount):
                 mounts.update(message)

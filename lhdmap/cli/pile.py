@@ -1,0 +1,101 @@
+"""`lhdmap pile LOG|CLOUD`: pile identification alone."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import Any
+
+from lhdmap.cli.build_map import topic_overrides
+from lhdmap.cli.console import Console
+
+CLOUD_SUFFIXES = (".ply", ".pcd", ".laz", ".las")
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the options of `lhdmap pile`."""
+    parser.add_argument(
+        "input", type=Path, metavar="LOG|CLOUD", help="log or bag folder, or a cloud (.ply, .pcd, .laz)"
+    )
+    parser.add_argument("-o", "--output", type=Path, metavar="DIR", help="folder to make (default: beside the input)")
+    parser.add_argument("--config", type=Path, metavar="FILE.toml", help="settings over the defaults")
+    parser.add_argument(
+        "--set", action="append", default=[], metavar="section.key=value", help="one setting; repeatable"
+    )
+    parser.add_argument("--topic", action="append", default=[], metavar="role=/topic", help="topic of a role")
+    parser.add_argument("--poses", default="", metavar="FILE.tum", help="given poses: a TUM file, or ground-truth")
+    parser.add_argument("--machine", type=Path, metavar="FILE.toml", help="machine description")
+    parser.add_argument(
+        "--up", default="z", choices=("x", "y", "z", "-x", "-y", "-z"), help="of a cloud: the axis that points up"
+    )
+
+
+def run(arguments: argparse.Namespace, console: Console) -> int:
+    """Find and measure the pile, write `pile.json`, print what was found."""
+    if arguments.input.suffix.lower() in CLOUD_SUFFIXES:
+        return _run_cloud(arguments, console)
+    from lhdmap.config import load_settings, settings_table
+    from lhdmap.machine import load_machine
+    from lhdmap.mapfolder import MapFolderWriter, MapInfo
+    from lhdmap.pile.run import identify
+
+    settings = load_settings(arguments.config, arguments.set)
+    machine = load_machine(arguments.machine) if arguments.machine else None
+    report = identify(arguments.input, settings, arguments.poses, machine, topic_overrides(arguments.topic))
+    with MapFolderWriter(_target(arguments)) as folder:
+        values = report.to_json()
+        folder.write_json("pile.json", values)
+        path = folder.complete(MapInfo([arguments.input], settings_table(settings), warnings=values["warnings"]))
+    for text in values["warnings"]:
+        console.warn(text)
+    console.result(values | {"folder": str(path)}, _text(values, path))
+    return 0
+
+
+def _run_cloud(arguments: argparse.Namespace, console: Console) -> int:
+    from lhdmap.pile.heap import run_cloud
+    from lhdmap.pile.result import estimate_json
+
+    estimate, more = run_cloud(arguments.input, arguments.up)
+    values = estimate_json(estimate) | more
+    for text in estimate.warnings:
+        console.warn(text)
+    console.result(values, _cloud_text(values))
+    return 0
+
+
+def _target(arguments: argparse.Namespace) -> Path:
+    if arguments.output is not None:
+        return Path(arguments.output)
+    name = arguments.input.name.split(".")[0]
+    return Path(arguments.input).resolve().parent / f"{name}_pile"
+
+
+def _text(values: dict[str, Any], folder: Path) -> str:
+    """Return the result in words."""
+    lines = [f"folder       {folder}", *_measures(values)]
+    if values["identified"]:
+        lines.append(f"decided      {values['distance_at_decision_m']:.1f} m before the toe")
+    else:
+        lines.append("decided      no: not identified")
+    return "\n".join(lines)
+
+
+def _measures(values: dict[str, Any]) -> list[str]:
+    chance = values["probabilities"][values["status"]]
+    lines = [f"status       {values['status']} ({100 * chance:.0f} %)"]
+    if values["width_m"] is not None:
+        lines.append(f"width        {values['width_m']:.2f} m ± {values['width_std_m']:.2f}")
+    if values["inclination_deg"] is not None:
+        lines.append(f"inclination  {values['inclination_deg']:.1f}° ± {values['inclination_std_deg']:.1f}")
+    if values["volume_m3"] is not None:
+        lines.append(f"volume seen  {values['volume_m3']:.1f} m³ ± {values['volume_std_m3']:.1f}")
+    lines.extend(f"boulder      {one['size_m']:.1f} m" for one in values["boulders"])
+    return lines
+
+
+def _cloud_text(values: dict[str, Any]) -> str:
+    plain = [
+        f"{key:<12} {value}" for key, value in values.items() if isinstance(value, (int, float)) and "m" not in key
+    ]
+    return "\n".join(_measures(values) if "probabilities" in values else plain)
