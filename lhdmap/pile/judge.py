@@ -16,13 +16,14 @@ from lhdmap.pile.result import STATUSES
 SHALLOW_DEG, STEEP_DEG, UPRIGHT_DEG, OVERHANG_DEG = 28.0, 60.0, 81.0, 98.0
 _MODEL_STD_DEG = 1.5  # rubble over the height that is seen
 _ROUGH_M = 0.12
+FLOOR_DEG = 8.0  # flatter is floor that rises
 
 
 class Evidence(NamedTuple):
     """What the status follows from.
 
     Inclination and deviation (deg, sign of Table 6), spread of the residuals along the normal (m), share of the width that the
-    face covers, share of it on which hits lie beyond the face.
+    face covers, share of it on which hits lie beyond the face, length before the face on which a wall is missing (m).
     """
 
     inclination_deg: float
@@ -30,6 +31,7 @@ class Evidence(NamedTuple):
     spread_m: float
     covered: float
     beyond: float
+    gap_m: float
 
 
 def probabilities(evidence: Evidence) -> dict[str, float]:
@@ -49,6 +51,10 @@ def probabilities(evidence: Evidence) -> dict[str, float]:
         "wall": upright * (1.0 - rough),
     }
     closes = _ramp(evidence.covered, 0.4, 0.7) * (1.0 - _ramp(evidence.beyond, 0.1, 0.3))
+    if angle > STEEP_DEG:  # the outer wall of a bend: on the inner side the drift goes on
+        closes *= 1.0 - _ramp(evidence.gap_m, 1.2, 2.5)
+    if angle < FLOOR_DEG:
+        closes = 0.0
     result = {name: share.get(name, 0.0) * closes for name in STATUSES}
     result["none"] = max(1.0 - sum(result.values()), 0.0)
     return result

@@ -25,7 +25,7 @@ def measure(scene: Scene) -> PileEstimate:
     std_deg = math.hypot(face.inclination_std_deg, _DEFINITION_DEG)
     covered, beyond = _closure(scene)
     spread = face.spread_m / math.sqrt(1.0 + face.c**2)
-    share = probabilities(Evidence(face.inclination_deg, std_deg, spread, covered, beyond))
+    share = probabilities(Evidence(face.inclination_deg, std_deg, spread, covered, beyond, limits.gap_m))
     on = scene.points[scene.on_face]
     off = (face.x_at(on[:, 1], on[:, 2]) - on[:, 0]) / math.sqrt(1.0 + face.b**2 + face.c**2)
     toe = _toe(scene, np.linspace(limits.left_m, limits.right_m, 15))

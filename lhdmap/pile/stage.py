@@ -17,8 +17,8 @@ from lhdmap.pile.surface import look
 from lhdmap.pile.window import HitWindow
 
 _MOST_HISTORY = 400
-_LONGEST_BACK_M = 3.0
 _SURE_STD_DEG = 2.5
+_ELSEWHERE_M = 5.0
 
 
 class ScanHits(NamedTuple):
@@ -83,6 +83,8 @@ class PileStage:
             return snapshot
         if snapshot.distance_m >= self._settings.closest_m:
             self._best = snapshot
+        if self._decision is not None and _elsewhere(self._decision.estimate, estimate):
+            self._decision = None  # what was decided on was not the end: the drift goes on behind it
         if self._decision is None and self._sure(snapshot):
             self._decision = snapshot
         return snapshot
@@ -101,3 +103,7 @@ def _forward(step: FloatArray, heading_rad: float) -> float:
     """Return the travel of a step (3,), negative in reverse."""
     length = float(np.hypot(step[0], step[1]))
     return math.copysign(length, math.cos(heading_rad) * step[0] + math.sin(heading_rad) * step[1])
+
+
+def _elsewhere(decided: PileEstimate, now: PileEstimate) -> bool:
+    return bool(np.hypot(*(now.center_m - decided.center_m)[:2]) > _ELSEWHERE_M)

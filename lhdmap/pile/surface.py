@@ -27,13 +27,17 @@ _FEWEST_BLOCKS = 6
 
 
 class Limits(NamedTuple):
-    """Left and right wall at the face, y in the end frame (m), with standard deviations; whether the drift opens before it."""
+    """Left and right wall at the face, y in the end frame (m), with standard deviations.
+
+    `opens`: no wall reaches the face on some side; `gap_m`: length before the face on which the worse side's wall was not seen.
+    """
 
     left_m: float
     right_m: float
     left_std_m: float
     right_std_m: float
     opens: bool
+    gap_m: float
 
 
 class Scene(NamedTuple):
@@ -126,7 +130,15 @@ def _limits(points: FloatArray, face: Face, floor_m: float, half_m: float) -> Li
         drift = (before > -8.0) & (before < -0.15) & (height > 0.0) & (height < 2.2)
         sides = [_mouth(points, drift, side, half_m) for side in (1.0, -1.0)]
     (left, left_std), (right, right_std) = (one if one is not None else (half_m, 0.5) for one in sides)
-    return Limits(left, -right, left_std, right_std, opens)
+    gap = max(_gap(points, before, side, half_m) for side in (1.0, -1.0))
+    return Limits(left, -right, left_std, right_std, opens, gap)
+
+
+def _gap(points: FloatArray, before: FloatArray, side: float, half_m: float) -> float:
+    """Return the distance from the last hits of a wall to the face."""
+    y = side * points[:, 1]
+    wall = (y > half_m - 0.7) & (y < half_m + 0.6) & (before < -0.1)
+    return float(-np.sort(before[wall])[-8]) if wall.sum() >= 8 else 99.0
 
 
 def _wall(points: FloatArray, at_face: Mask, side: float, half_m: float) -> tuple[float, float] | None:
