@@ -15,13 +15,14 @@ if TYPE_CHECKING:
     from lhdmap.messages import Record
     from lhdmap.simulation.scenario import DriftScenario
 
-BUILT_IN = ("drift",)
+BUILT_IN = ("drift", "pile")
+FILES = ("log", "truth", "scenario", "mesh", "pile")
 DUST_SHARE, MIXED_PIXEL_SHARE, DROP_OUT_SHARE = 0.03, 0.5, 0.01
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command's arguments; an option that is not given keeps the scenario's value."""
-    parser.add_argument("scenario", metavar="SCENARIO", help="'drift', or a scenario file (.toml)")
+    parser.add_argument("scenario", metavar="SCENARIO", help="'drift', 'pile', or a scenario file (.toml)")
     parser.add_argument(
         "-o", "--output", type=Path, metavar="LOG", help="log to write (default: a new name in this folder)"
     )
@@ -36,8 +37,18 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--planar", action="store_true", help="2D world: level scanners, flat floor, upright walls, no inclinometer"
     )
+    _add_pile(parser.add_argument_group("pile: a drift that ends in one"))
     _add_drive(parser.add_argument_group("drift and drive"))
     _add_sensors(parser.add_argument_group("sensors"))
+
+
+def _add_pile(group: Any) -> None:
+    group.add_argument(
+        "--variant", metavar="V", help="kind of scene, such as normal, stope, wall, boulder (default normal)"
+    )
+    group.add_argument("--flat-floor", action="store_true", help="no waves on the floor: the machine does not pitch")
+    group.add_argument("--suite", type=Path, metavar="TOML", help="write all scenes of a suite into the folder -o")
+    group.add_argument("--jobs", type=int, default=1, metavar="N", help="scenes of a suite at a time (default 1)")
 
 
 def _add_drive(group: Any) -> None:
@@ -74,8 +85,10 @@ def run(arguments: argparse.Namespace, console: Console) -> int:
     """Simulate and write; return the exit code."""
     from lhdmap.simulation.drive import simulate_drift
 
+    if arguments.suite is not None:
+        return _run_suite(arguments, console)
     scenario = scenario_of(arguments)
-    log = arguments.output or _free_name(_stem(arguments.scenario), scenario.seed)
+    log = arguments.output or _free_name(_stem(arguments, scenario), scenario.seed)
 
     def progress(records: Iterator[Record], duration_s: float) -> Iterator[Record]:
         return _shown(records, console, duration_s)
@@ -89,13 +102,45 @@ def run(arguments: argparse.Namespace, console: Console) -> int:
         "truth": str(drive.truth_file),
         "scenario": str(drive.scenario_file),
         "mesh": str(drive.mesh_file) if drive.mesh_file else None,
+        "pile": str(drive.pile_file) if drive.pile_file else None,
         "scans": drive.scans,
         "messages": drive.messages,
         "duration_s": drive.duration_s,
         "distance_m": drive.distance_m,
     }
-    files = "\n".join(f"{name:9} {values[name]}" for name in ("log", "truth", "scenario", "mesh") if values[name])
-    console.result(values, f"{files}\n{drive.distance_m:.1f} m in {drive.duration_s:.1f} s, {drive.scans} front scans")
+    files = "\n".join(f"{name:9} {values[name]}" for name in FILES if values[name])
+    text = f"{files}\n{drive.distance_m:.1f} m in {drive.duration_s:.1f} s, {drive.scans} front scans"
+    if drive.pile is not None:
+        values |= {
+            "status": drive.pile.status,
+            "width_m": drive.pile.width_m,
+            "inclination_deg": drive.pile.inclination_deg,
+        }
+        text += (
+            f"\n{drive.pile.status}, width {drive.pile.width_m:.2f} m, inclination {drive.pile.inclination_deg:.1f}°"
+        )
+    console.result(values, text)
+    return 0
+
+
+def _run_suite(arguments: argparse.Namespace, console: Console) -> int:
+    """Write all scenes of a suite; return the exit code."""
+    from lhdmap.simulation.pile_suite import load_suite, write_suite
+
+    if arguments.scenario != "pile" or arguments.jobs < 1:
+        raise UsageError(
+            "--suite was found without 'pile', or with --jobs below 1: lhdmap simulate pile --suite FILE.toml -o DIR"
+        )
+    scenes = load_suite(arguments.suite)
+    folder = arguments.output or Path(arguments.suite.stem)
+
+    def told(name: str, done: int, of: int) -> None:
+        console.note(f"{done} of {of}: {name}")
+
+    table = write_suite(scenes, folder, jobs=arguments.jobs, told=told)
+    console.result(
+        {"folder": str(folder), "truth": str(table), "scenes": len(scenes)}, f"{len(scenes)} scenes: {table}"
+    )
     return 0
 
 
@@ -107,18 +152,28 @@ def scenario_of(arguments: argparse.Namespace) -> DriftScenario:
         ConfigError: a value is out of its range.
     """
     from lhdmap.settings import load_section
-    from lhdmap.simulation.scenario import SECTIONS, DriftScenario, load_scenario
+    from lhdmap.simulation.scenario import SECTIONS, load_scenario
 
     path = Path(arguments.scenario)
     if arguments.scenario not in BUILT_IN and not path.is_file():
         raise UsageError(f"'{arguments.scenario}': one of {', '.join(BUILT_IN)} or a scenario file was wanted")
-    scenario = DriftScenario() if arguments.scenario in BUILT_IN else load_scenario(path)
+    scenario = _built_in(arguments) if arguments.scenario in BUILT_IN else load_scenario(path)
     top, sections = _overrides(arguments)
     for name, values in sections.items():
         current = getattr(scenario, name)
         checked = load_section(SECTIONS[name], name, values)
         scenario = replace(scenario, **{name: replace(current, **{key: getattr(checked, key) for key in values})})
     return replace(scenario, **top)
+
+
+def _built_in(arguments: argparse.Namespace) -> DriftScenario:
+    """Return the drift, or the scene of a pile that variant and seed make."""
+    from lhdmap.simulation.pile_scenes import scene
+    from lhdmap.simulation.scenario import DriftScenario
+
+    if arguments.scenario == "drift":
+        return DriftScenario()
+    return scene(arguments.variant or "normal", arguments.seed or 0, flat_floor=arguments.flat_floor)
 
 
 def _overrides(arguments: argparse.Namespace) -> tuple[dict[str, Any], dict[str, dict[str, Any]]]:
@@ -189,8 +244,10 @@ def _tuples(option: str, texts: list[str] | None, count: int) -> tuple[tuple[flo
     return rows
 
 
-def _stem(scenario: str) -> str:
-    return scenario if scenario in BUILT_IN else Path(scenario).stem.removesuffix(".scenario")
+def _stem(arguments: argparse.Namespace, scenario: DriftScenario) -> str:
+    if arguments.scenario not in BUILT_IN:
+        return Path(arguments.scenario).stem.removesuffix(".scenario")
+    return "drift" if scenario.pile is None else f"pile_{scenario.pile.variant}"
 
 
 def _free_name(stem: str, seed: int) -> Path:

@@ -41,7 +41,7 @@ class Crossing:
         """Mesh the rings `first` to `last` of the main drift with all that opens into them; its own ends are closed."""
         mesh = self.main_mesh(first, last)
         for opening in self._near(first, last):
-            mesh = _joined(mesh, opening.side_mesh())
+            mesh = joined(mesh, opening.side_mesh())
         return mesh
 
     def pieces(self, rings: int) -> Iterator[Mesh]:
@@ -117,7 +117,8 @@ def _without(mesh: Mesh, inside: npt.NDArray[np.bool_]) -> Mesh:
     return Mesh(mesh.vertices_m, mesh.triangles[~inside[mesh.triangles].all(axis=1)])
 
 
-def _joined(a: Mesh, b: Mesh) -> Mesh:
+def joined(a: Mesh, b: Mesh) -> Mesh:
+    """Return two meshes as one."""
     return Mesh(
         np.concatenate([a.vertices_m, b.vertices_m]),
         np.concatenate([a.triangles, (b.triangles.astype(np.int64) + len(a.vertices_m)).astype(np.uint32)]),
@@ -135,5 +136,5 @@ def side_drift(
         z = float(line.z_m[np.abs(line.s_m - at_m) < 4.0].max()) + _SILL_M
     start = Start(float(x), float(y), float(z), float(heading) + math.radians(angle_deg))
     pieces = ((length_m + 1.0, 0.0, 0.0),)
-    settings = replace(main.settings, pieces=pieces, cross_drifts=())
+    settings = replace(main.settings, pieces=pieces, cross_drifts=(), widenings=())
     return Side(at_m, Drift(settings, centre_line(pieces, length_m, 0.0, start), rng, planar=planar))

@@ -84,7 +84,7 @@ class Drift:
         self, settings: DriftSettings, line: CentreLine, rng: np.random.Generator, *, planar: bool = False
     ) -> None:
         self.settings, self.line, self.profile = settings, line, profile(settings, planar=planar)
-        span, width = (0.0, line.length_m), settings.half_width_m + 1.0
+        span, width = (0.0, line.length_m), settings.half_width_m + 1.0 + _widest(settings)
         perimeter = (0.0, float(self.profile.u_m[-1]))
         wall_rng, floor_rng, end_rng, self._blast_rng = rng.spawn(4)
         scales = Scales(settings.roughness_octaves, settings.roughness_scale_m, settings.roughness_gain)
@@ -141,7 +141,7 @@ class Drift:
     def rings(self, s_m: FloatArray) -> FloatArray:
         """Return closed rings (lateral, height over the centre line), shape (S, N, 2): walls and roof, then floor."""
         shape = self.profile
-        walls = shape.points_m + self.wall_offset(s_m)[:, :, None] * shape.normals
+        walls = self._widened(s_m) + self.wall_offset(s_m)[:, :, None] * shape.normals
         floor_count = max(2, int(np.ceil(2 * self.settings.half_width_m / self.settings.mesh_m)))
         floor_count = 2 if len(shape.u_m) == 4 else floor_count
         share = np.linspace(0.0, 1.0, floor_count + 1)
@@ -150,6 +150,16 @@ class Drift:
         height = self.floor_offset(station, lateral)
         walls[:, [0, -1], 1] = height[:, [-1, 0]]  # the corners are shared
         return np.concatenate([walls, np.stack([lateral, height], axis=2)[:, 1:-1]], axis=1)
+
+    def _widened(self, s_m: FloatArray) -> FloatArray:
+        """Return the nominal profile at each station, stretched by the widenings; shape (len(s), N, 2) or (N, 2)."""
+        settings, points = self.settings, self.profile.points_m
+        if not settings.widenings:
+            return points
+        at, *changes = np.array(settings.widenings).T
+        left, right, roof = (np.interp(s_m, at, change)[:, None] for change in changes)
+        lateral = points[:, 0] * (1.0 + np.where(points[:, 0] > 0.0, left, right) / settings.half_width_m)
+        return np.stack([lateral, points[:, 1] * (1.0 + roof / settings.height_m)], axis=2)
 
     def _to_map(self, s_m: FloatArray, rings: FloatArray) -> FloatArray:
         """Return map coordinates, shape (len(s), N, 3), of (lateral, height) at each station."""
@@ -169,6 +179,11 @@ class Drift:
         heading = float(np.interp(s_m, self.line.s_m, self.line.heading_rad))
         vertices[..., :2] += outward * bulge[..., None] * np.array([np.cos(heading), np.sin(heading)])
         return Mesh(vertices.reshape(-1, 3), _tube(steps, ring.shape[0]))
+
+
+def _widest(settings: DriftSettings) -> float:
+    """Return the largest widening to one side, metres."""
+    return max((max(left, right, 0.0) for _, left, right, _ in settings.widenings), default=0.0)
 
 
 def _tube(rings: int, points: int) -> Triangles:

@@ -15,6 +15,8 @@ from lhdmap.errors import UsageError
 from lhdmap.geometry import se3
 from lhdmap.messages import Float32Array, FloatArray, GroundTruth, LaserScan, Mount, Record
 from lhdmap.simulation import sensors
+from lhdmap.simulation.pile_files import write_pile_truth
+from lhdmap.simulation.pile_truth import PileTruth, pile_truth
 from lhdmap.simulation.scanner import Beams, Rig, measured, obstructed, rays_of
 from lhdmap.simulation.scenario import DriftScenario, scenario_toml
 from lhdmap.simulation.world import DriftWorld
@@ -38,6 +40,8 @@ class SimulatedDrive:
     messages: int
     duration_s: float
     distance_m: float
+    pile_file: Path | None = None
+    pile: PileTruth | None = None
 
 
 class ScannerStream(NamedTuple):
@@ -56,6 +60,8 @@ def simulate_drift(
 ) -> SimulatedDrive:
     """Simulate the drive of `scenario` into the log `path`, with `.truth.tum` and `.scenario.toml` beside it.
 
+    A drive to a pile has `.pile.json` as well: the truth about it.
+
     `mesh_path` takes the drift's mesh (PLY, in `map`). `progress(records, duration_s)` wraps the records on their
     way into the log.
 
@@ -68,7 +74,8 @@ def simulate_drift(
     if path.suffix != ".mcap":
         raise UsageError(f"{path}: logs are written as MCAP, so a name that ends in .mcap was wanted")
     truth_file, scenario_file = path.with_suffix(".truth.tum"), path.with_suffix(".scenario.toml")
-    for file in (path, truth_file, scenario_file, mesh_path):
+    pile_file = path.with_suffix(".pile.json") if scenario.pile is not None else None
+    for file in (path, truth_file, scenario_file, mesh_path, pile_file):
         if file is not None and file.exists():
             raise UsageError(f"{file} exists already and is never overwritten: give another name with -o")
     world = DriftWorld(scenario)
@@ -78,6 +85,9 @@ def simulate_drift(
     write_tum(truth_file, truth)
     if mesh_path is not None:
         world.write_mesh(mesh_path)
+    pile = pile_truth(world) if world.pile is not None else None
+    if pile is not None and pile_file is not None:
+        write_pile_truth(pile_file, pile, truth)
     stream, messages = records(world), 0
     with LogWriter(path) as writer:
         for record in progress(stream, world.motion.duration_s) if progress else stream:
@@ -94,6 +104,8 @@ def simulate_drift(
         messages,
         world.motion.duration_s,
         world.motion.distance_m,
+        pile_file,
+        pile,
     )
 
 

@@ -12,7 +12,6 @@ import numpy.typing as npt
 from lhdmap.messages import Float32Array, FloatArray
 from lhdmap.simulation.drift import Mesh
 
-_TILE_M = 40.0
 MeshBetween = Callable[[float, float], Mesh]
 
 
@@ -44,17 +43,20 @@ class Surface:
 class TiledSurface:
     """The surface around a place of a long drift; it is renewed as the machine drives on, so memory does not grow."""
 
-    def __init__(self, mesh_between: MeshBetween, reach_m: float) -> None:
-        """`mesh_between(s0, s1)` meshes the drift between two arc lengths; `reach_m` is how far rays go."""
-        self._mesh_between, self._reach_m = mesh_between, reach_m
+    def __init__(self, mesh_between: MeshBetween, reach_m: float, *, tile_m: float = 40.0) -> None:
+        """`mesh_between(s0, s1)` meshes the drift between two arc lengths; `reach_m` is how far rays go.
+
+        The surface is renewed when the machine comes from one stretch of `tile_m` into the next.
+        """
+        self._mesh_between, self._reach_m, self._tile_m = mesh_between, reach_m, tile_m
         self._tile: int | None = None
         self._surface: Surface | None = None
 
     def near(self, s_m: float) -> Surface:
         """Return the surface that a scanner at arc length `s_m` can see."""
-        tile = math.floor(s_m / _TILE_M)
+        tile = math.floor(s_m / self._tile_m)
         if self._surface is None or tile != self._tile:
             self._surface = None  # the old one must go before the new one takes its memory
-            start_m, end_m = tile * _TILE_M - self._reach_m, (tile + 1) * _TILE_M + self._reach_m
+            start_m, end_m = tile * self._tile_m - self._reach_m, (tile + 1) * self._tile_m + self._reach_m
             self._surface, self._tile = Surface(self._mesh_between(start_m, end_m)), tile
         return self._surface

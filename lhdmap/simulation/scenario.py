@@ -10,6 +10,7 @@ from typing import Any
 
 from lhdmap.errors import ConfigError, InputError
 from lhdmap.settings import load_section, nearest, section_toml
+from lhdmap.simulation.pile_sections import MountingSettings, PileSettings
 from lhdmap.simulation.sections import (
     DriftSettings,
     DriveSettings,
@@ -19,6 +20,7 @@ from lhdmap.simulation.sections import (
 )
 
 ROUGHNESS_M = {"rough": 0.12, "moderate": 0.03, "smooth": 0.005}
+NEAREST_M = 4.0  # how near base_link may come to a pile: the bucket is in front of it
 _PLANAR_MESH_M = 0.03  # upright walls need few triangles
 
 
@@ -27,7 +29,8 @@ class DriftScenario:
     """A drive through a drift: everything that the simulator needs to know.
 
     `planar` makes a 2D world: level scanners, flat floor, walls alike at all heights. `truth` writes the topic
-    `/ground_truth/odometry`. `machine` is a machine file, or empty for the default.
+    `/ground_truth/odometry`. `machine` is a machine file, or empty for the default. `pile` and `mounting` make it a
+    scenario of the kind 'pile': the drift ends in a pile, and the front scanner hangs as its mounting says.
     """
 
     seed: int = 0
@@ -39,11 +42,27 @@ class DriftScenario:
     scanner: ScannerSettings = field(default_factory=ScannerSettings)
     inclinometer: InclinometerSettings = field(default_factory=InclinometerSettings)
     wheels: WheelSettings = field(default_factory=WheelSettings)
+    pile: PileSettings | None = None
+    mounting: MountingSettings | None = None
+
+    @property
+    def kind(self) -> str:
+        """Kind of the scenario: `drift` or `pile`."""
+        return "drift" if self.pile is None else "pile"
 
     def __post_init__(self) -> None:
         """Check what the sections cannot; raises ConfigError."""
         if self.seed < 0:
             raise ConfigError(f"seed = {self.seed}: zero or a positive number was wanted")
+        if self.pile is None:
+            return
+        if self.planar:
+            raise ConfigError("planar = true: a pile needs a world with heights")
+        if self.drive.distance_m > self.pile.toe_m - NEAREST_M:
+            raise ConfigError(
+                f"drive.distance_m = {self.drive.distance_m:g}: the pile begins at {self.pile.toe_m:g} m, and the machine "
+                f"must stop {NEAREST_M:g} m before it"
+            )
 
 
 SECTIONS: dict[str, type[Any]] = {
@@ -53,6 +72,7 @@ SECTIONS: dict[str, type[Any]] = {
     "inclinometer": InclinometerSettings,
     "wheels": WheelSettings,
 }
+PILE_SECTIONS: dict[str, type[Any]] = {**SECTIONS, "pile": PileSettings, "mounting": MountingSettings}
 
 
 def load_scenario(path: Path) -> DriftScenario:
@@ -79,19 +99,21 @@ def scenario_from(table: Mapping[str, Any]) -> DriftScenario:
         ConfigError: a key or a value is wrong.
     """
     plain: dict[str, type[Any]] = {"seed": int, "planar": bool, "truth": bool, "machine": str}
-    known = ("scenario", *plain, *SECTIONS)
+    kind = table.get("scenario", "drift")
+    if kind not in ("drift", "pile"):
+        raise ConfigError(f"scenario = {kind!r}: 'drift' or 'pile' was wanted")
+    sections = SECTIONS if kind == "drift" else PILE_SECTIONS
+    known = ("scenario", *plain, *sections)
     for key in table:
         if key not in known:
             raise ConfigError(f"unknown key '{key}'{nearest(key, known)}")
-    if table.get("scenario", "drift") != "drift":
-        raise ConfigError(f"scenario = {table['scenario']!r}: this version simulates 'drift'")
     values: dict[str, Any] = {}
-    for key, kind in plain.items():
+    for key, wanted in plain.items():
         if key in table:
-            if type(table[key]) is not kind:
-                raise ConfigError(f"{key} = {table[key]!r}: a value of type {kind.__name__} was wanted")
+            if type(table[key]) is not wanted:
+                raise ConfigError(f"{key} = {table[key]!r}: a value of type {wanted.__name__} was wanted")
             values[key] = table[key]
-    for key, section in SECTIONS.items():
+    for key, section in sections.items():
         values[key] = load_section(section, key, table.get(key, {}))
     return DriftScenario(**values)
 
@@ -99,13 +121,16 @@ def scenario_from(table: Mapping[str, Any]) -> DriftScenario:
 def scenario_toml(scenario: DriftScenario) -> str:
     """Print a scenario as a TOML file that `load_scenario` reads back, each value with meaning, unit and source."""
     head = [
-        'scenario = "drift"',
+        f'scenario = "{scenario.kind}"',
         f"seed = {scenario.seed}",
         f"planar = {str(scenario.planar).lower()}",
         f"truth = {str(scenario.truth).lower()}",
         f'machine = "{scenario.machine}"',
     ]
-    return "\n".join(["\n".join(head) + "\n", *(section_toml(name, getattr(scenario, name)) for name in SECTIONS)])
+    sections = [(name, getattr(scenario, name)) for name in PILE_SECTIONS]
+    return "\n".join(
+        ["\n".join(head) + "\n", *(section_toml(name, part) for name, part in sections if part is not None)]
+    )
 
 
 def flattened(scenario: DriftScenario) -> DriftScenario:

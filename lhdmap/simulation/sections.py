@@ -63,6 +63,11 @@ class DriftSettings:
         unit="m, deg, m",
         doc="Side openings as (driven distance, angle from the drift, length); positive angles lie left.",
     )
+    widenings: tuple[tuple[float, float, float, float], ...] = setting(
+        (),
+        unit="m, m, m, m",
+        doc="How much wider on the left, on the right, and higher, from driven distance to driven distance; linear between.",
+    )
     mesh_m: float = setting(0.06, unit="m", minimum=0.01, maximum=0.5, doc="Edge length of the mesh.")
 
 

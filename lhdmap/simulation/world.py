@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 import zlib
 from dataclasses import replace
@@ -19,6 +20,8 @@ from lhdmap.simulation.crossing import Crossing, side_drift
 from lhdmap.simulation.drift import Drift, Mesh
 from lhdmap.simulation.driving import Motion, Plan, Shaking, drive_path, simulate_motion
 from lhdmap.simulation.mesh_file import write_ply
+from lhdmap.simulation.pile import Pile, make_pile
+from lhdmap.simulation.pile_sections import MountingSettings
 from lhdmap.simulation.raycast import TiledSurface
 from lhdmap.simulation.scanner import Beams, Rig, beams_of, rig_of
 from lhdmap.simulation.scenario import DriftScenario, flattened
@@ -26,8 +29,10 @@ from lhdmap.simulation.sensors import Clock
 from lhdmap.simulation.timetable import timetable
 
 _PIECE_M = 30.0
+FRONT = "lidar_front"
+_VIEW_M = 0.25  # how far a scanner's height is above the bucket: it is mounted where its view is free
 START_NS = 1_700_000_000_123_456_789
-_BEHIND_M, _AHEAD_M = 14.0, 20.0  # drift behind the machine's start and ahead of its end
+BEHIND_M, _AHEAD_M = 14.0, 20.0  # drift behind the machine's start and ahead of its end
 
 
 class DriftWorld:
@@ -35,38 +40,52 @@ class DriftWorld:
 
     def __init__(self, scenario: DriftScenario) -> None:
         self.scenario = flattened(scenario)
-        self.machine = _levelled(load_machine(Path(scenario.machine) if scenario.machine else None), scenario.planar)
+        machine = load_machine(Path(scenario.machine) if scenario.machine else None)
+        self.machine = _mounted(_levelled(machine, scenario.planar), scenario.mounting)
         self.clock = Clock(START_NS)
         self.drift = self._make_drift()
         self.crossing = self._make_crossing()
+        self.pile = self._make_pile()
         self.motion = self._make_motion()
         self.beams: Beams = beams_of(self.scenario.scanner)
         reach_m = min(self.scenario.scanner.max_range_m, 85.0) + 15.0
-        self.surface = TiledSurface(self.mesh_between, reach_m)
+        self.surface = TiledSurface(self.mesh_between, reach_m, tile_m=40.0 if self.pile is None else 1e6)
 
     def rng(self, name: str) -> np.random.Generator:
         """Return the source of chance of the part `name`: independent of all others and of the order of use."""
-        return np.random.default_rng([self.scenario.seed, zlib.crc32(name.encode())])
+        pile = self.scenario.pile
+        kind = [] if pile is None else [zlib.crc32(pile.variant.encode())]
+        return np.random.default_rng([self.scenario.seed, zlib.crc32(name.encode()), *kind])
 
     def _make_drift(self) -> Drift:
         settings, rng = self.scenario.drift, self.rng("start")
         x, y, z = rng.uniform((-20.0, -20.0, -2.0), (20.0, 20.0, 2.0))
         start = Start(x, y, 0.0 if self.scenario.planar else z, rng.uniform(-math.pi, math.pi))
-        length = self.scenario.drive.distance_m + _BEHIND_M + _AHEAD_M
+        pile = self.scenario.pile
+        length = BEHIND_M + (self.scenario.drive.distance_m + _AHEAD_M if pile is None else pile.toe_m + pile.back_m)
+        if settings.widenings:
+            shifted = tuple((at + BEHIND_M, left, right, roof) for at, left, right, roof in settings.widenings)
+            settings = replace(settings, widenings=shifted)
         line = centre_line(settings.pieces, length, settings.transition_m, start)
         return Drift(settings, line, self.rng("drift"), planar=self.scenario.planar)
 
     def _make_crossing(self) -> Crossing:
         planar, sides = self.scenario.planar, []
         for index, (at_m, angle_deg, length_m) in enumerate(self.scenario.drift.cross_drifts):
-            place = (at_m + _BEHIND_M, angle_deg, length_m)
+            place = (at_m + BEHIND_M, angle_deg, length_m)
             sides.append(side_drift(self.drift, place, self.rng(f"cross drift {index}"), planar=planar))
         return Crossing(self.drift, sides, planar=planar)
+
+    def _make_pile(self) -> Pile | None:
+        settings = self.scenario.pile
+        if settings is None:
+            return None
+        return make_pile(settings, self.drift, BEHIND_M + settings.toe_m, self.machine, self.rng("pile"))
 
     def _make_motion(self) -> Motion:
         settings = self.scenario.drive
         path = drive_path(self.drift, settings, self.rng("path"))
-        plan = Plan(path, _BEHIND_M, timetable(settings, self.rng("speed")))
+        plan = Plan(path, BEHIND_M, timetable(settings, self.rng("speed")))
         self._check_bends(path)
         shaking = Shaking(math.radians(settings.vibration_deg), self.rng("shaking"))
         return simulate_motion(self.drift, plan, self.machine, shaking)
@@ -90,7 +109,11 @@ class DriftWorld:
         """
         if mount not in self.machine.mounts:
             raise ConfigError(f"machine '{self.machine.name}' has no [mount.{mount}]: the simulator needs one")
-        return rig_of(self.machine, self.machine.mounts[mount], occlusion=self.scenario.scanner.occlusion)
+        true_mount = self.machine.mounts[mount]
+        if mount == FRONT and self.scenario.mounting is not None:
+            error_deg = self.scenario.mounting.tilt_error_deg
+            true_mount = replace(true_mount, pitch_deg=true_mount.pitch_deg + error_deg)
+        return rig_of(self.machine, true_mount, occlusion=self.scenario.scanner.occlusion)
 
     def place_m(self, time_s: float) -> float:
         """Return the place of the machine along the drift at a time, metres."""
@@ -109,7 +132,8 @@ class DriftWorld:
     def mesh_between(self, start_m: float, end_m: float) -> Mesh:
         """Return the mesh between two arc lengths; the drift's own ends are closed."""
         spacing = self.scenario.drift.mesh_m
-        return self.crossing.mesh(math.floor(start_m / spacing), math.ceil(end_m / spacing) + 1)
+        mesh = self.crossing.mesh(math.floor(start_m / spacing), math.ceil(end_m / spacing) + 1)
+        return mesh if self.pile is None else self.pile.joined_to(mesh)
 
     def write_mesh(self, path: Path) -> None:
         """Write the whole mesh as PLY, in `map`.
@@ -117,7 +141,8 @@ class DriftWorld:
         Raises:
             OSError: the file exists or cannot be written.
         """
-        write_ply(path, self.crossing.pieces(max(round(_PIECE_M / self.scenario.drift.mesh_m), 1)))
+        pieces = self.crossing.pieces(max(round(_PIECE_M / self.scenario.drift.mesh_m), 1))
+        write_ply(path, pieces if self.pile is None else itertools.chain(pieces, self.pile.meshes()))
 
 
 def _levelled(machine: Machine, planar: bool) -> Machine:
@@ -126,3 +151,20 @@ def _levelled(machine: Machine, planar: bool) -> Machine:
         return machine
     mounts = {name: replace(mount, roll_deg=0.0, pitch_deg=0.0) for name, mount in machine.mounts.items()}
     return replace(machine, mounts=mounts)
+
+
+def _mounted(machine: Machine, mounting: MountingSettings | None) -> Machine:
+    """Return the machine with its front scanner as the log says that it is mounted, and nothing in its view."""
+    if mounting is None or FRONT not in machine.mounts:
+        return machine
+    mount = machine.mounts[FRONT]
+    x, y, _ = mount.position_m
+    mounts = {
+        **machine.mounts,
+        FRONT: replace(mount, position_m=(x, y, mounting.height_m), pitch_deg=mounting.tilt_deg),
+    }
+    top, bodies = mounting.height_m - _VIEW_M, dict(machine.bodies)
+    for name, body in machine.bodies.items():
+        if body.frame == "base_link" and body.max_m[0] > x and body.max_m[2] > top:
+            bodies[name] = replace(body, max_m=(*body.max_m[:2], max(top, body.min_m[2] + 0.1)))
+    return replace(machine, mounts=mounts, bodies=bodies)

@@ -35,7 +35,7 @@ def test_the_shipped_scenario_is_a_drive_of_a_minute_at_most() -> None:
         ("[drive]\nspeed_kmh = 400.0", "40"),
         ("seed = 'one'", "int"),
         ("seed = -1", "positive"),
-        ("scenario = 'pile'", "drift"),
+        ("scenario = 'shaft'", "drift"),
         ("[wheel]", "wheels"),
         ("[drift]\npieces = [[1.0, 2.0]]", "3"),
     ],

@@ -1,0 +1,120 @@
+"""Suites: lists of scenes that are written as logs with their truth and a table in the style of Table 6."""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Callable, Iterator
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from lhdmap.errors import ConfigError, InputError
+from lhdmap.settings import load_section, nearest, setting
+from lhdmap.simulation.pile_files import row_of, write_table
+from lhdmap.simulation.pile_scenes import scene
+from lhdmap.simulation.pile_sections import VARIANTS
+from lhdmap.simulation.scenario import DriftScenario
+
+TABLE = "truth.csv"
+Told = Callable[[str, int, int], None]
+
+
+@dataclass(frozen=True, slots=True)
+class SuitePart:
+    """One `[[scenes]]` of a suite: so many seeds of a variant."""
+
+    variant: str = setting("normal", choices=VARIANTS, doc="Kind of scene.")
+    first_seed: int = setting(0, minimum=0, doc="First of the seeds.")
+    count: int = setting(1, minimum=1, maximum=100_000, doc="How many seeds, one after the other.")
+    flat_floor: bool = setting(False, doc="Whether the floor has no waves.")
+
+
+class SuiteScene(NamedTuple):
+    """One scene of a suite."""
+
+    variant: str
+    seed: int
+    flat_floor: bool
+
+    @property
+    def name(self) -> str:
+        """Name of its files."""
+        return f"{self.variant}{'_flat' if self.flat_floor else ''}_{self.seed}"
+
+    def scenario(self) -> DriftScenario:
+        """Return its scenario."""
+        return scene(self.variant, self.seed, flat_floor=self.flat_floor)
+
+
+def load_suite(path: Path) -> list[SuiteScene]:
+    """Return the scenes of a suite file: TOML with `[[scenes]]`, each with variant, first_seed, count, flat_floor.
+
+    Raises:
+        InputError: the file cannot be read or is not TOML.
+        ConfigError: a key or a value in it is wrong, or a scene is in it twice.
+    """
+    try:
+        table: dict[str, Any] = tomllib.loads(path.read_text(encoding="utf-8"))
+    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+        raise InputError(f"{path}: not a readable suite file ({error})") from error
+    for key in table:
+        if key != "scenes":
+            raise ConfigError(f"{path}: unknown key '{key}'{nearest(key, ['scenes'])}")
+    parts = table.get("scenes", [])
+    if not isinstance(parts, list) or not parts:
+        raise ConfigError(f"{path}: at least one [[scenes]] was wanted")
+    try:
+        sections = [load_section(SuitePart, "scenes", part) for part in parts]
+    except ConfigError as error:
+        raise ConfigError(f"{path}: {error}") from error
+    found = [
+        SuiteScene(part.variant, part.first_seed + k, part.flat_floor) for part in sections for k in range(part.count)
+    ]
+    if len(set(found)) < len(found):
+        raise ConfigError(f"{path}: a scene is in it twice; give each [[scenes]] its own first_seed")
+    return found
+
+
+def write_suite(scenes: list[SuiteScene], folder: Path, *, jobs: int = 1, told: Told | None = None) -> Path:
+    """Write the logs of all scenes into `folder`, with their truth and the table `truth.csv`; return the table.
+
+    What is there already (from a run that was interrupted) stays. `told(name, done, of)` hears of each finished scene.
+
+    Raises:
+        OSError: a file cannot be written.
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+    wanted = [one for one in scenes if not _finished(one, folder)]
+    for done, name in enumerate(_written(wanted, folder, jobs), start=1):
+        if told is not None:
+            told(name, done, len(wanted))
+    write_table(folder / TABLE, (row_of(folder / f"{one.name}.pile.json", folder) for one in scenes))
+    return folder / TABLE
+
+
+def _finished(one: SuiteScene, folder: Path) -> bool:
+    return (folder / f"{one.name}.mcap").exists() and (folder / f"{one.name}.pile.json").exists()
+
+
+def _written(scenes: list[SuiteScene], folder: Path, jobs: int) -> Iterator[str]:
+    if jobs == 1:
+        for one in scenes:
+            yield _write(one, folder)
+        return
+    with ProcessPoolExecutor(jobs) as pool:
+        yield from pool.map(_write, scenes, [folder] * len(scenes))
+
+
+def _write(one: SuiteScene, folder: Path) -> str:
+    """Write one scene under a partial name, and rename it when complete."""
+    from lhdmap.simulation.drive import simulate_drift
+
+    partial = folder / f"partial.{one.name}.mcap"
+    suffixes = (".truth.tum", ".scenario.toml", ".pile.json", ".mcap")
+    for suffix in suffixes:
+        partial.with_suffix(suffix).unlink(missing_ok=True)
+    simulate_drift(one.scenario(), partial)
+    for suffix in suffixes:
+        partial.with_suffix(suffix).replace(folder / f"{one.name}{suffix}")
+    return one.name
