@@ -38,26 +38,32 @@ class Frame2(NamedTuple):
         return Frame2(self.map(at), self.heading_rad + turn_rad)
 
 
-def end_turn(corridor: Corridor, face_x_m: float) -> tuple[float, float] | None:
-    """Return how far (rad) the drift's end turns left of the frame's x axis, and y of its middle at the face; None: no walls."""
-    last = (corridor.x_m < face_x_m - 0.3) & (corridor.x_m > face_x_m - _WALLS_M)
-    slopes, middles, weights = [], [], []
+class End(NamedTuple):
+    """The drift's end: how far it turns left of the frame's x axis (rad), y of its middle at the face and half its width (m)."""
+
+    turn_rad: float
+    middle_m: float
+    half_m: float
+
+
+def end_of(corridor: Corridor, face_x_m: float) -> End | None:
+    """Return the end before a face at x, from the walls of the last metres; None where they were not seen."""
+    last = (corridor.x_m < face_x_m - 0.8) & (corridor.x_m > face_x_m - _WALLS_M)
+    lines, weights = [], []
     for wall in (corridor.left_m, corridor.right_m):
         seen = last & np.isfinite(wall)
-        if seen.sum() < _FEWEST_BINS:
-            continue
-        slope, offset = _line(corridor.x_m[seen], wall[seen])
-        slopes.append(slope)
-        weights.append(float(seen.sum()))
-        middles.append(offset + slope * face_x_m)
-    if len(slopes) < 2:
-        if not slopes:
-            return None
-        return math.atan(float(np.clip(slopes[0], -_MOST_TURN, _MOST_TURN))), float(
-            corridor.centre_at(np.array([face_x_m]))[0]
-        )
-    slope = float(np.clip(np.average(slopes, weights=weights), -_MOST_TURN, _MOST_TURN))
-    return math.atan(slope), 0.5 * (middles[0] + middles[1])
+        if seen.sum() >= _FEWEST_BINS:
+            lines.append(_line(corridor.x_m[seen], wall[seen]))
+            weights.append(float(seen.sum()))
+    if not lines:
+        return None
+    slope = float(np.clip(np.average([line[0] for line in lines], weights=weights), -_MOST_TURN, _MOST_TURN))
+    at = np.array([face_x_m])
+    middle, half = float(corridor.centre_at(at)[0]), float(corridor.half_at(at)[0])
+    if len(lines) == 2:
+        left, right = (offset + own * (face_x_m - 0.5) for own, offset in lines)
+        middle, half = 0.5 * (left + right), 0.5 * (left - right)
+    return End(math.atan(slope), middle, half)
 
 
 def _line(x: FloatArray, y: FloatArray) -> tuple[float, float]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections import deque
 from typing import NamedTuple
 
 import numpy as np
@@ -13,12 +14,13 @@ from lhdmap.pile.face import Registration
 from lhdmap.pile.measure import measure
 from lhdmap.pile.result import PileEstimate, PileReport, Snapshot
 from lhdmap.pile.settings import PileSettings
-from lhdmap.pile.surface import look
+from lhdmap.pile.surface import View, look
 from lhdmap.pile.window import HitWindow
 
 _MOST_HISTORY = 400
 _SURE_STD_DEG = 2.5
 _ELSEWHERE_M = 5.0
+_GRADE_M = 10.0
 
 
 class ScanHits(NamedTuple):
@@ -42,6 +44,7 @@ class PileStage:
         self._travelled_m = 0.0
         self._position: FloatArray | None = None
         self._estimated_m = -math.inf
+        self._path: deque[tuple[float, float]] = deque()
         self._history: list[Snapshot] = []
         self._decision: Snapshot | None = None
         self._best: Snapshot | None = None
@@ -52,6 +55,9 @@ class PileStage:
         if self._position is not None:
             self._travelled_m += _forward(position - self._position, float(scan.T_map_base[3]))
         self._position = position
+        self._path.append((self._travelled_m, float(position[2])))
+        while abs(self._path[0][0] - self._travelled_m) > _GRADE_M:
+            self._path.popleft()
         self._window.add(scan.points_map, position, self._travelled_m)
         if abs(self._travelled_m - self._estimated_m) < self._settings.update_m:
             return None
@@ -66,12 +72,18 @@ class PileStage:
         base = Frame2(scan.T_map_base[:3], float(scan.T_map_base[3]))
         hits = self._window.hits(self._travelled_m)
         rng = np.random.default_rng(len(hits))
-        scene = look(hits, base, self._registration, self._settings.reach_m, rng)
+        scene = look(hits, View(base, self._grade(), self._registration), self._settings.reach_m, rng)
         if scene is None:
             return self._take(Snapshot(scan.stamp_ns, math.nan, PileEstimate()))
         estimate = measure(scene)
         distance = float(np.linalg.norm(estimate.toe_m - scan.T_map_base[:3], axis=1).min())
         return self._take(Snapshot(scan.stamp_ns, distance, estimate))
+
+    def _grade(self) -> float:
+        """Return how the path rose over the last metres (m/m)."""
+        first, last = self._path[0], self._path[-1]
+        length = abs(last[0] - first[0])
+        return (last[1] - first[1]) / length if length > 0.3 * _GRADE_M else 0.0
 
     def _take(self, snapshot: Snapshot) -> Snapshot:
         """Keep the estimate, and decide: when sure enough, at the latest at the deadline."""

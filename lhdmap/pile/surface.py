@@ -15,13 +15,14 @@ import numpy.typing as npt
 
 from lhdmap.messages import FloatArray
 from lhdmap.pile.corridor import trace
-from lhdmap.pile.end_frame import Frame2, end_turn, floor_before
+from lhdmap.pile.end_frame import Frame2, end_of, floor_before
 from lhdmap.pile.face import Face, Registration, find, fit
 
 Mask = npt.NDArray[np.bool_]
 LOW_M, HIGH_M = 0.2, 1.6  # heights over the floor at the toe that the inclination is defined over
 _WALL_GAP_M = 0.3
 _CLEAR_M = 0.08
+_WALL_SLACK_M = 0.45  # a wall at the face stands no farther from the line of the wall before
 _FEWEST_HITS = 40
 _FEWEST_BLOCKS = 6
 
@@ -58,10 +59,17 @@ class Scene(NamedTuple):
         return self.face.a + self.face.b * y + self.face.c * self.floor_m
 
 
-def look(
-    hits: FloatArray, base: Frame2, registration: Registration, reach_m: float, rng: np.random.Generator
-) -> Scene | None:
-    """Return what closes the drift ahead of `base`, or None; hits rows x, y, z (map, m), travelled (m)."""
+class View(NamedTuple):
+    """From where one looks: the machine's frame, the grade of its path (m/m, rising ahead), how far poses may be wrong."""
+
+    base: Frame2
+    grade: float
+    registration: Registration
+
+
+def look(hits: FloatArray, view: View, reach_m: float, rng: np.random.Generator) -> Scene | None:
+    """Return what closes the drift ahead, or None; hits rows x, y, z (map, m), travelled (m)."""
+    base = view.base
     local = base.local(hits)
     local = local[(local[:, 0] > 1.0) & (np.abs(local[:, 1]) < 12.0)]
     corridor = trace(local, reach_m)
@@ -70,13 +78,13 @@ def look(
     if seed is None:
         return None
     face_x = _crossing(seed, corridor.centre_at)
-    end = end_turn(corridor, face_x)
+    end = end_of(corridor, face_x)
     if end is None:
         return None
-    frame = base.turned(np.array([face_x, end[1], 0.0]), end[0])
-    return _refined(
-        frame, frame.local(hits), end[0], seed, registration, half_m=float(corridor.half_at(np.array([face_x]))[0])
-    )
+    frame = base.turned(np.array([face_x, end.middle_m, 0.0]), end.turn_rad)
+    model = _turned(seed, end.turn_rad)
+    floor = _Floor(view.grade * face_x, view.grade)
+    return _refined(frame, frame.local(hits), model, end.half_m, floor, view.registration)
 
 
 def _crossing(seed: FloatArray, centre_at) -> float:  # type: ignore[no-untyped-def]
@@ -87,16 +95,34 @@ def _crossing(seed: FloatArray, centre_at) -> float:  # type: ignore[no-untyped-
     return x
 
 
+def _turned(seed: FloatArray, turn_rad: float) -> FloatArray:
+    """Return the face x = a + b y + c z in a frame turned left by an angle, with its origin on the face."""
+    c, s = math.cos(turn_rad), math.sin(turn_rad)
+    across = max(c + float(seed[1]) * s, 0.3)
+    return np.array([0.0, (float(seed[1]) * c - s) / across, float(seed[2]) / across])
+
+
+class _Floor(NamedTuple):
+    """The floor where it was not seen: the machine's path carried on; z at the frame's origin and grade."""
+
+    z_m: float
+    grade: float
+
+    def at_toe(self, points: FloatArray, model: FloatArray, on: FloatArray, half_m: float) -> tuple[float, bool]:
+        """Return z of the floor at the toe and whether it was seen; never above the lowest hits of the face."""
+        toe_x = float(model[0] + model[2] * self.z_m)
+        seen = floor_before(points, toe_x, half_m)
+        lowest = float(np.percentile(on[:, 2], 1.0))
+        floor = seen if seen is not None else self.z_m + self.grade * toe_x
+        return min(floor, lowest), seen is not None
+
+
 def _refined(
-    frame: Frame2, points: FloatArray, turn: float, seed: FloatArray, registration: Registration, half_m: float
+    frame: Frame2, points: FloatArray, model: FloatArray, half_m: float, path: _Floor, registration: Registration
 ) -> Scene | None:
     """Fit the face in the end frame, with the floor and the walls that the fit itself shows."""
-    c, s = math.cos(turn), math.sin(turn)
-    # x = a + b y + c z turned into the end frame, through the same point
-    slope_y = (seed[1] * c - s) / max(c + seed[1] * s, 0.3)
-    model = np.array([0.0, slope_y, seed[2] / max(c + seed[1] * s, 0.3)])
     left, right = half_m, -half_m
-    face, floor, floor_seen, used = None, 0.0, False, np.zeros(0, dtype=bool)
+    scene = None
     for _ in range(3):
         near = np.abs(points[:, 0] - (model[0] + model[1] * points[:, 1] + model[2] * points[:, 2]))
         band = (points[:, 1] < left - _CLEAR_M) & (points[:, 1] > right + _CLEAR_M)
@@ -104,9 +130,7 @@ def _refined(
         on = points[band]
         if len(on) < _FEWEST_HITS:
             return None
-        seen = floor_before(points, float(model[0] + model[2] * floor), 0.5 * (left - right))
-        floor_seen = seen is not None
-        floor = seen if seen is not None else float(np.percentile(on[:, 2], 2.0))
+        floor, seen = path.at_toe(points, model, on, 0.5 * (left - right))
         used = band & (points[:, 2] > floor + LOW_M) & (points[:, 2] < floor + HIGH_M)
         if used.sum() < _FEWEST_HITS:
             return None
@@ -114,9 +138,8 @@ def _refined(
         model = np.array([face.a, face.b, face.c])
         limits = _limits(points, face, floor, half_m)
         left, right = limits.left_m, limits.right_m
-    if face is None or face.blocks < _FEWEST_BLOCKS:
-        return None
-    return Scene(frame, points, face, used, floor, floor_seen, limits)
+        scene = Scene(frame, points, face, used, floor, seen, limits)
+    return scene if scene is not None and scene.face.blocks >= _FEWEST_BLOCKS else None
 
 
 def _limits(points: FloatArray, face: Face, floor_m: float, half_m: float) -> Limits:
@@ -144,7 +167,7 @@ def _gap(points: FloatArray, before: FloatArray, side: float, half_m: float) -> 
 def _wall(points: FloatArray, at_face: Mask, side: float, half_m: float) -> tuple[float, float] | None:
     """Return the distance of a wall from the middle and its standard deviation; None where none is near."""
     y = side * points[at_face, 1]
-    y = y[(y > half_m - 0.9) & (y < half_m + 0.6)]
+    y = y[(y > half_m - _WALL_SLACK_M) & (y < half_m + _WALL_SLACK_M)]
     if y.size < 8:
         return None
     return float(np.median(y)), _deviation(y)
