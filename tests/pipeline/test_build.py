@@ -56,7 +56,7 @@ def test_the_truth_in_a_log_is_no_input(built: BuildResult, untold: Path, tmp_pa
 
 def test_the_trajectory_is_near_the_truth(built: BuildResult, drive: SimulatedDrive) -> None:
     found = evaluate_trajectory(built.trajectory, drive.truth).to_json()
-    assert found["end_pct"] < 2.0
+    assert found["end_pct"] < 1.0  # a short drive: 0.1 m weighs more than over 60 m
     assert built.summary["distance_m"] == pytest.approx(drive.distance_m, rel=0.01)
     assert built.summary["lost_stretches"] == 0
 
@@ -67,8 +67,8 @@ def test_the_cloud_lies_on_the_walls(built: BuildResult, drive: SimulatedDrive) 
     cloud = read_cloud(built.folder / "cloud.ply")
     points = in_truth_frame(cloud.points_m.astype(float), built.trajectory, drive.truth)
     distance = distances_to_mesh(points, drive.mesh_file)
-    assert np.median(distance) < 0.08
-    assert np.percentile(distance, 95) < 0.25
+    assert np.median(distance) < 0.06
+    assert np.percentile(distance, 95) < 0.20
 
 
 def test_diagnostics_have_a_row_for_each_processed_scan(built: BuildResult) -> None:
