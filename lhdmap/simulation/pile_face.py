@@ -20,7 +20,7 @@ _BELOW_M = 0.6  # how deep under the floor the face begins
 _BEND_OVER_M = 0.25  # height over which the slope changes at the bend
 _TOP_DEG = 7.0  # slope of the top of a pile, behind its crest
 _COVER = 1.6  # area of all rocks over the face's
-_SPREAD = 0.45  # of the logarithm of the rocks' sizes
+_SPREAD = 0.38  # of the logarithm of the rocks' sizes
 _WAVES = Scales(5, 1.2, 0.75)
 
 
@@ -124,7 +124,7 @@ def _rocks(settings: PileSettings, shape: tuple[int, int], rng: np.random.Genera
     area = shape[0] * shape[1] * settings.mesh_m**2
     mean_area = 0.25 * math.pi * settings.d50_m**2 * math.exp(2 * _SPREAD**2)
     count = math.ceil(_COVER * area / mean_area)
-    sizes = np.clip(settings.d50_m * np.exp(_SPREAD * rng.standard_normal(count)), 0.06, min(2.2 * settings.d50_m, 0.9))
+    sizes = np.clip(settings.d50_m * np.exp(_SPREAD * rng.standard_normal(count)), 0.06, min(2.0 * settings.d50_m, 0.8))
     draws = rng.random((count, 5))
     out = np.zeros(shape)
     for size, draw in zip(sizes.tolist(), draws.tolist(), strict=True):
@@ -144,7 +144,7 @@ def _dome(out: FloatArray, cells: float, draw: list[float], size_m: float) -> No
     c, s, flat = math.cos(math.pi * draw[2]), math.sin(math.pi * draw[2]), 0.6 + 0.4 * draw[3]
     u = (rows[:, None] * c + columns * s) / half
     v = (columns * c - rows[:, None] * s) / (half * flat)
-    height = size_m * (0.35 + 0.45 * draw[4])
+    height = size_m * (0.2 + 0.35 * draw[4])
     dome = height * np.sqrt(np.maximum(1.0 - u * u - v * v, 0.0))
     window = out[low[0] : low[0] + rows.size, low[1] : low[1] + columns.size]
     np.maximum(window, dome, out=window)

@@ -87,7 +87,7 @@ def _common(variant: str, seed: int, rng: np.random.Generator) -> DriftScenario:
 
 def _drift(toe_m: float, rng: np.random.Generator) -> DriftSettings:
     """Return a drift of one or two bends before its last straight, with a taper and a grade."""
-    half_m, straight_m = rng.uniform(1.6, 2.25), rng.uniform(*_LAST_STRAIGHT_M)
+    half_m, straight_m = rng.uniform(1.62, 2.2), rng.uniform(*_LAST_STRAIGHT_M)
     bends = []
     for _ in range(int(rng.integers(0, 3))):
         bends += [

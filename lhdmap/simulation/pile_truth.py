@@ -18,10 +18,11 @@ import numpy.typing as npt
 from lhdmap.messages import FloatArray
 from lhdmap.simulation.drift import Mesh
 from lhdmap.simulation.pile import Pile, floor_height
+from lhdmap.simulation.pile_rocks import extent
 from lhdmap.simulation.raycast import Surface
 from lhdmap.simulation.world import DriftWorld
 
-CELL_M = 0.04
+CELL_M, VOLUME_CELL_M = 0.04, 0.02
 OFF_WALL_CELLS = 2  # 8 cm
 FACE_HEIGHTS_M = (0.2, 1.6)
 WIDTH_HEIGHTS_M = (0.3, 1.5)
@@ -270,7 +271,7 @@ def _volumes(bodies: Bodies, plane: FacePlane, floor_m: float, sides_m: tuple[fl
     It is that between the walls, or within `sides_m` of the middle (the aperture) where that is less.
     """
     half, depth = bodies.drift.settings.half_width_m + 3.0, bodies.pile.settings.back_m
-    x, y = np.arange(_front_m(bodies, floor_m) - 0.5, depth, CELL_M), np.arange(-half, half, CELL_M) + 0.5 * CELL_M
+    x, y = (np.arange(a, b, VOLUME_CELL_M) for a, b in ((_front_m(bodies, floor_m) - 0.5, depth), (-half, half)))
     along, lateral = np.meshgrid(x, y, indexing="ij")
     top = np.stack([along, lateral, np.full(along.shape, _ABOVE_ALL_M)], axis=2)
     floor = np.array([bodies.floor(value) for value in x])[:, None]
@@ -280,7 +281,7 @@ def _volumes(bodies: Bodies, plane: FacePlane, floor_m: float, sides_m: tuple[fl
     right = np.minimum(bodies.to_walls(side, -_LEFT), sides_m[1])[:, None]
     over = np.where(np.isfinite(over) & (lateral < left) & (lateral > -right), np.maximum(over, 0.0), 0.0)
     ends = {height: plane.x_m(lateral, np.full(lateral.shape, floor_m + height)) for height in VOLUME_HEIGHTS_M}
-    return {height: float(over[along < end].sum()) * CELL_M**2 for height, end in ends.items()}
+    return {height: float(over[along < end].sum()) * VOLUME_CELL_M**2 for height, end in ends.items()}
 
 
 def _boulder_truth(pile: Pile, index: int) -> BoulderTruth:
@@ -292,6 +293,5 @@ def _boulder_truth(pile: Pile, index: int) -> BoulderTruth:
     depth = _cast(ahead, vertices - [3.0, 0.0, 0.0], _FORWARD) - 3.0  # how far the face is behind a vertex
     out = vertices[depth > 0.0]
     seen = out if len(out) >= 3 else vertices
-    size = float(np.linalg.norm(np.ptp(seen, axis=0)[1:]).item()) if len(seen) else math.nan
     to_map = pile.frame.to_map
-    return BoulderTruth(to_map(boulder.middle_m), to_map(seen.mean(axis=0)), boulder.size_m, size)
+    return BoulderTruth(to_map(boulder.middle_m), to_map(seen.mean(axis=0)), boulder.size_m, extent(seen))

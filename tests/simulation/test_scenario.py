@@ -89,7 +89,9 @@ def test_options_go_over_the_scenario_file(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     "words",
     [
-        ["pile"],
+        ["shaft"],
+        ["pile", "--variant", "heap"],
+        ["drift", "--suite", "suite.toml"],
         ["drift", "--roughness", "hairy"],
         ["drift", "--stop", "1"],
         ["drift", "--beams", "2"],
