@@ -15,8 +15,9 @@ from lhdmap.errors import UsageError
 from lhdmap.geometry import se3
 from lhdmap.messages import Float32Array, FloatArray, GroundTruth, LaserScan, Mount, Record
 from lhdmap.simulation import sensors
+from lhdmap.simulation.pile_facts import PileTruth
 from lhdmap.simulation.pile_files import write_pile_truth
-from lhdmap.simulation.pile_truth import PileTruth, pile_truth
+from lhdmap.simulation.pile_truth import pile_truth
 from lhdmap.simulation.scanner import Beams, Rig, measured, obstructed, rays_of
 from lhdmap.simulation.scenario import DriftScenario, scenario_toml
 from lhdmap.simulation.world import DriftWorld

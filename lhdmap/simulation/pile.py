@@ -112,22 +112,23 @@ def _spill(settings: PileSettings, drift: Drift, place_m: float, rng: np.random.
         along = -settings.spill_reach_m * float(rng.random()) ** 1.5 - 0.2
         lateral = float(rng.uniform(-1.0, 1.0)) * (drift.settings.half_width_m - 0.3)
         mesh = rock(size, rng)
-        floor = floor_height(drift, place_m, along, lateral)
+        floor = float(floor_height(drift, place_m, np.array([along]), np.array([lateral]))[0])
         lift = floor - float(mesh.vertices_m[:, 2].min()) - 0.1 * size
         parts.append(Mesh(mesh.vertices_m + np.array([along, lateral, lift]), mesh.triangles))
     return parts
 
 
-def floor_height(drift: Drift, place_m: float, along_m: float, lateral_m: float) -> float:
-    """Return the floor's height over the foot's origin at a point of the frame of the foot."""
-    s = place_m + along_m
-    rise = np.interp(s, drift.line.s_m, drift.line.z_m) - np.interp(place_m, drift.line.s_m, drift.line.z_m)
-    return float(rise + drift.floor_offset(np.array([s]), np.array([lateral_m]))[0])
+def floor_height(drift: Drift, place_m: float, along_m: FloatArray, lateral_m: FloatArray) -> FloatArray:
+    """Return the floor's height over the foot's origin at points (N,), (N,) of the frame of the foot, shape (N,)."""
+    s, line = place_m + along_m, drift.line
+    rise: FloatArray = np.interp(s, line.s_m, line.z_m) - np.interp(place_m, line.s_m, line.z_m)
+    return rise + drift.floor_offset(s, lateral_m)
 
 
 def _obstacle(settings: PileSettings, drift: Drift, place_m: float, machine: Machine) -> list[Mesh]:
     """Return what stands at the foot: a machine whose nearest point is there, or a post from floor to roof."""
-    lateral, floor = settings.obstacle_lateral_m, floor_height(drift, place_m, 0.0, settings.obstacle_lateral_m)
+    lateral = settings.obstacle_lateral_m
+    floor = float(floor_height(drift, place_m, np.zeros(1), np.array([lateral]))[0])
     if settings.obstacle == "post":
         height = drift.settings.height_m + 2.0
         return [cylinder(np.array([0.0, lateral, floor + 0.5 * height - 0.5]), np.array([0.0, 0.0, height]), 0.2)]

@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from lhdmap.errors import InputError
-from lhdmap.simulation.pile_truth import PileTruth
+from lhdmap.simulation.pile_facts import PileTruth
 from lhdmap.trajectory import Trajectory
 
 COLUMNS = ("attempt", "log", "gt_width_m", "gt_inclination_deg", "gt_status")

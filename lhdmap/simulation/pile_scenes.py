@@ -87,7 +87,7 @@ def _common(variant: str, seed: int, rng: np.random.Generator) -> DriftScenario:
 
 def _drift(toe_m: float, rng: np.random.Generator) -> DriftSettings:
     """Return a drift of one or two bends before its last straight, with a taper and a grade."""
-    half_m, straight_m = rng.uniform(1.62, 2.2), rng.uniform(*_LAST_STRAIGHT_M)
+    half_m, straight_m = rng.uniform(1.68, 2.2), rng.uniform(*_LAST_STRAIGHT_M)
     bends = []
     for _ in range(int(rng.integers(0, 3))):
         bends += [
@@ -97,7 +97,7 @@ def _drift(toe_m: float, rng: np.random.Generator) -> DriftSettings:
     first_m = max(_BEHIND_M + toe_m - straight_m - sum(piece[0] for piece in bends), 1.0)
     end_grade = float(np.clip(rng.normal(0.0, 2.0), -5.0, 5.0))
     pieces = [(_round(first_m), 0.0, _normal(rng, 3.0)), *bends, (200.0, 0.0, _round(end_grade))]
-    taper = rng.normal(0.0, 0.12, 4)
+    taper = np.clip(rng.normal(0.0, 0.08, 4), -0.15, 0.15)
     at = (toe_m - 25.0, toe_m - 8.0, toe_m + 1.0)
     narrow = [(0.0, 0.0), (taper[0], taper[1]), (taper[0] + 0.5 * taper[2], taper[1] + 0.5 * taper[3])]
     widenings = tuple(

@@ -10,7 +10,6 @@ face is wider than the drift (a stope, whose mouth lies before the toe), the ape
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -18,6 +17,7 @@ import numpy.typing as npt
 from lhdmap.messages import FloatArray
 from lhdmap.simulation.drift import Mesh
 from lhdmap.simulation.pile import Pile, floor_height
+from lhdmap.simulation.pile_facts import BoulderTruth, FacePlane, PileTruth, fit_face
 from lhdmap.simulation.pile_rocks import extent
 from lhdmap.simulation.raycast import Surface
 from lhdmap.simulation.world import DriftWorld
@@ -29,67 +29,10 @@ WIDTH_HEIGHTS_M = (0.3, 1.5)
 BEFORE_FACE_M = (0.15, 0.9)
 VOLUME_HEIGHTS_M = (1.0, 1.4, 1.6, 2.0)
 _BEFORE_M = 1.0  # rays along the drift start this far before the foremost point of the face, or before the mouth
-_FEWEST = 60  # hits on the face below which it has no inclination
-_TUKEY = 4.685
+_LYING = ("loadable", "too_shallow")  # what lies has a volume under its face
 _ABOVE_ALL_M = 15.0
 _TOE_OVER_FLOOR_M = 0.03
 _FORWARD, _LEFT, _DOWN = np.eye(3)[0], np.eye(3)[1], -np.eye(3)[2]
-
-
-class FacePlane(NamedTuple):
-    """The fitted face x = offset + by_y·y + by_z·z in the frame of the foot, metres."""
-
-    offset_m: float
-    by_y: float
-    by_z: float
-
-    def x_m(self, y_m: FloatArray, z_m: FloatArray) -> FloatArray:
-        """Return where the plane is along the drift."""
-        return self.offset_m + self.by_y * y_m + self.by_z * z_m
-
-    @property
-    def inclination_deg(self) -> float:
-        """Inclination in the sign of Table 6: -45 for a pile of 45°, -90 for a wall."""
-        return -math.degrees(math.atan2(1.0, self.by_z))
-
-
-class BoulderTruth(NamedTuple):
-    """A boulder: its middle and the middle of what stands out of the face, both (3,) in `map`; largest extent (m)."""
-
-    center_m: FloatArray
-    visible_center_m: FloatArray
-    size_m: float
-    visible_size_m: float
-
-
-class PileTruth(NamedTuple):
-    """What a perfect observer knows; points in `map`. NaN or empty where the scene has no such thing.
-
-    `left_m`, `right_m` are the two medians whose sum is the width; `toe_m` (K, 3) runs from left to right; `center_m` (3,) is
-    the middle of the toe, or where the obstacle or opening is. `volumes_m3` maps a height over the floor at the toe to the
-    volume between floor and face as far as the fitted face rises to that height.
-    """
-
-    variant: str
-    status: str
-    width_m: float
-    inclination_deg: float
-    left_m: float
-    right_m: float
-    center_m: FloatArray
-    toe_m: FloatArray
-    plane: FacePlane | None
-    end_heading_rad: float
-    floor_m: float
-    boulders: tuple[BoulderTruth, ...]
-    volumes_m3: dict[float, float]
-
-    def distances_m(self, positions_m: FloatArray) -> FloatArray:
-        """Return the level distance from each position of base_link, (N, 3), to the nearest point of the toe, (N,)."""
-        toe = self.toe_m if len(self.toe_m) else self.center_m[None]
-        difference = positions_m[:, None, :2] - toe[None, :, :2]
-        nearest: FloatArray = np.sqrt((difference**2).sum(axis=2)).min(axis=1)
-        return nearest
 
 
 class Bodies:
@@ -111,8 +54,8 @@ class Bodies:
         """Return the range to the face, as if nothing else were there; inf for none."""
         return np.full(starts_m.shape[:-1], np.inf) if self._face is None else _cast(self._face, starts_m, direction)
 
-    def floor(self, along_m: float, lateral_m: float = 0.0) -> float:
-        """Return the floor's height in the frame of the foot."""
+    def floor(self, along_m: FloatArray, lateral_m: FloatArray) -> FloatArray:
+        """Return the floor's height, shape (N,), in the frame of the foot."""
         return floor_height(self.drift, self.pile.place_m, along_m, lateral_m)
 
 
@@ -130,15 +73,15 @@ def pile_truth(world: DriftWorld) -> PileTruth:
     settings, frame = pile.settings, pile.frame
     bodies = Bodies(world, pile)
     toe = _toe(bodies)
-    center = toe[len(toe) // 2] if len(toe) else np.array([0.0, settings.obstacle_lateral_m, bodies.floor(0.0)])
-    floor = bodies.floor(float(center[0]))
+    center = toe[len(toe) // 2] if len(toe) else np.array([0.0, settings.obstacle_lateral_m, 0.0])
+    floor = float(bodies.floor(center[:1], np.zeros(1))[0])
     plane, left, right, volumes = None, math.nan, math.nan, {}
     if len(toe):
         plane = fit_face(*_face_hits(bodies, floor))
     if plane is not None:
         left, right = _aperture(bodies, floor) if settings.mouth_m > 0.0 else _width(bodies, plane, floor)
         sides = (left, right) if settings.mouth_m > 0.0 else (math.inf, math.inf)
-        volumes = _volumes(bodies, plane, floor, sides)
+        volumes = _volumes(bodies, plane, floor, sides) if settings.status in _LYING else {}
     return PileTruth(
         settings.variant,
         settings.status,
@@ -165,7 +108,7 @@ def _toe(bodies: Bodies) -> FloatArray:
     reach = float(face.points_m[..., 0].min()) - 1.0
     x = np.zeros(len(lateral))
     for _ in range(3):  # the height of the floor depends on where the toe is
-        height = np.array([bodies.floor(a, b) for a, b in zip(x, lateral, strict=True)]) + _TOE_OVER_FLOOR_M
+        height = bodies.floor(x, lateral) + _TOE_OVER_FLOOR_M
         starts = np.stack([np.full(len(lateral), reach), lateral, height], axis=1)
         x = np.clip(reach + bodies.to_face(starts, _FORWARD), -20.0, 60.0)
     points = np.stack([x, lateral, height - _TOE_OVER_FLOOR_M], axis=1)
@@ -218,25 +161,6 @@ def off_walls(hit: npt.NDArray[np.bool_]) -> npt.NDArray[np.bool_]:
     return kept
 
 
-def fit_face(x_m: FloatArray, at_m: FloatArray) -> FacePlane | None:
-    """Return the robust regression of x (N,) on (y, z) (N, 2), by Tukey's weights; None where there is too little."""
-    if len(x_m) < _FEWEST or np.ptp(at_m[:, 1]) < 0.2:
-        return None
-    matrix = np.column_stack([np.ones(len(x_m)), at_m])
-    weights = np.ones(len(x_m))
-    solution = np.zeros(3)
-    for step in range(40):
-        root = np.sqrt(weights)
-        solution = np.linalg.lstsq(matrix * root[:, None], x_m * root, rcond=None)[0]
-        residual = np.abs(x_m - matrix @ solution)
-        scale = max(1.4826 * float(np.median(residual)), 1e-4)
-        if step < 10:  # Huber's weights lead to where Tukey's may begin
-            weights = np.minimum(1.0, 1.345 * scale / np.maximum(residual, 1e-12))
-        else:
-            weights = np.maximum(1.0 - (residual / (_TUKEY * scale)) ** 2, 0.0) ** 2
-    return FacePlane(*solution.tolist())
-
-
 def _width(bodies: Bodies, plane: FacePlane, floor_m: float) -> tuple[float, float]:
     """Return the medians to the left and to the right (m) of lateral rays in the plane of the face, before it."""
     heights = floor_m + np.linspace(*WIDTH_HEIGHTS_M, 13)
@@ -274,7 +198,7 @@ def _volumes(bodies: Bodies, plane: FacePlane, floor_m: float, sides_m: tuple[fl
     x, y = (np.arange(a, b, VOLUME_CELL_M) for a, b in ((_front_m(bodies, floor_m) - 0.5, depth), (-half, half)))
     along, lateral = np.meshgrid(x, y, indexing="ij")
     top = np.stack([along, lateral, np.full(along.shape, _ABOVE_ALL_M)], axis=2)
-    floor = np.array([bodies.floor(value) for value in x])[:, None]
+    floor = bodies.floor(x, 0.0 * x)[:, None]
     over = _ABOVE_ALL_M - bodies.to_face(top, _DOWN) - floor
     side = np.stack([x, 0.0 * x, floor[:, 0] + 0.8], axis=1)
     left = np.minimum(bodies.to_walls(side, _LEFT), sides_m[0])[:, None]

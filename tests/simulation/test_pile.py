@@ -13,10 +13,11 @@ from hypothesis import strategies as st
 from lhdmap.errors import ConfigError, UsageError
 from lhdmap.simulation.drift import Mesh
 from lhdmap.simulation.drive import exact_ranges, scanner_stream
+from lhdmap.simulation.pile_facts import PileTruth, fit_face
 from lhdmap.simulation.pile_rocks import cylinder, extent, rock
 from lhdmap.simulation.pile_scenes import scene
 from lhdmap.simulation.pile_sections import VARIANTS, MountingSettings, PileSettings
-from lhdmap.simulation.pile_truth import PileTruth, fit_face, off_walls, pile_truth
+from lhdmap.simulation.pile_truth import off_walls, pile_truth
 from lhdmap.simulation.raycast import Surface
 from lhdmap.simulation.scenario import DriftScenario, scenario_from, scenario_toml
 from lhdmap.simulation.sections import DriftSettings, DriveSettings
@@ -189,6 +190,9 @@ def test_the_truth_of_a_loadable_pile_is_one(truth: PileTruth) -> None:
         assert 2.9 < truth.width_m < 5.2
         assert truth.volumes_m3[1.0] < truth.volumes_m3[2.0]
         assert (len(truth.boulders) == 1) == (truth.variant == "boulder")
+    if truth.status in ("wall", "hang_up"):
+        assert truth.volumes_m3 == {}
+        assert truth.inclination_deg < -58.0
     if truth.status == "none":
         assert math.isnan(truth.width_m)
         assert math.isnan(truth.inclination_deg)
