@@ -58,11 +58,15 @@ def trace(points: FloatArray, reach_m: float) -> Corridor:
 
 @nb.njit(cache=True)
 def _side(values, predicted):  # type: ignore[no-untyped-def]
-    """Return the median of the values within 0.8 m of the prediction, NaN where there are few."""
+    """Return where the wall is among distances to its side, NaN where there are few near the prediction.
+
+    Floor and rubble lie before the wall: it is the outermost that many hits agree on.
+    """
     near = values[np.abs(values - predicted) < 0.8]
     if near.size < _FEWEST:
         return math.nan
-    return float(np.median(near))
+    outer = np.percentile(near, 85.0)
+    return float(np.median(near[np.abs(near - outer) < 0.3]))
 
 
 @nb.njit(cache=True)
@@ -73,11 +77,11 @@ def _follow(y, starts, out):  # type: ignore[no-untyped-def]
     for k in range(out.shape[0]):
         values = y[starts[k] : starts[k + 1]]
         centre += slope
-        left, right = _side(values, centre + half), _side(values, centre - half)
+        left, right = _side(values, centre + half), -_side(-values, half - centre)
         if known < 4:  # the machine may stand anywhere between the walls
             above, below = values[values > 0.6], values[values < -0.6]
             if above.size >= _FEWEST and below.size >= _FEWEST:
-                left, right = float(np.median(above)), float(np.median(below))
+                left, right = _side(above, np.median(above)), -_side(-below, np.median(-below))
         both = not (math.isnan(left) or math.isnan(right))
         if both:
             found = 0.5 * (left + right)

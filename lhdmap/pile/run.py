@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from pathlib import Path
 
@@ -24,7 +25,7 @@ from lhdmap.pipeline.pile import scan_hits
 from lhdmap.pipeline.track import FinalTrack
 
 _ROLES = ("tf_static", "front", "rear", "inclinometer", "joints", "tachometer", "wheel_odometry")
-_GIVEN_POSES = Registration(scale=2e-4, pitch_rad=2e-4)
+_GIVEN_POSES = Registration(scale=2e-4, pitch_rad=math.radians(0.15))  # the mounting's tilt is still the log's
 
 
 def identify(

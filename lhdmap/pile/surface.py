@@ -22,6 +22,8 @@ Mask = npt.NDArray[np.bool_]
 LOW_M, HIGH_M = 0.2, 1.6  # heights over the floor at the toe that the inclination is defined over
 _WALL_GAP_M = 0.3
 _CLEAR_M = 0.08
+_WALL_CELL_M = 0.1
+_MOUTH_M = 1.2
 _WALL_SLACK_M = 0.45  # a wall at the face stands no farther from the line of the wall before
 _FEWEST_HITS = 40
 _FEWEST_BLOCKS = 6
@@ -146,7 +148,9 @@ def _limits(points: FloatArray, face: Face, floor_m: float, half_m: float) -> Li
     """Return the walls in the last metre before the face; where the drift opens there, its mouth."""
     before = points[:, 0] - face.x_at(points[:, 1], points[:, 2])
     height = points[:, 2] - floor_m
-    at_face = (before > -0.9) & (before < -0.15) & (height > 0.3) & (height < 1.5)
+    # rubble of a shallow face reaches far along the drift: off it by a distance along the normal
+    off = max(0.15, 0.2 * math.sqrt(1.0 + face.c**2))
+    at_face = (before > -0.75 - off) & (before < -off) & (height > 0.3) & (height < 1.5)
     sides = [_wall(points, at_face, side, half_m) for side in (1.0, -1.0)]
     opens = any(side is None for side in sides)
     if opens:
@@ -166,20 +170,34 @@ def _gap(points: FloatArray, before: FloatArray, side: float, half_m: float) -> 
 
 def _wall(points: FloatArray, at_face: Mask, side: float, half_m: float) -> tuple[float, float] | None:
     """Return the distance of a wall from the middle and its standard deviation; None where none is near."""
-    y = side * points[at_face, 1]
+    y = _cell_medians(points[at_face], side)
     y = y[(y > half_m - _WALL_SLACK_M) & (y < half_m + _WALL_SLACK_M)]
     if y.size < 8:
         return None
     return float(np.median(y)), _deviation(y)
 
 
+def _cell_medians(points: FloatArray, side: float) -> FloatArray:
+    """Return how far to a side the wall is in each (x, z) cell: near patches have many hits and must not outvote."""
+    y = side * points[:, 1]
+    points, y = points[y > 0.5], y[y > 0.5]
+    cells = np.floor(points[:, [0, 2]] / _WALL_CELL_M).astype(np.int64) @ np.array([100_003, 1])
+    order = np.lexsort((y, cells))
+    _, first, count = np.unique(cells[order], return_index=True, return_counts=True)
+    return y[order][first + count // 2]
+
+
 def _mouth(points: FloatArray, drift: Mask, side: float, half_m: float) -> tuple[float, float] | None:
-    """Return how far to a side one can look past the drift's last metres."""
-    y = side * points[drift, 1]
-    y = y[(y > half_m - 0.9) & (y < half_m + 0.6)]
-    if y.size < 8:
+    """Return how far to a side one can look past the drift's last metre of wall: what stands out most at each height."""
+    y = side * points[:, 1]
+    wall = drift & (np.abs(y - half_m) < _WALL_SLACK_M)
+    if wall.sum() < 16:
         return None
-    return float(np.percentile(y, 10.0)), _deviation(y) + 0.05
+    last = np.sort(points[wall, 0])[-8]
+    wall &= points[:, 0] > last - _MOUTH_M
+    rows = np.floor(points[wall, 2] / _WALL_CELL_M).astype(np.int64)
+    inner = [float(np.percentile(y[wall][rows == row], 5.0)) for row in np.unique(rows)]
+    return float(np.median(inner)), _deviation(np.array(inner)) + 0.05
 
 
 def _deviation(y: FloatArray) -> float:
