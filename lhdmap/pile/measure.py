@@ -10,8 +10,9 @@ from lhdmap.messages import FloatArray
 from lhdmap.pile.judge import Evidence, probabilities
 from lhdmap.pile.relief import Relief, boulders, relief
 from lhdmap.pile.result import AttackPoint, PileEstimate
-from lhdmap.pile.surface import Scene
+from lhdmap.pile.surface import HIGH_M, LOW_M, Scene
 
+_UNSEEN_DEG = 5.0  # the slope of the heights that were not seen
 _DEFINITION_DEG = 0.4  # rubble within the height that the inclination is defined over
 _WIDTH_DEFINITION_M = 0.04
 _BEYOND_M = 1.5
@@ -22,11 +23,12 @@ def measure(scene: Scene) -> PileEstimate:
     """Return the estimate of a scene, in the map."""
     face, limits = scene.face, scene.limits
     seen = relief(scene)
-    std_deg = math.hypot(face.inclination_std_deg, _DEFINITION_DEG)
+    on = scene.points[scene.on_face]
+    unseen = max(1.0 - float(np.ptp(on[:, 2])) / (HIGH_M - LOW_M), 0.0)
+    std_deg = math.hypot(face.inclination_std_deg, _DEFINITION_DEG + _UNSEEN_DEG * unseen)
     covered, beyond = _closure(scene)
     spread = face.spread_m / math.sqrt(1.0 + face.c**2)
     share = probabilities(Evidence(face.inclination_deg, std_deg, spread, covered, beyond, limits.gap_m))
-    on = scene.points[scene.on_face]
     off = (face.x_at(on[:, 1], on[:, 2]) - on[:, 0]) / math.sqrt(1.0 + face.b**2 + face.c**2)
     toe = _toe(scene, np.linspace(limits.left_m, limits.right_m, 15))
     volume, volume_std = _volume(scene, seen)

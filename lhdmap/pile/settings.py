@@ -45,9 +45,9 @@ class PileSettings:
         source="evaluation/odometry.md",
     )
     pitch_std_deg: float = setting(
-        0.05,
+        0.15,
         unit="deg",
-        minimum=0.0,
-        doc="Constant error of pitch and mounting tilt, standard deviation.",
+        minimum=0.001,
+        doc="Constant error of pitch and mounting tilt, standard deviation, before the floor has told.",
         source="inclinometer filtered; findings, section 1",
     )

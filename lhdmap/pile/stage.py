@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections import deque
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -15,6 +16,7 @@ from lhdmap.pile.measure import measure
 from lhdmap.pile.result import PileEstimate, PileReport, Snapshot
 from lhdmap.pile.settings import PileSettings
 from lhdmap.pile.surface import View, look
+from lhdmap.pile.tilt import TiltCheck
 from lhdmap.pile.window import HitWindow
 
 _MOST_HISTORY = 400
@@ -44,6 +46,7 @@ class PileStage:
         self._travelled_m = 0.0
         self._position: FloatArray | None = None
         self._estimated_m = -math.inf
+        self._tilt = TiltCheck(self._registration.pitch_rad)
         self._path: deque[tuple[float, float]] = deque()
         self._history: list[Snapshot] = []
         self._decision: Snapshot | None = None
@@ -72,10 +75,15 @@ class PileStage:
         base = Frame2(scan.T_map_base[:3], float(scan.T_map_base[3]))
         hits = self._window.hits(self._travelled_m)
         rng = np.random.default_rng(len(hits))
-        scene = look(hits, View(base, self._grade(), self._registration), self._settings.reach_m, rng)
+        self._tilt.update(base.local(hits), self._travelled_m)
+        tilt = self._tilt.tilt()
+        registration = self._registration._replace(pitch_rad=tilt.std_rad)
+        view = View(base, self._grade(), registration, self._travelled_m, tilt)
+        scene = look(hits, view, self._settings.reach_m, rng)
         if scene is None:
             return self._take(Snapshot(scan.stamp_ns, math.nan, PileEstimate()))
-        estimate = measure(scene)
+        warning = tilt.warning()
+        estimate = replace(measure(scene), warnings=() if warning is None else (warning,))
         distance = float(np.linalg.norm(estimate.toe_m - scan.T_map_base[:3], axis=1).min())
         return self._take(Snapshot(scan.stamp_ns, distance, estimate))
 

@@ -17,6 +17,7 @@ from lhdmap.messages import FloatArray
 from lhdmap.pile.corridor import trace
 from lhdmap.pile.end_frame import Frame2, end_of, floor_before
 from lhdmap.pile.face import Face, Registration, find, fit
+from lhdmap.pile.tilt import Tilt
 
 Mask = npt.NDArray[np.bool_]
 LOW_M, HIGH_M = 0.2, 1.6  # heights over the floor at the toe that the inclination is defined over
@@ -67,11 +68,20 @@ class View(NamedTuple):
     base: Frame2
     grade: float
     registration: Registration
+    travelled_m: float = 0.0
+    tilt: Tilt = Tilt(0.0, 0.0)
+
+    def straightened(self, hits: FloatArray) -> FloatArray:
+        """Return hits (N, 4) of the map with their heights put right by the tilt."""
+        ahead = self.base.local(hits)[:, 0] + self.travelled_m - hits[:, 3]
+        out = hits.copy()
+        out[:, 2] -= self.tilt.angle_rad * ahead
+        return out
 
 
 def look(hits: FloatArray, view: View, reach_m: float, rng: np.random.Generator) -> Scene | None:
     """Return what closes the drift ahead, or None; hits rows x, y, z (map, m), travelled (m)."""
-    base = view.base
+    base, hits = view.base, view.straightened(hits)
     local = base.local(hits)
     local = local[(local[:, 0] > 1.0) & (np.abs(local[:, 1]) < 12.0)]
     corridor = trace(local, reach_m)
@@ -154,7 +164,7 @@ def _limits(points: FloatArray, face: Face, floor_m: float, half_m: float) -> Li
     sides = [_wall(points, at_face, side, half_m) for side in (1.0, -1.0)]
     opens = any(side is None for side in sides)
     if opens:
-        drift = (before > -8.0) & (before < -0.15) & (height > 0.0) & (height < 2.2)
+        drift = (before > -8.0) & (before < -0.15 - off) & (height > 0.3) & (height < 1.5)
         sides = [_mouth(points, drift, side, half_m) for side in (1.0, -1.0)]
     (left, left_std), (right, right_std) = (one if one is not None else (half_m, 0.5) for one in sides)
     gap = max(_gap(points, before, side, half_m) for side in (1.0, -1.0))
@@ -172,7 +182,7 @@ def _wall(points: FloatArray, at_face: Mask, side: float, half_m: float) -> tupl
     """Return the distance of a wall from the middle and its standard deviation; None where none is near."""
     y = _cell_medians(points[at_face], side)
     y = y[(y > half_m - _WALL_SLACK_M) & (y < half_m + _WALL_SLACK_M)]
-    if y.size < 8:
+    if y.size < 5:
         return None
     return float(np.median(y)), _deviation(y)
 
