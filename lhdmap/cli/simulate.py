@@ -85,6 +85,8 @@ def run(arguments: argparse.Namespace, console: Console) -> int:
     """Simulate and write; return the exit code."""
     from lhdmap.simulation.drive import simulate_drift
 
+    if arguments.scenario != "pile" and (arguments.variant or arguments.flat_floor):
+        raise UsageError("--variant and --flat-floor belong to 'lhdmap simulate pile'; another scenario was found")
     if arguments.suite is not None:
         return _run_suite(arguments, console)
     scenario = scenario_of(arguments)

@@ -92,6 +92,7 @@ def test_options_go_over_the_scenario_file(tmp_path: Path) -> None:
         ["shaft"],
         ["pile", "--variant", "heap"],
         ["drift", "--suite", "suite.toml"],
+        ["drift", "--variant", "stope"],
         ["drift", "--roughness", "hairy"],
         ["drift", "--stop", "1"],
         ["drift", "--beams", "2"],
