@@ -17,7 +17,7 @@ from lhdmap.messages import FloatArray
 
 CELL_M = 0.1
 BLOCK_M = 0.3  # rocks are as large: residuals of cells nearer than this are alike
-_TRIES = 150
+_TRIES = 250
 _NEAR_M = 0.2
 _STEEPEST, _FLATTEST = -1.2, 6.0  # dx/dz: an overhang of 50 deg, a slope of 10 deg
 _MOST_ASKEW = 0.9
@@ -57,8 +57,11 @@ class Face(NamedTuple):
         return math.degrees(math.sqrt(max(self.covariance[2, 2], 0.0)) / (1.0 + self.c * self.c))
 
 
-def find(points: FloatArray, rng: np.random.Generator) -> FloatArray | None:
-    """Return a, b, c of the face that most (y, z) cells of points (N, 3+) lie on, or None where there is none."""
+def find(points: FloatArray, rng: np.random.Generator, known: FloatArray | None = None) -> FloatArray | None:
+    """Return a, b, c of the face that most (y, z) cells of points (N, 3+) lie on, or None where there is none.
+
+    `known` (3,): the face of the estimate before, tried as well.
+    """
     cells, first = np.unique(_cells(points, CELL_M), return_index=True)
     thin = points[first]
     if len(cells) < 12:
@@ -70,6 +73,8 @@ def find(points: FloatArray, rng: np.random.Generator) -> FloatArray | None:
     models = np.linalg.solve(A[solvable], corners[solvable, :, :1])[:, :, 0]
     likely = (models[:, 2] > _STEEPEST) & (models[:, 2] < _FLATTEST) & (np.abs(models[:, 1]) < _MOST_ASKEW)
     models = models[likely]
+    if known is not None:
+        models = np.concatenate([models, known[None]])
     if not len(models):
         return None
     off = thin[:, 0] - (models[:, :1] + models[:, 1:2] * thin[:, 1] + models[:, 2:3] * thin[:, 2])

@@ -15,7 +15,8 @@ from lhdmap.pile.result import STATUSES
 # bounds of |inclination| in degrees: findings, section 1
 SHALLOW_DEG, STEEP_DEG, UPRIGHT_DEG, OVERHANG_DEG = 28.0, 60.0, 81.0, 98.0
 _MODEL_STD_DEG = 1.5  # rubble over the height that is seen
-_ROUGH_M = 0.12
+_SMOOTH_M = 0.075  # spread of bare rock, unless the drift's own walls are rougher: then theirs, and so much more
+_ROUGHER = 1.2
 FLOOR_DEG = 8.0  # flatter is floor that rises
 
 
@@ -23,7 +24,8 @@ class Evidence(NamedTuple):
     """What the status follows from.
 
     Inclination and deviation (deg, sign of Table 6), spread of the residuals along the normal (m), share of the width that the
-    face covers, share of it on which hits lie beyond the face, length before the face on which a wall is missing (m).
+    face covers, share of it on which hits lie beyond the face, length before the face on which a wall is missing (m), spread of
+    the side walls (m).
     """
 
     inclination_deg: float
@@ -32,6 +34,7 @@ class Evidence(NamedTuple):
     covered: float
     beyond: float
     gap_m: float
+    walls_m: float
 
 
 def probabilities(evidence: Evidence) -> dict[str, float]:
@@ -42,7 +45,8 @@ def probabilities(evidence: Evidence) -> dict[str, float]:
     def below(bound_deg: float) -> float:
         return 0.5 * math.erfc((angle - bound_deg) / (std * math.sqrt(2.0)))
 
-    rough = _ramp(evidence.spread_m, 0.8 * _ROUGH_M, 1.6 * _ROUGH_M)
+    usual = max(_SMOOTH_M, _ROUGHER * evidence.walls_m)
+    rough = _ramp(evidence.spread_m, usual, 1.25 * usual)
     upright = below(OVERHANG_DEG) - below(UPRIGHT_DEG)
     share = {
         "too_shallow": below(SHALLOW_DEG),

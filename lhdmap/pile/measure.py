@@ -28,7 +28,17 @@ def measure(scene: Scene) -> PileEstimate:
     std_deg = math.hypot(face.inclination_std_deg, _DEFINITION_DEG + _UNSEEN_DEG * unseen)
     covered, beyond = _closure(scene)
     spread = face.spread_m / math.sqrt(1.0 + face.c**2)
-    share = probabilities(Evidence(face.inclination_deg, std_deg, spread, covered, beyond, limits.gap_m))
+    share = probabilities(
+        Evidence(
+            face.inclination_deg,
+            std_deg,
+            spread,
+            covered,
+            beyond,
+            limits.gap_m,
+            min(limits.left_std_m, limits.right_std_m) * 2.0,
+        )
+    )
     off = (face.x_at(on[:, 1], on[:, 2]) - on[:, 0]) / math.sqrt(1.0 + face.b**2 + face.c**2)
     toe = _toe(scene, np.linspace(limits.left_m, limits.right_m, 15))
     volume, volume_std = _volume(scene, seen)

@@ -15,7 +15,7 @@ from lhdmap.pile.face import Registration
 from lhdmap.pile.measure import measure
 from lhdmap.pile.result import PileEstimate, PileReport, Snapshot
 from lhdmap.pile.settings import PileSettings
-from lhdmap.pile.surface import View, look
+from lhdmap.pile.surface import Scene, View, look
 from lhdmap.pile.tilt import TiltCheck
 from lhdmap.pile.window import HitWindow
 
@@ -23,6 +23,7 @@ _MOST_HISTORY = 400
 _SURE_STD_DEG = 2.5
 _ELSEWHERE_M = 5.0
 _GRADE_M = 10.0
+_BLURRED_DEG = 15.0  # an inclination that is less sure is none
 
 
 class ScanHits(NamedTuple):
@@ -46,6 +47,7 @@ class PileStage:
         self._travelled_m = 0.0
         self._position: FloatArray | None = None
         self._estimated_m = -math.inf
+        self._scene: Scene | None = None
         self._tilt = TiltCheck(self._registration.pitch_rad)
         self._path: deque[tuple[float, float]] = deque()
         self._history: list[Snapshot] = []
@@ -78,10 +80,11 @@ class PileStage:
         self._tilt.update(base.local(hits), self._travelled_m)
         tilt = self._tilt.tilt()
         registration = self._registration._replace(pitch_rad=tilt.std_rad)
-        view = View(base, self._grade(), registration, self._travelled_m, tilt)
+        view = View(base, self._grade(), registration, self._scene, self._travelled_m, tilt)
         scene = look(hits, view, self._settings.reach_m, rng)
-        if scene is None:
+        if scene is None or scene.face.inclination_std_deg > _BLURRED_DEG:
             return self._take(Snapshot(scan.stamp_ns, math.nan, PileEstimate()))
+        self._scene = scene
         warning = tilt.warning()
         estimate = replace(measure(scene), warnings=() if warning is None else (warning,))
         distance = float(np.linalg.norm(estimate.toe_m - scan.T_map_base[:3], axis=1).min())

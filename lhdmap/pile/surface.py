@@ -55,6 +55,16 @@ class Scene(NamedTuple):
     floor_seen: bool
     limits: Limits
 
+    def face_in(self, base: Frame2) -> FloatArray:
+        """Return a, b, c of the face in another frame."""
+        y = np.array([-1.0, 1.0, 0.0])
+        z = self.floor_m + np.array([0.5, 0.5, 1.5])
+        corners = self.frame.map(np.column_stack([self.face.x_at(y, z), y, z]))
+        local = base.local(np.column_stack([corners, np.zeros(3)]))
+        A = np.column_stack([np.ones(3), local[:, 1], local[:, 2]])
+        found: FloatArray = np.linalg.solve(A, local[:, 0]).astype(np.float64)
+        return found
+
     @property
     def toe_x_m(self) -> float:
         """X of the toe in the middle."""
@@ -68,6 +78,7 @@ class View(NamedTuple):
     base: Frame2
     grade: float
     registration: Registration
+    known: Scene | None = None
     travelled_m: float = 0.0
     tilt: Tilt = Tilt(0.0, 0.0)
 
@@ -86,7 +97,8 @@ def look(hits: FloatArray, view: View, reach_m: float, rng: np.random.Generator)
     local = local[(local[:, 0] > 1.0) & (np.abs(local[:, 1]) < 12.0)]
     corridor = trace(local, reach_m)
     inside = np.abs(local[:, 1] - corridor.centre_at(local[:, 0])) < corridor.half_at(local[:, 0]) - _WALL_GAP_M
-    seed = find(local[inside], rng) if inside.sum() >= _FEWEST_HITS else None
+    known = view.known.face_in(base) if view.known is not None else None
+    seed = find(local[inside], rng, known) if inside.sum() >= _FEWEST_HITS else None
     if seed is None:
         return None
     face_x = _crossing(seed, corridor.centre_at)
