@@ -16,14 +16,16 @@ import numpy.typing as npt
 from lhdmap.integration.normals import estimate_normals
 from lhdmap.messages import FloatArray
 from lhdmap.pile.figure9_fit import plane_inclination_deg, robust_plane, voxelised
+from lhdmap.pile.figure9_settings import Figure9Constants
 from lhdmap.pile.height_map import Mask
-from lhdmap.pile.judge import Evidence, probabilities
 from lhdmap.pile.result import PileEstimate
+from lhdmap.pile.slope_status import status_probabilities
 
 VOXEL_M = (0.2, 0.2, 0.1)
 NORMAL_RADIUS_M = 0.75
 _DRIFT_EXTENT_M = 8.0
 _WALL_SHARE = 0.25
+_LEAST_DENSE = 0.7
 _STEEP_NZ, _SLOPE_NZ = 0.4, (0.2, 0.97)
 _COLUMN_M, _LOWEST_M = 0.4, 1.0
 _STEP_M = 0.45
@@ -39,23 +41,29 @@ _MODEL_STD_DEG = 2.0
 
 
 class Shell(NamedTuple):
-    """The cloud on the voxel grid: `points` (N, 3), `normals` (N, 3) with z upwards, `lowest` (N,): part of the lowest surface."""
+    """The cloud on the voxel grid: `points` (N, 3), `normals` (N, 3) with z upwards, `lowest` (N,): part of the lowest surface.
+
+    `dense`: share of the voxels whose surroundings show a surface; only those are kept.
+    """
 
     points: FloatArray
     normals: FloatArray
     lowest: Mask
+    dense: float
 
 
 class Slope(NamedTuple):
     """A slope in its own frame: `R` (3, 3) from the cloud's axes to x uphill, y to the left, z up; its points (K, 3) therein.
 
-    `inclination_deg`: Table 6's sign; `floor_m`: z of the floor before it; `left_m`, `right_m`: y of the walls before it.
+    `inclination_deg`: Table 6's sign; `floor_m`: z of the floor before it (of the lowest hits where it was not seen); `left_m`,
+    `right_m`: y of the walls before it.
     """
 
     R: FloatArray
     points: FloatArray
     inclination_deg: float
     floor_m: float
+    floor_seen: bool
     left_m: float
     right_m: float
 
@@ -75,7 +83,7 @@ def drift_shell(points_m: FloatArray) -> Shell | None:
     if float(np.ptp(points_m[:, :2], axis=0).max()) < _DRIFT_EXTENT_M:
         return None
     shell = _shell(points_m)
-    return shell if _wall_share(shell) > _WALL_SHARE else None
+    return shell if shell.dense > _LEAST_DENSE and _wall_share(shell) > _WALL_SHARE else None
 
 
 def measure_drift(shell: Shell) -> tuple[PileEstimate, dict[str, Any]]:
@@ -99,12 +107,13 @@ def _shell(points_m: FloatArray) -> Shell:
     points = voxelised(points_m, VOXEL_M)
     normals = estimate_normals(points, NORMAL_RADIUS_M).normals.astype(np.float64)  # type: ignore[arg-type]
     known = normals.any(axis=1)
+    dense = float(known.mean()) if len(known) else 0.0
     points, normals = points[known], normals[known]
     columns = np.floor(points[:, :2] / _COLUMN_M).astype(np.int64)
     _, place = np.unique(columns, axis=0, return_inverse=True)
     low = np.full(int(place.max(initial=-1)) + 1, np.inf)
     np.minimum.at(low, place, points[:, 2])
-    return Shell(points, normals, points[:, 2] < low[place] + _LOWEST_M)
+    return Shell(points, normals, points[:, 2] < low[place] + _LOWEST_M, dense)
 
 
 def _wall_share(shell: Shell) -> float:
@@ -182,15 +191,11 @@ def _bounded(shell: Shell, points: FloatArray, normal: FloatArray) -> Slope | No
         return None
     middle = np.median(face, axis=0)
     near = np.linalg.norm(shell.points[:, :2] - (R.T @ middle)[:2], axis=1) < _AROUND_M
-    around = Shell(shell.points[near] @ R.T, shell.normals[near] @ R.T, shell.lowest[near])
-    slope = Slope(R, face, inclination, math.nan, math.nan, math.nan)
+    around = Shell(shell.points[near] @ R.T, shell.normals[near] @ R.T, shell.lowest[near], shell.dense)
+    slope = Slope(R, face, inclination, math.nan, False, math.nan, math.nan)
     before = around.points[:, 0] - slope.x_at(around.points[:, 2])
-    beside = np.abs(around.points[:, 1] - middle[1])
-    flat = np.abs(around.normals[:, 2]) > 0.94
-    floor = around.lowest & flat & (before < -0.3) & (before > -_BEFORE_M) & (beside < 1.5)
-    if np.count_nonzero(floor) < 20:
-        return None
-    slope = slope._replace(floor_m=float(np.median(around.points[floor, 2])))
+    floor_m, seen = _floor(around, before, middle)
+    slope = slope._replace(floor_m=floor_m, floor_seen=seen)
     left, right = (_wall(around, before, slope.floor_m, side * middle[1], side) for side in (1.0, -1.0))
     if left is None or right is None or left + right > _WIDEST_M:
         return None
@@ -198,12 +203,21 @@ def _bounded(shell: Shell, points: FloatArray, normal: FloatArray) -> Slope | No
     return slope if _closes(slope, around, before) else None
 
 
+def _floor(around: Shell, before: FloatArray, middle: FloatArray) -> tuple[float, bool]:
+    """Return z of the floor before the face, and whether it was seen; a level or tilted 2D scanner may only see above it."""
+    near = (before > -_BEFORE_M) & (np.abs(around.points[:, 1] - middle[1]) < 1.5)
+    level = around.lowest & (np.abs(around.normals[:, 2]) > 0.94) & near & (before < -0.3)
+    if np.count_nonzero(level) >= 20:
+        return float(np.median(around.points[level, 2])), True
+    return float(np.percentile(around.points[near & (before < 0.5), 2], 1.0)), False
+
+
 def _wall(around: Shell, before: FloatArray, floor_m: float, middle: float, side: float) -> float | None:
     """Return the distance of the nearest wall on a side; None where it does not accompany the last metres before the face."""
     height = around.points[:, 2] - floor_m
     away = side * around.points[:, 1] - middle
     wall = (np.abs(around.normals[:, 1]) > 0.6) & (height > 0.3) & (height < 1.6) & (away > 0.5)
-    at_face = away[wall & (before > -1.0) & (before < -0.1)]
+    at_face = away[wall & (before > -2.0) & (before < -0.1)]
     if len(at_face) < 8:
         return None
     nearest = float(np.percentile(at_face, 10.0))
@@ -232,8 +246,7 @@ def _closes(slope: Slope, around: Shell, before: FloatArray) -> bool:
 def _estimate(slope: Slope) -> PileEstimate:
     points, width = slope.points, slope.left_m - slope.right_m
     residuals = (slope.x_at(points[:, 2]) - points[:, 0]) * -math.sin(math.radians(slope.inclination_deg))
-    spread = 1.4826 * float(np.median(np.abs(residuals - np.median(residuals))))
-    share = probabilities(Evidence(slope.inclination_deg, _MODEL_STD_DEG, spread, 1.0, 0.0, 0.0))
+    share = status_probabilities(slope.inclination_deg, _MODEL_STD_DEG, Figure9Constants())
     y = np.linspace(slope.left_m, slope.right_m, 15)
     toe = np.column_stack([np.full(15, slope.x_at(slope.floor_m)), y, np.full(15, slope.floor_m)]) @ slope.R
     top = float(np.percentile(points[:, 2], 97.0)) - slope.floor_m
@@ -253,4 +266,5 @@ def _estimate(slope: Slope) -> PileEstimate:
         toe_m=toe,
         face_m=points @ slope.R,
         residuals_m=residuals,
+        warnings=() if slope.floor_seen else ("the floor before the pile was not seen: its toe is at the lowest hits",),
     )

@@ -18,6 +18,7 @@ from lhdmap.messages import FloatArray
 from lhdmap.pile.figure9_fit import largest_cluster, plane_inclination_deg, voxelised
 from lhdmap.pile.figure9_settings import Figure9Constants
 from lhdmap.pile.result import PileEstimate
+from lhdmap.pile.slope_status import status_of
 
 Mask = npt.NDArray[np.bool_]
 _TOE_BIN_M = 0.3
@@ -92,16 +93,6 @@ def distance_to_center_m(estimate: PileEstimate, T_map_base: FloatArray) -> floa
     if not len(estimate.face_m):
         return math.inf
     return float(np.linalg.norm(estimate.face_m.mean(axis=0) - T_map_base[:3, 3]))
-
-
-def status_of(inclination_deg: float, constants: Figure9Constants) -> str:
-    """Return the status by thresholds on the slope, as in section 3.2; not safe: walls and hang-ups can read as piles."""
-    steepness = abs(inclination_deg)
-    if steepness < constants.shallow_deg:
-        return "too_shallow"
-    if steepness <= constants.steep_deg:
-        return "loadable"
-    return "wall" if constants.wall_deg <= steepness <= constants.overhang_deg else "hang_up"
 
 
 def mean_normal_inclination_deg(points_m: FloatArray, radius_m: float, viewpoint_m: FloatArray) -> float:

@@ -14,12 +14,13 @@ import numpy as np
 from lhdmap.errors import InputError
 from lhdmap.integration.cloud_io import read_cloud
 from lhdmap.messages import FloatArray
+from lhdmap.pile.figure9_settings import Figure9Constants
 from lhdmap.pile.heap_axes import isolated, rotation_to_up, vertical_axis
 from lhdmap.pile.heap_faces import HeapFace, find_faces
 from lhdmap.pile.heap_floor import Floor, find_floor
 from lhdmap.pile.height_map import HeightMap, Mask, height_map
-from lhdmap.pile.judge import Evidence, probabilities
 from lhdmap.pile.result import PileEstimate
+from lhdmap.pile.slope_status import status_probabilities
 
 FEWEST_POINTS = 200
 _LEAST_RISE = 0.02
@@ -83,20 +84,15 @@ def measure_cloud(points_m: FloatArray, up: str = "auto", empty_m: FloatArray | 
     axis = vertical_axis(points_m) if up == "auto" else up
     R_up_cloud = rotation_to_up(axis)
     points = np.asarray(points_m, dtype=np.float64) @ R_up_cloud.T
-    lonely = isolated(points)
-    points = points[~lonely]
     shell = drift_shell(points)
     if shell is not None:
         estimate, figures = measure_drift(shell)
     else:
+        lonely = isolated(points)
         floor = None if empty_m is None else _floor_of(np.asarray(empty_m, dtype=np.float64) @ R_up_cloud.T)
-        estimate, figures = measure_heap(points, floor)
-    extra = {
-        "up": axis,
-        "up_was_given": up != "auto",
-        "points": len(points),
-        "isolated_points": int(np.count_nonzero(lonely)),
-    }
+        estimate, figures = measure_heap(points[~lonely], floor)
+        figures |= {"isolated_points": int(np.count_nonzero(lonely))}
+    extra = {"up": axis, "up_was_given": up != "auto", "cloud_points": len(points)}
     return CloudPile(_turned(estimate, R_up_cloud.T), extra | figures)
 
 
@@ -188,7 +184,7 @@ def _without_face(heap: Heap, points_m: FloatArray, reason: str) -> PileEstimate
 def _estimate(heap: Heap, points_m: FloatArray) -> PileEstimate:
     volume, volume_std = volume_m3(heap, points_m)
     face = heap.faces[0]
-    share = probabilities(Evidence(-face.slope_deg, face.slope_std_deg, 0.0, 1.0, 0.0, 0.0))
+    share = status_probabilities(-face.slope_deg, face.slope_std_deg, Figure9Constants())
     toe, left, right = _toe(heap, face)
     points = _cell_points(heap, face.cells)
     return PileEstimate(

@@ -11,6 +11,7 @@ from lhdmap.pile.height_map import Mask
 AXES = ("x", "y", "z", "-x", "-y", "-z")
 _NEIGHBOUR = 6
 _ALONE = 12.0
+_ALONE_SHARE = 0.02
 
 
 def rotation_to_up(axis: str) -> FloatArray:
@@ -40,12 +41,17 @@ def vertical_axis(points_m: FloatArray) -> str:
 
 
 def isolated(points_m: FloatArray) -> Mask:
-    """Return which points (N, 3) are alone: their sixth neighbour is twelve times farther than usual, shape (N,)."""
+    """Return which points (N, 3) are alone, shape (N,): their sixth neighbour is twelve times farther than usual.
+
+    And at least 2 % of the cloud's extent away: where the density varies much, thin parts are not alone.
+    """
     from scipy.spatial import cKDTree
 
     tree = cKDTree(points_m)
     sample = points_m[:: max(len(points_m) // 5000, 1)]
     usual = float(np.median(tree.query(sample, k=_NEIGHBOUR + 1)[0][:, -1]))
-    far = tree.query(points_m, k=_NEIGHBOUR + 1, distance_upper_bound=max(_ALONE * usual, 1e-9))[0][:, -1]
+    extent = float(np.ptp(np.percentile(points_m, [1.0, 99.0], axis=0), axis=0).max())
+    limit = max(_ALONE * usual, _ALONE_SHARE * extent, 1e-9)
+    far = tree.query(points_m, k=_NEIGHBOUR + 1, distance_upper_bound=limit)[0][:, -1]
     alone: Mask = ~np.isfinite(far)
     return alone

@@ -18,11 +18,11 @@ from lhdmap.pile.figure9 import (
     loop_ends,
     mean_normal_inclination_deg,
     segment,
-    status_of,
 )
 from lhdmap.pile.figure9_fit import largest_cluster, plane_inclination_deg, voxelised
 from lhdmap.pile.figure9_settings import Figure9Constants, RepairedConstants
 from lhdmap.pile.result import PileEstimate
+from lhdmap.pile.slope_status import status_of, status_probabilities
 from lhdmap.settings import load_section
 
 from tests.pile.piled_drift import TOE_M, PiledDrift
@@ -213,6 +213,16 @@ def test_loop_ends_at_100_points_as_printed_and_at_15_m_when_it_waits() -> None:
 def test_status_by_thresholds() -> None:
     said = [status_of(-slope, PRINTED) for slope in (10.0, 27.9, 28.0, 60.0, 70.0, 81.0, 98.0, 99.0)]
     assert said == ["too_shallow", "too_shallow", "loadable", "loadable", "hang_up", "wall", "wall", "hang_up"]
+
+
+@given(st.floats(0.0, 130.0), st.floats(0.0, 20.0))
+def test_probabilities_of_statuses_add_up_and_favour_the_one_by_threshold(slope_deg: float, std_deg: float) -> None:
+    share = status_probabilities(-slope_deg, std_deg, PRINTED)
+    assert sum(share.values()) == pytest.approx(1.0)
+    assert min(share.values()) >= -1e-12
+    bounds = np.array([PRINTED.shallow_deg, PRINTED.steep_deg, PRINTED.wall_deg, PRINTED.overhang_deg])
+    if np.abs(bounds - slope_deg).min() > 3.0 and std_deg < 1.0:
+        assert max(share, key=lambda name: share[name]) == status_of(-slope_deg, PRINTED)
 
 
 @pytest.mark.parametrize("constants", [PRINTED, REPAIRED])
