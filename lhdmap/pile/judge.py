@@ -34,7 +34,7 @@ class Evidence(NamedTuple):
     covered: float
     beyond: float
     gap_m: float
-    walls_m: float
+    walls_m: float = 0.0
 
 
 def probabilities(evidence: Evidence) -> dict[str, float]:

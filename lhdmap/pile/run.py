@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -22,7 +22,7 @@ from lhdmap.pipeline.given import given_rows
 from lhdmap.pipeline.mapping import MappingPipeline, own_boxes
 from lhdmap.pipeline.mounts import Mounts, level_sensor
 from lhdmap.pipeline.pile import scan_hits
-from lhdmap.pipeline.track import FinalTrack
+from lhdmap.pipeline.track import FinalTrack, Rows
 
 _ROLES = ("tf_static", "front", "rear", "inclinometer", "joints", "tachometer", "wheel_odometry")
 _GIVEN_POSES = Registration(scale=2e-4, pitch_rad=math.radians(0.15))  # the mounting's tilt is still the log's
@@ -41,7 +41,8 @@ def identify(
         InputError: the log holds no scan of a front scanner.
     """
     if poses:
-        return _with_poses(log, settings, poses, machine or Machine(), topics or {})
+        rows = given_rows(poses, [log], topics or {})
+        return identify_along(rows, [log], settings, machine or Machine(), topics)
     with LogSource([log], topics) as source:
         pipeline = MappingPipeline(settings, machine or Machine(), cloud=False)
         for role, message in source.messages([role for role in _ROLES if role in source.roles]):
@@ -52,11 +53,13 @@ def identify(
     return pipeline.pile.report()
 
 
-def _with_poses(log: Path, settings: Settings, poses: str, machine: Machine, topics: Mapping[str, str]) -> PileReport:
-    """Run the pile stage alone, on poses that are known."""
-    track, mounts = FinalTrack(given_rows(poses, [log], topics)), Mounts(machine)
+def identify_along(
+    rows: Rows, logs: Sequence[Path], settings: Settings, machine: Machine, topics: Mapping[str, str] | None = None
+) -> PileReport:
+    """Run the pile stage alone, on poses that are known: given ones, or those of a map whose loops were closed."""
+    track, mounts = FinalTrack(rows), Mounts(machine)
     stage, boxes = PileStage(settings.pile, _GIVEN_POSES), own_boxes(machine, settings.integration.body_margin_m)
-    with LogSource([log], topics) as source:
+    with LogSource(list(logs), topics) as source:
         for _, message in source.messages([role for role in ("tf_static", "front") if role in source.roles]):
             if isinstance(message, Mount):
                 mounts.update(message)

@@ -23,6 +23,7 @@ _MOST_HISTORY = 400
 _SURE_STD_DEG = 2.5
 _ELSEWHERE_M = 5.0
 _GRADE_M = 10.0
+_IDLE = 3.0  # times the travel between estimates while nothing closes the drift
 _BLURRED_DEG = 15.0  # an inclination that is less sure is none
 
 
@@ -64,7 +65,8 @@ class PileStage:
         while abs(self._path[0][0] - self._travelled_m) > _GRADE_M:
             self._path.popleft()
         self._window.add(scan.points_map, position, self._travelled_m)
-        if abs(self._travelled_m - self._estimated_m) < self._settings.update_m:
+        wait_m = self._settings.update_m * (1.0 if self._scene is not None else _IDLE)
+        if abs(self._travelled_m - self._estimated_m) < wait_m:
             return None
         self._estimated_m = self._travelled_m
         return self._estimate(scan)
@@ -83,6 +85,7 @@ class PileStage:
         view = View(base, self._grade(), registration, self._scene, self._travelled_m, tilt)
         scene = look(hits, view, self._settings.reach_m, rng)
         if scene is None or scene.face.inclination_std_deg > _BLURRED_DEG:
+            self._scene = None
             return self._take(Snapshot(scan.stamp_ns, math.nan, PileEstimate()))
         self._scene = scene
         warning = tilt.warning()

@@ -25,6 +25,7 @@ _WALL_GAP_M = 0.3
 _CLEAR_M = 0.08
 _WALL_CELL_M = 0.1
 _MOUTH_M = 1.2
+_ROUND_M = 9.0  # what lies farther from the face says nothing of it
 _WALL_SLACK_M = 0.45  # a wall at the face stands no farther from the line of the wall before
 _FEWEST_HITS = 40
 _FEWEST_BLOCKS = 6
@@ -82,19 +83,17 @@ class View(NamedTuple):
     travelled_m: float = 0.0
     tilt: Tilt = Tilt(0.0, 0.0)
 
-    def straightened(self, hits: FloatArray) -> FloatArray:
-        """Return hits (N, 4) of the map with their heights put right by the tilt."""
-        ahead = self.base.local(hits)[:, 0] + self.travelled_m - hits[:, 3]
-        out = hits.copy()
-        out[:, 2] -= self.tilt.angle_rad * ahead
-        return out
+    def ahead(self, hits: FloatArray) -> FloatArray:
+        """Return the hits (N, 4) of the map that lie ahead, in the machine's frame, heights put right by the tilt."""
+        local = self.base.local(hits)
+        local = local[(local[:, 0] > 1.0) & (np.abs(local[:, 1]) < 12.0)]
+        local[:, 2] -= self.tilt.angle_rad * (local[:, 0] + self.travelled_m - local[:, 3])
+        return local
 
 
 def look(hits: FloatArray, view: View, reach_m: float, rng: np.random.Generator) -> Scene | None:
     """Return what closes the drift ahead, or None; hits rows x, y, z (map, m), travelled (m)."""
-    base, hits = view.base, view.straightened(hits)
-    local = base.local(hits)
-    local = local[(local[:, 0] > 1.0) & (np.abs(local[:, 1]) < 12.0)]
+    base, local = view.base, view.ahead(hits)
     corridor = trace(local, reach_m)
     inside = np.abs(local[:, 1] - corridor.centre_at(local[:, 0])) < corridor.half_at(local[:, 0]) - _WALL_GAP_M
     known = view.known.face_in(base) if view.known is not None else None
@@ -108,7 +107,9 @@ def look(hits: FloatArray, view: View, reach_m: float, rng: np.random.Generator)
     frame = base.turned(np.array([face_x, end.middle_m, 0.0]), end.turn_rad)
     model = _turned(seed, end.turn_rad)
     floor = _Floor(view.grade * face_x, view.grade)
-    return _refined(frame, frame.local(hits), model, end.half_m, floor, view.registration)
+    near = local[np.abs(local[:, 0] - face_x) < _ROUND_M]
+    near[:, :3] = base.map(near[:, :3])
+    return _refined(frame, frame.local(near), model, end.half_m, floor, view.registration)
 
 
 def _crossing(seed: FloatArray, centre_at) -> float:  # type: ignore[no-untyped-def]

@@ -21,6 +21,8 @@ from lhdmap.logs.source import LogSource
 from lhdmap.machine import Machine
 from lhdmap.mapfolder import MapFolderWriter, MapInfo
 from lhdmap.messages import Joints, LaserScan, Message, PointCloud
+from lhdmap.pile.result import PileReport
+from lhdmap.pile.run import identify_along
 from lhdmap.pipeline.given import given_rows
 from lhdmap.pipeline.interruption import Interruption
 from lhdmap.pipeline.mapping import MappingPipeline
@@ -139,6 +141,7 @@ class _Outcome:
             rows = Rows(rows.times_ns, corrected(rows.poses, rows.times_ns, correction))
             self.final = trajectory_of(resample(rows, times), stamps)
             self.cloud = integrate_again(request, pipeline, rows)
+        self.pile = self._pile(rows, moved=given is not None or correction is not None)
         self.duration_s = float(times[-1] - times[0]) * 1e-9 if len(times) else 0.0
         self.warnings = [*source.warnings, *source.damage, *pipeline.warnings, *_remarks(pipeline)]
         steps = np.diff(rows.poses[:, :3], axis=0)
@@ -151,8 +154,18 @@ class _Outcome:
             "degenerate_share": records.degenerate_share,
             "lost_stretches": records.lost_stretches,
             "closures": 0 if correction is None else correction.closures,
-            "pile": None,
+            "pile": self.pile.to_json()["status"] if self.pile is not None else None,
         }
+
+    def _pile(self, rows: Rows, *, moved: bool) -> PileReport | None:
+        """Return what is said of the pile, on the final poses; None where none was looked for."""
+        stage, request = self.pipeline.pile, self.request
+        if stage is None or not self.pipeline.has_inclinometer:
+            return None
+        if not moved:
+            return stage.report()
+        machine = self.pipeline.machine or Machine()
+        return identify_along(rows, request.logs, request.settings, machine, request.topics)
 
     def report(self) -> ReportData:
         """Return the data of the HTML page and of the recording."""
@@ -202,6 +215,8 @@ def _write(folder: MapFolderWriter, outcome: _Outcome, recording: RecordingWrite
     folder.write_odometry(outcome.odometry)
     folder.write_diagnostics(outcome.pipeline.records.diagnostics())
     write_cloud(folder.path / "cloud.ply", outcome.cloud)
+    if outcome.pile is not None:
+        folder.write_json("pile.json", outcome.pile.to_json())
     data = outcome.report()
     record_run(recording, data, outcome.pipeline.machine or Machine(bodies={}))
     write_report(data, folder.path / "report.html")
