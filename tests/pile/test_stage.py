@@ -1,0 +1,195 @@
+"""The pile stage on drives through drifts made of planes: what is found is what stands there."""
+
+from __future__ import annotations
+
+import json
+import math
+from functools import cache
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from lhdmap.messages import FloatArray
+from lhdmap.pile.face import Registration
+from lhdmap.pile.result import PileReport, Snapshot, estimate_json
+from lhdmap.pile.settings import PileSettings
+from lhdmap.pile.stage import PileStage
+
+from tests.pile.cast_drift import STEP_M, TOE_M, Box, CastDrift, Segments, drive, last_of
+
+KEYS = {
+    *("status", "center_m", "left_limit_m", "right_limit_m", "width_m", "inclination_deg", "width_std_m"),
+    *("inclination_std_deg", "frame", "decided_at_ns", "distance_at_decision_m", "points", "boulders"),
+}
+
+
+@cache
+def driven(drift: CastDrift, to_m: float = 28.0) -> PileReport:
+    return drive(drift, to_m)
+
+
+def _found(drift: CastDrift) -> Snapshot:
+    return last_of(driven(drift))
+
+
+@pytest.mark.parametrize(
+    "drift",
+    [
+        CastDrift(35.0),
+        CastDrift(45.0),
+        CastDrift(55.0),
+        CastDrift(45.0, width_m=3.4, grade=0.05, turn_rad=2.0, shift_m=(100.0, -50.0, 7.0)),
+        CastDrift(40.0, width_m=4.4, grade=-0.05, turn_rad=-3.0, shift_m=(-20.0, 300.0, -400.0)),
+    ],
+    ids=["35", "45", "55", "uphill", "downhill"],
+)
+def test_plane_face_is_measured(drift: CastDrift) -> None:
+    last = _found(drift)
+    pile = last.estimate
+    assert drift.slope_deg is not None
+    assert pile.status == "loadable"
+    assert pile.probabilities["loadable"] > 0.95
+    assert pile.width_m == pytest.approx(drift.width_m, abs=0.05)
+    assert pile.inclination_deg == pytest.approx(-drift.slope_deg, abs=1.0)
+    assert abs(pile.inclination_deg + drift.slope_deg) < 2.0 * pile.inclination_std_deg
+    for limit_m, side in ((pile.left_limit_m, 1.0), (pile.right_limit_m, -1.0)):
+        assert drift.in_drift(limit_m) == pytest.approx([TOE_M, side * drift.width_m / 2, drift.grade * TOE_M], abs=0.1)
+    machine_x_m = last.stamp_ns / 100_000_000 * STEP_M
+    assert last.distance_m == pytest.approx(math.hypot(1.0, drift.grade) * (TOE_M - machine_x_m), abs=0.1)
+    assert not pile.boulders
+
+
+def test_plane_face_is_decided_before_the_deadline() -> None:
+    decision = driven(CastDrift(45.0)).decision
+    assert decision is not None
+    assert decision.estimate.status == "loadable"
+    assert decision.distance_m >= PileSettings().deadline_m
+    assert decision.estimate.inclination_deg == pytest.approx(-45.0, abs=3.0 * decision.estimate.inclination_std_deg)
+
+
+@pytest.mark.parametrize(
+    ("slope_deg", "status"), [(90.0, "wall"), (15.0, "too_shallow"), (70.0, "hang_up"), (105.0, "hang_up")]
+)
+def test_what_is_not_to_be_loaded_is_named(slope_deg: float, status: str) -> None:
+    report = driven(CastDrift(slope_deg))
+    pile = last_of(report).estimate
+    assert pile.status == status
+    assert pile.inclination_deg == pytest.approx(-slope_deg, abs=1.0)
+    assert pile.probabilities["loadable"] < 0.01
+    assert report.decision is not None
+    assert report.decision.estimate.status == status
+
+
+def test_open_drift_is_none() -> None:
+    report = driven(CastDrift(None))
+    assert report.decision is None
+    assert all(one.estimate.probabilities.get("loadable", 0.0) < 0.01 for one in report.history)
+    assert report.to_json()["status"] == "none"
+    assert report.to_json()["identified"] is False
+
+
+def _arc(centre: tuple[float, float], radius: float) -> Segments:
+    angles = np.linspace(-0.5 * math.pi, 0.0, 25)
+    x, y = centre[0] + radius * np.cos(angles), centre[1] + radius * np.sin(angles)
+    return tuple((float(x[i]), float(y[i]), float(x[i + 1]), float(y[i + 1])) for i in range(24))
+
+
+CORNER: Segments = (
+    *((-20.0, -2.0, 32.0, -2.0), (32.0, -2.0, 32.0, 60.0)),
+    *((-20.0, 2.0, 28.0, 2.0), (28.0, 2.0, 28.0, 60.0)),
+)
+BEND: Segments = (
+    *((-20.0, -2.0, 20.0, -2.0), *_arc((20.0, 15.0), 17.0)),
+    *((-20.0, 2.0, 20.0, 2.0), *_arc((20.0, 15.0), 13.0)),
+)
+
+
+@pytest.mark.parametrize(("walls", "to_m"), [(CORNER, 24.0), (BEND, 19.0)], ids=["corner", "bend"])
+def test_outer_wall_of_a_bend_is_none(walls: Segments, to_m: float) -> None:
+    report = driven(CastDrift(None, walls=walls), to_m)
+    assert report.decision is None
+    assert report.to_json()["status"] == "none"
+
+
+def test_rock_that_stands_out_is_one_boulder() -> None:
+    lower, upper = (TOE_M - 0.2, -0.9, 0.2), (TOE_M + 1.0, 0.3, 1.4)
+    drift = CastDrift(45.0, rocks=(Box(lower, upper),))
+    pile = _found(drift).estimate
+    assert len(pile.boulders) == 1
+    found = pile.boulders[0]
+    assert drift.in_drift(found.center_m) == pytest.approx(0.5 * (np.array(lower) + upper), abs=0.3)
+    assert 1.2 * 0.9 < found.size_m < 1.2 * math.sqrt(3.0)  # between an edge and the diagonal in space
+    assert pile.status == "loadable"
+    assert pile.inclination_deg == pytest.approx(-45.0, abs=1.0)  # the rock does not tilt the face
+
+
+def test_the_true_surface_is_the_residual_zero() -> None:
+    drift = CastDrift(45.0)
+    pile = _found(drift).estimate
+    rows = np.array([drift.in_drift(point) for point in pile.face_m])
+    out = (TOE_M + rows[:, 2] - rows[:, 0]) / math.sqrt(2.0)
+    assert pile.residuals_m == pytest.approx(out, abs=0.04)
+    assert np.std(pile.residuals_m) < 0.02
+
+
+def test_attack_point_is_on_the_toe_and_clear_of_the_walls() -> None:
+    drift = CastDrift(45.0, turn_rad=1.0)
+    attack = _found(drift).estimate.attack
+    assert attack is not None
+    x, y, _ = drift.in_drift(attack.point_m)
+    assert x == pytest.approx(TOE_M, abs=0.1)
+    assert abs(y) < 0.5 * drift.width_m - 1.3
+    assert math.remainder(attack.heading_rad - 1.0, 2.0 * math.pi) == pytest.approx(0.0, abs=0.03)
+
+
+@settings(max_examples=4, deadline=None)
+@given(st.floats(-math.pi, math.pi), st.floats(-500.0, 500.0))
+def test_result_does_not_depend_on_where_north_is(turn_rad: float, shift_m: float) -> None:
+    here = _found(CastDrift(45.0)).estimate
+    there = last_of(drive(CastDrift(45.0, turn_rad=turn_rad, shift_m=(shift_m, -shift_m, 0.1 * shift_m)))).estimate
+    assert there.status == here.status
+    assert there.width_m == pytest.approx(here.width_m, abs=0.01)
+    assert there.inclination_deg == pytest.approx(here.inclination_deg, abs=0.2)
+
+
+def test_tilt_error_is_found_and_undone() -> None:
+    """The scanner looks 0.3 deg lower than its mount says: the floor tells, once the machine drives over what it saw."""
+    drift = CastDrift(45.0, tilt_error_rad=math.radians(0.3))
+    stage = PileStage(PileSettings(), Registration(2e-4, math.radians(0.3)))
+    for scan in drift.scans(from_m=-28.0):
+        stage.update(scan)
+    pile = last_of(stage.report()).estimate
+    assert pile.inclination_deg == pytest.approx(-45.0, abs=1.0)
+    assert drift.in_drift(pile.left_limit_m) == pytest.approx([TOE_M, 2.0, 0.0], abs=0.05)
+    assert len(pile.warnings) == 1
+    assert "lower" in pile.warnings[0]
+
+
+def _grow(values: FloatArray) -> float:
+    return float(np.median(values[-len(values) // 4 :]) / np.median(values[: len(values) // 4]))
+
+
+def test_deviations_shrink_on_the_way() -> None:
+    found = [one.estimate.inclination_std_deg for one in driven(CastDrift(45.0)).history if one.estimate.found]
+    assert _grow(np.array(found)) < 0.6
+
+
+def test_json_holds_the_contract() -> None:
+    table = driven(CastDrift(45.0)).to_json()
+    assert set(table) >= KEYS
+    assert json.loads(json.dumps(table, allow_nan=False)) == table
+    assert table["frame"] == "map"
+    assert table["distance_at_decision_m"] > 10.0
+    assert isinstance(table["decided_at_ns"], int)
+    assert sum(table["probabilities"].values()) == pytest.approx(1.0)
+
+
+def test_json_of_nothing_is_null() -> None:
+    table = PileReport(None, None).to_json()
+    assert set(table) >= KEYS
+    assert json.loads(json.dumps(table, allow_nan=False)) == table
+    for key in ("center_m", "left_limit_m", "width_m", "inclination_deg", "decided_at_ns", "distance_at_decision_m"):
+        assert table[key] is None
+    assert table["probabilities"]["none"] == 1.0
+    assert estimate_json(_found(CastDrift(45.0)).estimate)["width_m"] == pytest.approx(4.0, abs=0.05)
