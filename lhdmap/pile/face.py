@@ -22,6 +22,7 @@ _NEAR_M = 0.2
 _STEEPEST, _FLATTEST = -1.2, 6.0  # dx/dz: an overhang of 50 deg, a slope of 10 deg
 _MOST_ASKEW = 0.9
 _TUKEY = 4.7
+_MOST_POINTS = 1500
 
 
 class Registration(NamedTuple):
@@ -86,6 +87,7 @@ def find(points: FloatArray, rng: np.random.Generator, known: FloatArray | None 
 
 def fit(points: FloatArray, start: FloatArray, registration: Registration) -> Face:
     """Refine a face by Tukey-weighted regression with one weight for each (y, z) cell; points rows x, y, z, travelled."""
+    points = points[:: 1 + len(points) // _MOST_POINTS]
     weights = _cell_weights(points)
     s = points[:, 3] - points[:, 3].mean()
     J = np.column_stack([np.ones(len(points)), points[:, 1], points[:, 2], s])

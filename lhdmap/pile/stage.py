@@ -23,7 +23,7 @@ _MOST_HISTORY = 400
 _SURE_STD_DEG = 2.5
 _ELSEWHERE_M = 5.0
 _GRADE_M = 10.0
-_IDLE = 3.0  # times the travel between estimates while nothing closes the drift
+_IDLE = 4.0  # times the travel between estimates while nothing closes the drift
 _BLURRED_DEG = 15.0  # an inclination that is less sure is none
 
 
@@ -49,6 +49,7 @@ class PileStage:
         self._position: FloatArray | None = None
         self._estimated_m = -math.inf
         self._scene: Scene | None = None
+        self._idle = False
         self._tilt = TiltCheck(self._registration.pitch_rad)
         self._path: deque[tuple[float, float]] = deque()
         self._history: list[Snapshot] = []
@@ -65,7 +66,7 @@ class PileStage:
         while abs(self._path[0][0] - self._travelled_m) > _GRADE_M:
             self._path.popleft()
         self._window.add(scan.points_map, position, self._travelled_m)
-        wait_m = self._settings.update_m * (1.0 if self._scene is not None else _IDLE)
+        wait_m = self._settings.update_m * (_IDLE if self._idle else 1.0)
         if abs(self._travelled_m - self._estimated_m) < wait_m:
             return None
         self._estimated_m = self._travelled_m
@@ -77,9 +78,9 @@ class PileStage:
 
     def _estimate(self, scan: ScanHits) -> Snapshot | None:
         base = Frame2(scan.T_map_base[:3], float(scan.T_map_base[3]))
-        hits = self._window.hits(self._travelled_m)
+        hits = self._window.hits(scan.T_map_base, self._travelled_m)
         rng = np.random.default_rng(len(hits))
-        self._tilt.update(base.local(hits), self._travelled_m)
+        self._tilt.update(hits, self._travelled_m)
         tilt = self._tilt.tilt()
         registration = self._registration._replace(pitch_rad=tilt.std_rad)
         view = View(base, self._grade(), registration, self._scene, self._travelled_m, tilt)
@@ -105,6 +106,7 @@ class PileStage:
         if len(self._history) > _MOST_HISTORY:
             del self._history[1::2]
         estimate = snapshot.estimate
+        self._idle = not estimate.found or estimate.status == "none"
         if not estimate.found:
             return snapshot
         if snapshot.distance_m >= self._settings.closest_m:

@@ -84,15 +84,14 @@ class View(NamedTuple):
     tilt: Tilt = Tilt(0.0, 0.0)
 
     def ahead(self, hits: FloatArray) -> FloatArray:
-        """Return the hits (N, 4) of the map that lie ahead, in the machine's frame, heights put right by the tilt."""
-        local = self.base.local(hits)
-        local = local[(local[:, 0] > 1.0) & (np.abs(local[:, 1]) < 12.0)]
+        """Return the hits (N, 4) that lie ahead, heights put right by the tilt."""
+        local = hits[hits[:, 0] > 1.0]
         local[:, 2] -= self.tilt.angle_rad * (local[:, 0] + self.travelled_m - local[:, 3])
         return local
 
 
 def look(hits: FloatArray, view: View, reach_m: float, rng: np.random.Generator) -> Scene | None:
-    """Return what closes the drift ahead, or None; hits rows x, y, z (map, m), travelled (m)."""
+    """Return what closes the drift ahead, or None; hits rows x, y, z (machine's frame, m), travelled (m)."""
     base, local = view.base, view.ahead(hits)
     corridor = trace(local, reach_m)
     inside = np.abs(local[:, 1] - corridor.centre_at(local[:, 0])) < corridor.half_at(local[:, 0]) - _WALL_GAP_M

@@ -65,7 +65,9 @@ class TiltCheck:
         kept = np.abs(off - angle * ranges) < 0.12
         if kept.sum() < _FEWEST_STEPS:
             return Tilt(0.0, self._prior_std_rad)
-        information = float((ranges[kept] ** 2).sum()) / _FLOOR_STD_M**2 / 4.0  # the floor's waves: steps are not independent
+        information = (
+            float((ranges[kept] ** 2).sum()) / _FLOOR_STD_M**2 / 4.0
+        )  # the floor's waves: steps are not independent
         prior = 1.0 / self._prior_std_rad**2
         seen = float((off[kept] * ranges[kept]).sum() / (ranges[kept] ** 2).sum())
         return Tilt(information * seen / (information + prior), 1.0 / math.sqrt(information + prior))

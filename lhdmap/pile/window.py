@@ -10,6 +10,7 @@ from lhdmap.messages import FloatArray
 _ROOM = 120_000  # hits: 45 m at a scan each 0.1 m
 _APART_M = 0.05  # hits of one scan nearer to each other than this are one
 _STEP_M = 0.06
+_BEHIND_M, _BESIDE_M = 1.0, 12.0
 
 
 class HitWindow:
@@ -31,9 +32,13 @@ class HitWindow:
         self._last_m = travelled_m
         self._next = _append(self._rows, self._next, points_map, position_map, (travelled_m, self._reach_m, _APART_M))
 
-    def hits(self, travelled_m: float) -> FloatArray:
-        """Return the rows of the last `reach_m` of travel, shape (N, 4)."""
-        return self._rows[np.abs(self._rows[:, 3] - travelled_m) < self._reach_m]
+    def hits(self, pose: FloatArray, travelled_m: float) -> FloatArray:
+        """Return the hits around and ahead of a pose: rows x, y, z in its frame (m), travelled (m), shape (N, 4).
+
+        `pose`: x, y, z (m), heading (rad), shape (4,); only hits of the last `reach_m` of travel.
+        """
+        out = np.empty_like(self._rows)
+        return out[: _around(self._rows, pose, (travelled_m, self._reach_m), out)]
 
 
 @nb.njit(cache=True)
@@ -50,3 +55,20 @@ def _append(rows, at, points, position, limits):  # type: ignore[no-untyped-def]
         last_x, last_y = x, y
         at = (at + 1) % rows.shape[0]
     return at
+
+
+@nb.njit(cache=True)
+def _around(rows, pose, limits, out):  # type: ignore[no-untyped-def]
+    """Fill `out` with what lies ahead, in the frame of the pose; return how many."""
+    c, s = np.cos(pose[3]), np.sin(pose[3])
+    count = 0
+    for i in range(rows.shape[0]):
+        if not abs(rows[i, 3] - limits[0]) < limits[1]:
+            continue
+        dx, dy = rows[i, 0] - pose[0], rows[i, 1] - pose[1]
+        x, y = c * dx + s * dy, -s * dx + c * dy
+        if x < -_BEHIND_M or abs(y) > _BESIDE_M:
+            continue
+        out[count, 0], out[count, 1], out[count, 2], out[count, 3] = x, y, rows[i, 2] - pose[2], rows[i, 3]
+        count += 1
+    return count
