@@ -72,12 +72,16 @@ class Snapshot(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class PileReport:
-    """Outcome of a drive: the decision (None: not identified), the last estimate, and how it came about."""
+    """Outcome of a drive: the decision (None: not identified), the last estimate, and how it came about.
+
+    `around_m` (N, 3): hits around the pile in the map, thinned, for pictures.
+    """
 
     decision: Snapshot | None
     last: Snapshot | None
     history: tuple[Snapshot, ...] = ()
     method: str = "surface"
+    around_m: FloatArray = field(default_factory=lambda: np.zeros((0, 3)))
 
     def to_json(self) -> dict[str, Any]:
         """Return the content of `pile.json`: the last estimate, and when and how far away it was decided."""

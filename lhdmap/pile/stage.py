@@ -24,6 +24,7 @@ _SURE_STD_DEG = 2.5
 _ELSEWHERE_M = 5.0
 _GRADE_M = 10.0
 _IDLE = 4.0  # times the travel between estimates while nothing closes the drift
+_AROUND_M, _MOST_AROUND = 10.0, 12_000
 _BLURRED_DEG = 15.0  # an inclination that is less sure is none
 
 
@@ -74,7 +75,14 @@ class PileStage:
 
     def report(self) -> PileReport:
         """Return what there is so far."""
-        return PileReport(self._decision, self._best, tuple(self._history), self._settings.method)
+        around = self._around(self._best.estimate) if self._best is not None else np.zeros((0, 3))
+        return PileReport(self._decision, self._best, tuple(self._history), self._settings.method, around)
+
+    def _around(self, pile: PileEstimate) -> FloatArray:
+        """Return the hits around the pile (N, 3), thinned, for pictures."""
+        hits = self._window.hits(self._travelled_m)[:, :3]
+        hits = hits[np.hypot(*(hits - pile.center_m).T[:2]) < _AROUND_M]
+        return hits[:: max(1, len(hits) // _MOST_AROUND)]
 
     def _estimate(self, scan: ScanHits) -> Snapshot | None:
         base = Frame2(scan.T_map_base[:3], float(scan.T_map_base[3]))
