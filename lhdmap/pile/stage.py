@@ -23,7 +23,7 @@ _MOST_HISTORY = 400
 _SURE_STD_DEG = 2.5
 _ELSEWHERE_M = 5.0
 _GRADE_M = 10.0
-_IDLE = 4.0  # times the travel between estimates while nothing closes the drift
+_IDLE = 6.0  # times the travel between estimates while nothing closes the drift
 _AROUND_M, _MOST_AROUND = 10.0, 12_000
 _BLURRED_DEG = 15.0  # an inclination that is less sure is none
 
@@ -80,9 +80,12 @@ class PileStage:
 
     def _around(self, pile: PileEstimate) -> FloatArray:
         """Return the hits around the pile (N, 3), thinned, for pictures."""
-        hits = self._window.hits(self._travelled_m)[:, :3]
-        hits = hits[np.hypot(*(hits - pile.center_m).T[:2]) < _AROUND_M]
-        return hits[:: max(1, len(hits) // _MOST_AROUND)]
+        across = pile.left_limit_m - pile.right_limit_m
+        heading = math.atan2(-float(across[0]), float(across[1]))
+        start = Frame2(pile.center_m, heading).map(np.array([-_AROUND_M, 0.0, 0.0]))
+        hits = self._window.hits(np.array([*start, heading]), self._travelled_m)
+        hits = hits[hits[:, 0] < 2.0 * _AROUND_M][:, :3]
+        return Frame2(start, heading).map(hits[:: max(1, len(hits) // _MOST_AROUND)])
 
     def _estimate(self, scan: ScanHits) -> Snapshot | None:
         base = Frame2(scan.T_map_base[:3], float(scan.T_map_base[3]))

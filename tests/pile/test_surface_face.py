@@ -157,7 +157,7 @@ def test_window_keeps_its_size() -> None:
         for travelled_m in np.arange(from_m, to_m, 0.1):
             here = np.array([travelled_m, 0.0, 0.0])
             window.add(fan + here, here, float(travelled_m))
-        return len(window.hits(to_m))
+        return len(window.hits(np.array([to_m, 0.0, 0.0, 0.0]), to_m))
 
     first = drive(0.0, 100.0)
     tracemalloc.start()
@@ -166,11 +166,11 @@ def test_window_keeps_its_size() -> None:
     tracemalloc.stop()
     assert later == pytest.approx(first, rel=0.02)
     assert grown < 1_000_000
-    assert window.hits(200.0)[:, 3].min() > 180.0 - 0.2
+    assert window.hits(np.array([175.0, 0.0, 0.0, 0.0]), 200.0)[:, 3].min() > 180.0 - 0.2
 
 
 def test_window_takes_nothing_twice_while_the_machine_stands() -> None:
     window, fan = HitWindow(20.0), np.column_stack([np.full(9, 5.0), np.arange(9.0), np.zeros(9)])
     for _ in range(5):
         window.add(fan, np.zeros(3), 0.0)
-    assert len(window.hits(0.0)) == 9
+    assert len(window.hits(np.zeros(4), 0.0)) == 9
