@@ -38,6 +38,7 @@ def run(arguments: argparse.Namespace, console: Console) -> int:
     from lhdmap.machine import load_machine
     from lhdmap.mapfolder import MapFolderWriter, MapInfo
     from lhdmap.pile.run import identify
+    from lhdmap.report.pile_page import write_pile_report
 
     settings = load_settings(arguments.config, arguments.set)
     machine = load_machine(arguments.machine) if arguments.machine else None
@@ -45,6 +46,7 @@ def run(arguments: argparse.Namespace, console: Console) -> int:
     with MapFolderWriter(_target(arguments)) as folder:
         values = report.to_json()
         folder.write_json("pile.json", values)
+        write_pile_report(report, folder.path / "report.html", f"Ore pile, {arguments.input.name}")
         path = folder.complete(MapInfo([arguments.input], settings_table(settings), warnings=values["warnings"]))
     for text in values["warnings"]:
         console.warn(text)

@@ -1,0 +1,108 @@
+"""The ore pile on a page: figures with their deviations and four pictures; a page of its own, or a section of build-map's."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from lhdmap.messages import FloatArray
+from lhdmap.pile.result import STATUSES, PileEstimate, PileReport
+from lhdmap.report import charts, markup, pile_charts
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+ABOVE = (
+    "The end of the drift from above, hits coloured by what they are taken for. The toe is where the face meets the floor; "
+    "the diamonds are the limits E_L and E_R with twice their deviation, the arrow is where to drive into the pile."
+)
+CUT = (
+    "Cut along the drift. Each point of the face is drawn at its distance from the toe on its own side, so that a face "
+    "that stands askew is not blurred; the line is the fit, the band twice the deviation of its inclination."
+)
+RELIEF = (
+    "The face as the machine sees it: red stands out of the fitted face towards the machine, blue lies behind it. "
+    "Dashed: the limits."
+)
+CONVERGENCE = "How the estimate came about on the way to the pile, bands of two standard deviations; dashed: where it was decided."
+_MEANING = {
+    "loadable": "a pile that can be loaded",
+    "too_shallow": "the face is too flat to fill a bucket",
+    "wall": "bare rock closes the drift",
+    "hang_up": "too steep or overhanging: rock may come down",
+    "none": "nothing closes the drift",
+}
+
+
+def write_pile_report(report: PileReport, path: Path, title: str) -> None:
+    """Write one self-contained HTML page of what is said of the pile."""
+    path.write_text(markup.document(title, pile_sections(report)), encoding="utf-8")
+
+
+def pile_sections(report: PileReport) -> str:
+    """Return the sections as markup: for a page of their own, and within another."""
+    pile = report.last.estimate if report.last is not None else PileEstimate()
+    parts = [markup.section("Ore pile", markup.cards(_figures(report, pile)) + markup.listed(pile.warnings, "warning"))]
+    if not pile.found:
+        words = "No face was found that closes the drift, so there is nothing to draw.\n"
+        return "".join([*parts, f"<p>{words}</p>\n"])
+    with charts.styled():
+        if len(pile.face_m):
+            parts.append(markup.section("The pile from above", _picture(pile_charts.above_chart(report, pile), ABOVE)))
+            parts.append(markup.section("The face from the side", _picture(pile_charts.cut_chart(report, pile), CUT)))
+            parts.append(markup.section("The face from the machine", _picture(pile_charts.relief_chart(pile), RELIEF)))
+        if any(one.estimate.found and math.isfinite(one.distance_m) for one in report.history):
+            picture = _picture(pile_charts.convergence_chart(report), CONVERGENCE)
+            parts.append(markup.section("How the estimate converged", picture))
+    parts.append(markup.section("Probabilities and places", _tables(pile)))
+    return "".join(parts)
+
+
+def _picture(figure: Figure, caption: str) -> str:
+    return markup.picture(charts.svg_uri(figure), caption)
+
+
+def _figures(report: PileReport, pile: PileEstimate) -> Iterator[tuple[str, str, str]]:
+    """Yield name, value and meaning of the headline figures; ± is one standard deviation."""
+    chance = 100.0 * pile.probabilities.get(pile.status, 0.0)
+    yield "status", pile.status.replace("_", " "), f"{_MEANING[pile.status]}; probability {chance:.0f} %"
+    if pile.found:
+        yield "width", f"{pile.width_m:.2f} ± {pile.width_std_m:.2f} m", "wall to wall before the face"
+        slope = f"{pile.inclination_deg:.1f} ± {pile.inclination_std_deg:.1f}°"
+        yield "inclination", slope, "0 is the floor, -90 an upright wall"
+    if math.isfinite(pile.volume_m3):
+        value = f"{pile.volume_m3:.1f} ± {pile.volume_std_m3:.1f} m³"
+        yield "volume", value, "above the floor, as far up as the face was seen"
+    if report.decision is not None:
+        distance = report.decision.distance_m
+        status = report.decision.estimate.status.replace("_", " ")
+        yield "decided", f"{distance:.1f} m", f"before the toe, as {status}"
+    else:
+        yield "decided", "no", "not identified: no status was sure enough"
+    if pile.found:
+        sizes = ", ".join(f"{rock.size_m:.1f} m" for rock in pile.boulders)
+        yield "boulders", str(len(pile.boulders)), sizes or "nothing oversized stands out of the face"
+
+
+def _tables(pile: PileEstimate) -> str:
+    shares = [
+        (name.replace("_", " "), f"{100 * pile.probabilities.get(name, 0.0):.1f}", _MEANING[name]) for name in STATUSES
+    ]
+    places = [
+        ("left limit E_L", *_xyz(pile.left_limit_m)),
+        ("right limit E_R", *_xyz(pile.right_limit_m)),
+        ("middle of the face", *_xyz(pile.center_m)),
+        *((f"boulder, {rock.size_m:.1f} m", *_xyz(rock.center_m)) for rock in pile.boulders),
+    ]
+    if pile.attack is not None:
+        heading = f"attack, heading {math.degrees(pile.attack.heading_rad):.1f}°"
+        places.append((heading, *_xyz(pile.attack.point_m)))
+    first = markup.table(("status", "probability, %", "meaning"), shares, numbers_from=1, numbers_to=2)
+    return first + markup.table(("in map", "x, m", "y, m", "z, m"), places, numbers_from=1)
+
+
+def _xyz(point_m: FloatArray) -> tuple[str, str, str]:
+    x, y, z = (f"{value:.2f}" for value in point_m)
+    return x, y, z
