@@ -16,16 +16,16 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-FLOOR, WALL, FACE, ROCK = "#b08d57", "#8a949e", charts.FINAL, charts.WHEELS
+FLOOR, WALL, FACE, REST, ROCK = "#b08d57", "#8a949e", charts.FINAL, "#8cc4ee", charts.WHEELS
 STATUS_COLOURS = dict(
     zip(STATUSES, (charts.TRUTH, charts.ODOMETRY, charts.FINAL, charts.FLAGGED, "#8a949e"), strict=True)
 )
 _BEFORE_M, _BEYOND_M = 7.0, 3.5
 _FLOOR_M = 0.2  # what lies lower over the toe is drawn as floor
 _NEAR_WALL_M = 0.25
+_NEAR_FACE_M = 0.28
 _PROUD_M = 0.5  # end of the colours
 _CELL_M = 0.1
-_DPI = 170
 
 
 class Ahead(NamedTuple):
@@ -53,18 +53,18 @@ def above_chart(report: PileReport, pile: PileEstimate) -> Figure:
     """Draw the hits around the face from above by what they are taken for, toe, limits, boulders and the attack point."""
     frame = Ahead.of(pile)
     side = frame.half_m + 1.0
-    figure = charts.new_figure(0.9 * charts.WIDTH_IN * 2.0 * side / (_BEFORE_M + _BEYOND_M) + 0.9)
+    figure = charts.new_figure(0.9 * charts.WIDTH_IN * 2.0 * side / (_BEFORE_M + _BEYOND_M) + 1.1)
     axes = figure.add_subplot()
-    _segments(axes, frame, report.around_m, (0, 1))
+    _segments(axes, frame, pile, report.around_m)
     face, toe = frame.local(pile.face_m), frame.local(pile.toe_m)
-    _dots(axes, face[:, 0], face[:, 1], FACE, "face")
+    _dots(axes, face[:, 0], face[:, 1], FACE, "face, fitted")
     axes.plot(toe[:, 0], toe[:, 1], color=charts.FLAGGED, linewidth=2.2, label="toe")
     _limits(axes, frame, pile)
     _boulders(axes, frame, pile, (0, 1))
     _attack(axes, frame, pile)
     axes.set(xlim=(-_BEFORE_M, _BEYOND_M), ylim=(-side, side), aspect="equal")
     axes.set(xlabel="from the middle of the toe into the pile, m", ylabel="to the left, m")
-    charts.legend_above(axes, columns=9)
+    charts.legend_above(axes, columns=5)
     return figure
 
 
@@ -97,14 +97,18 @@ def cut_chart(report: PileReport, pile: PileEstimate) -> Figure:
     return figure
 
 
-def relief_chart(pile: PileEstimate) -> Figure:
+def relief_chart(report: PileReport, pile: PileEstimate) -> Figure:
     """Draw the face as the machine sees it, coloured by how far the rock stands out of the fit."""
     frame = Ahead.of(pile)
-    face = frame.local(pile.face_m)
+    face = frame.local(np.concatenate([pile.face_m, report.around_m]))
+    proud = _proud(frame, pile, face)
+    near = (proud > -0.8) & (proud < 1.6) & (face[:, 2] > 0.05) & (face[:, 2] < 3.0)
+    near &= np.abs(face[:, 1]) < frame.half_m - 0.12
+    face, proud = face[near], proud[near]
     top = max(float(face[:, 2].max(initial=1.6)), 1.0) + 0.15
     figure = charts.new_figure(min(0.8 * charts.WIDTH_IN * top / (2.0 * frame.half_m) + 0.9, 5.0), right_in=0.95)
     axes = figure.add_subplot()
-    values, extent = _mean_cells(-face[:, 1], face[:, 2], pile.residuals_m)
+    values, extent = _mean_cells(-face[:, 1], face[:, 2], proud)
     image = axes.imshow(
         values, extent=extent, origin="lower", cmap="RdBu_r", vmin=-_PROUD_M, vmax=_PROUD_M, interpolation="nearest"
     )
@@ -144,20 +148,35 @@ def convergence_chart(report: PileReport) -> Figure:
     return figure
 
 
-def _segments(axes: Axes, frame: Ahead, points_m: FloatArray, columns: tuple[int, int]) -> None:
-    """Draw what is not face: floor, and walls with what lies high."""
+def _segments(axes: Axes, frame: Ahead, pile: PileEstimate, points_m: FloatArray) -> None:
+    """Draw what was not fitted: walls, floor, face beyond the heights of the fit, and what is none of these."""
     local = frame.local(points_m)
+    proud = _proud(frame, pile, local)
     inside = np.abs(local[:, 1]) < frame.half_m - _NEAR_WALL_M
-    floor = inside & (local[:, 2] < _FLOOR_M) & (local[:, 0] < 0.0)
-    for rows, colour, name in ((floor, FLOOR, "floor"), (~inside, WALL, "walls")):
-        _dots(axes, local[rows, columns[0]], local[rows, columns[1]], colour, name)
+    floor = inside & (local[:, 2] < _FLOOR_M) & (proud > 0.0)
+    near = inside & ~floor & (np.abs(proud) < _NEAR_FACE_M)
+    other = inside & ~floor & ~near
+    for rows, colour, name in (
+        (~inside, WALL, "walls"),
+        (floor, FLOOR, "floor"),
+        (near, REST, "face, not in the fit"),
+        (other, ROCK, "off the face"),
+    ):
+        _dots(axes, local[rows, 0], local[rows, 1], colour, name, size=5.0 if rows.sum() < 500 else 1.6)
 
 
-def _dots(axes: Axes, x: FloatArray, y: FloatArray, colour: str, label: str) -> None:
+def _proud(frame: Ahead, pile: PileEstimate, local: FloatArray) -> FloatArray:
+    """Return how far points (N, 3) of the pile's frame stand out of the fitted face, along its normal, shape (N,)."""
+    slope = _slope(pile.inclination_deg)
+    x_fit = _toe_at(frame.local(pile.toe_m), local[:, 1]) + slope * local[:, 2]
+    return (x_fit - local[:, 0]) / math.hypot(1.0, slope)
+
+
+def _dots(axes: Axes, x: FloatArray, y: FloatArray, colour: str, label: str, size: float = 1.6) -> None:
     """Draw points as pixels: thousands of marks would make the page heavy."""
     if len(x):
         rows = charts.thinned(len(x), 12_000)
-        axes.scatter(x[rows], y[rows], s=1.6, color=colour, linewidths=0, rasterized=True)
+        axes.scatter(x[rows], y[rows], s=size, color=colour, linewidths=0, rasterized=True)
         axes.plot([], [], "o", color=colour, markersize=4.0, label=label)
 
 

@@ -52,7 +52,9 @@ def pile_sections(report: PileReport) -> str:
         if len(pile.face_m):
             parts.append(markup.section("The pile from above", _picture(pile_charts.above_chart(report, pile), ABOVE)))
             parts.append(markup.section("The face from the side", _picture(pile_charts.cut_chart(report, pile), CUT)))
-            parts.append(markup.section("The face from the machine", _picture(pile_charts.relief_chart(pile), RELIEF)))
+            parts.append(
+                markup.section("The face from the machine", _picture(pile_charts.relief_chart(report, pile), RELIEF))
+            )
         if any(one.estimate.found and math.isfinite(one.distance_m) for one in report.history):
             picture = _picture(pile_charts.convergence_chart(report), CONVERGENCE)
             parts.append(markup.section("How the estimate converged", picture))
@@ -69,12 +71,13 @@ def _figures(report: PileReport, pile: PileEstimate) -> Iterator[tuple[str, str,
     chance = 100.0 * pile.probabilities.get(pile.status, 0.0)
     yield "status", pile.status.replace("_", " "), f"{_MEANING[pile.status]}; probability {chance:.0f} %"
     if pile.found:
-        yield "width", f"{pile.width_m:.2f} ± {pile.width_std_m:.2f} m", "wall to wall before the face"
-        slope = f"{pile.inclination_deg:.1f} ± {pile.inclination_std_deg:.1f}°"
-        yield "inclination", slope, "0 is the floor, -90 an upright wall"
+        width = f"± {pile.width_std_m:.2f} m, one standard deviation; wall to wall before the face"
+        yield "width", f"{pile.width_m:.2f} m", width
+        slope = f"± {pile.inclination_std_deg:.1f}°; 0 is the floor, -90 an upright wall"
+        yield "inclination", f"{pile.inclination_deg:.1f}°", slope
     if math.isfinite(pile.volume_m3):
-        value = f"{pile.volume_m3:.1f} ± {pile.volume_std_m3:.1f} m³"
-        yield "volume", value, "above the floor, as far up as the face was seen"
+        volume = f"± {pile.volume_std_m3:.1f} m³; above the floor, as far up as the face was seen"
+        yield "volume", f"{pile.volume_m3:.1f} m³", volume
     if report.decision is not None:
         distance = report.decision.distance_m
         status = report.decision.estimate.status.replace("_", " ")
