@@ -13,6 +13,7 @@ from lhdmap.evaluation.trajectory import TrajectoryEvaluation
 from lhdmap.integration.cloud import Cloud
 from lhdmap.mapfolder import Diagnostics
 from lhdmap.messages import FloatArray
+from lhdmap.pile.result import PileReport
 from lhdmap.trajectory import Trajectory
 
 
@@ -72,6 +73,7 @@ class ReportData:
     tachometer_speed: SpeedSeries | None = None
     articulation: AngleSeries | None = None
     has_inclinometer: bool = True
+    pile: PileReport | None = None
     warnings: Sequence[str] = ()
     settings_text: str = ""
     provenance: Mapping[str, str] = field(default_factory=dict)

@@ -6,7 +6,7 @@ import html
 from collections.abc import Sequence
 from pathlib import Path
 
-from lhdmap.report import charts, cloud_charts, markup, path_charts, series_charts, text
+from lhdmap.report import charts, cloud_charts, markup, path_charts, pile_page, series_charts, text
 from lhdmap.report.data import ReportData, TopicRow
 
 FLAGGED_NOTE = (
@@ -30,6 +30,7 @@ def render_report(data: ReportData) -> str:
             markup.section("Path", _path(data)),
             markup.section("Against the truth", _truth(data)),
             markup.section("Cloud", _cloud(data)),
+            "" if data.pile is None else pile_page.pile_sections(data.pile),
             markup.section("Speed and slip", _speed(data)),
             markup.section("Information over the drive", _information(data)),
             markup.section("What was in the log", _topics(data.topics)),

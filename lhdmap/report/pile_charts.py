@@ -103,7 +103,7 @@ def relief_chart(report: PileReport, pile: PileEstimate) -> Figure:
     face = frame.local(np.concatenate([pile.face_m, report.around_m]))
     proud = _proud(frame, pile, face)
     near = (proud > -0.8) & (proud < 1.6) & (face[:, 2] > 0.05) & (face[:, 2] < 3.0)
-    near &= np.abs(face[:, 1]) < frame.half_m - 0.12
+    near &= (np.abs(face[:, 1]) < frame.half_m - 0.12) & ~((face[:, 2] < _FLOOR_M) & (proud > 0.5 * _FLOOR_M))
     face, proud = face[near], proud[near]
     top = max(float(face[:, 2].max(initial=1.6)), 1.0) + 0.15
     figure = charts.new_figure(min(0.8 * charts.WIDTH_IN * top / (2.0 * frame.half_m) + 0.9, 5.0), right_in=0.95)
@@ -143,7 +143,7 @@ def convergence_chart(report: PileReport) -> Figure:
     for axes in rows:
         _decision(axes, report.decision)
     charts.legend_above(rows[0])
-    rows[2].legend(loc="center left", fontsize=8.0)
+    rows[2].legend(loc="center right", fontsize=8.0)
     rows[0].invert_xaxis()
     return figure
 

@@ -107,5 +107,5 @@ def _tables(pile: PileEstimate) -> str:
 
 
 def _xyz(point_m: FloatArray) -> tuple[str, str, str]:
-    x, y, z = (f"{value:.2f}" for value in point_m)
+    x, y, z = (f"{round(float(value), 2) + 0.0:.2f}" for value in point_m)
     return x, y, z
