@@ -13,6 +13,7 @@ from lhdmap.errors import ConfigError
 from lhdmap.integration.integrator import IntegrationSettings
 from lhdmap.odometry.cloud_settings import CloudOdometrySettings
 from lhdmap.odometry.settings import AnchorSettings, OdometrySettings, RangeFlowSettings, SearchSettings
+from lhdmap.pile.figure9_settings import Figure9Constants, RepairedConstants
 from lhdmap.pile.settings import PileSettings
 from lhdmap.proprioception.attitude import AttitudeSettings
 from lhdmap.proprioception.slip import SlipSettings
@@ -42,6 +43,8 @@ class Settings:
     integration: IntegrationSettings = field(default_factory=IntegrationSettings)
     smoothing: SmoothingSettings = field(default_factory=SmoothingSettings)
     pile: PileSettings = field(default_factory=PileSettings)
+    figure9: Figure9Constants = field(default_factory=Figure9Constants)
+    figure9_repaired: RepairedConstants = field(default_factory=RepairedConstants)
     recording: RecordingSettings = field(default_factory=RecordingSettings)
 
 

@@ -31,6 +31,7 @@ FLOORS = [
     {"machine", "mapfolder"},
     {"kinematics"},
     {"logs", "proprioception", "odometry", "integration"},
+    {"pile"},
     {"smoothing", "simulation", "evaluation"},
     {"report"},
     {"config"},

@@ -106,7 +106,7 @@ def measure_drift(shell: Shell) -> tuple[PileEstimate, dict[str, Any]]:
 def _shell(points_m: FloatArray) -> Shell:
     points = voxelised(points_m, VOXEL_M)
     normals = estimate_normals(points, NORMAL_RADIUS_M).normals.astype(np.float64)  # type: ignore[arg-type]
-    known = normals.any(axis=1)
+    known: Mask = np.asarray(normals.any(axis=1))
     dense = float(known.mean()) if len(known) else 0.0
     points, normals = points[known], normals[known]
     columns = np.floor(points[:, :2] / _COLUMN_M).astype(np.int64)

@@ -67,7 +67,7 @@ def _plane(xy: FloatArray, z: FloatArray) -> tuple[FloatArray, npt.NDArray[np.bo
     used = np.ones(len(z), dtype=bool)
     values = np.zeros(3)
     for _ in range(6):
-        values = np.linalg.lstsq(design[used], z[used], rcond=None)[0]
+        values = np.linalg.lstsq(design[used], z[used], rcond=None)[0].astype(np.float64)
         rest = z - design @ values
         spread = 1.4826 * float(np.median(np.abs(rest[used] - np.median(rest[used]))))
         used = np.abs(rest) <= max(2.5 * spread, 1e-9)

@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from lhdmap.messages import FloatArray
-from lhdmap.pile.corridor import trace
+from lhdmap.pile.corridor import Corridor, trace
 from lhdmap.pile.end_frame import Frame2, end_of, floor_before
 from lhdmap.pile.face import Face, Registration, find, fit
 from lhdmap.pile.tilt import Tilt
@@ -25,6 +25,7 @@ _WALL_GAP_M = 0.3
 _CLEAR_M = 0.08
 _WALL_CELL_M = 0.1
 _MOUTH_M = 1.2
+_BLURRED_DEG = 5.0
 _ROUND_M = 9.0  # what lies farther from the face says nothing of it
 _WALL_SLACK_M = 0.45  # a wall at the face stands no farther from the line of the wall before
 _FEWEST_HITS = 40
@@ -99,6 +100,17 @@ def look(hits: FloatArray, view: View, reach_m: float, rng: np.random.Generator)
     seed = find(local[inside], rng, known) if inside.sum() >= _FEWEST_HITS else None
     if seed is None:
         return None
+    scene = _measured(view, local, corridor, seed)
+    if known is not None and (scene is None or scene.face.inclination_std_deg > _BLURRED_DEG):
+        again = _measured(view, local, corridor, known)  # chance picked something else than the face of before
+        if again is not None and (scene is None or again.face.inclination_std_deg < scene.face.inclination_std_deg):
+            return again
+    return scene
+
+
+def _measured(view: View, local: FloatArray, corridor: Corridor, seed: FloatArray) -> Scene | None:
+    """Return the scene of a face x = a + b y + c z in the machine's frame, with the end's frame and its limits."""
+    base = view.base
     face_x = _crossing(seed, corridor.centre_at)
     end = end_of(corridor, face_x)
     if end is None:

@@ -22,8 +22,8 @@ from lhdmap.machine import Machine
 from lhdmap.mapfolder import MapFolderWriter, MapInfo
 from lhdmap.messages import Joints, LaserScan, Message, PointCloud
 from lhdmap.pile.result import PileReport
-from lhdmap.pile.run import identify_along
 from lhdmap.pipeline.given import given_rows
+from lhdmap.pipeline.identify import identify_along
 from lhdmap.pipeline.interruption import Interruption
 from lhdmap.pipeline.mapping import MappingPipeline
 from lhdmap.pipeline.sweeps import SweepIntegration
@@ -182,6 +182,7 @@ class _Outcome:
             tachometer_speed=records.tachometer(),
             articulation=records.articulation(),
             has_inclinometer=self.pipeline.has_inclinometer,
+            pile=self.pile,
             warnings=self.warnings,
             settings_text=settings_toml(self.request.settings),
             provenance={"log": ", ".join(path.name for path in self.request.logs)},

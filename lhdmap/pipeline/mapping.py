@@ -33,9 +33,8 @@ from lhdmap.odometry.planar import PlanarOdometry, View
 from lhdmap.odometry.scan_points import NO_BOXES, half_sweep_ns
 from lhdmap.odometry.start import ScanInput, starting_velocity
 from lhdmap.odometry.steps import OdometryStep, WheelStep
-from lhdmap.pile.stage import PileStage
 from lhdmap.pipeline.mounts import Mounts, level_sensor
-from lhdmap.pipeline.pile import scan_hits
+from lhdmap.pipeline.pile import pile_stage, scan_hits
 from lhdmap.pipeline.rear import RearScans
 from lhdmap.pipeline.records import ScanRecords
 from lhdmap.pipeline.sweeps import ScanSink, SweepIntegration
@@ -78,7 +77,7 @@ class MappingPipeline:
         self.track = Track(settings.odometry.height_lever_m)
         self.records = ScanRecords()
         self.smoother = Smoother(settings.smoothing)
-        self.pile = PileStage(settings.pile) if settings.pile.method != "off" and primary == "front" else None
+        self.pile = pile_stage(settings) if primary == "front" else None
         self._cloud = cloud
         self.rear = RearScans(self.mounts, self.wheels, machine or _DEFAULT_MACHINE)
         self.has_inclinometer = False

@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 
+from lhdmap.config import Settings
 from lhdmap.geometry import se2
 from lhdmap.messages import FloatArray, LaserScan
 from lhdmap.odometry.scan_points import planar_points
-from lhdmap.pile.stage import ScanHits
+from lhdmap.pile.face import Registration
+from lhdmap.pile.figure9_stage import Figure9Stage
+from lhdmap.pile.stage import PileStage, ScanHits
 
 
 def scan_hits(
@@ -26,3 +29,15 @@ def scan_hits(
     hits = se2.transform(np.array([pose[0], pose[1], pose[3]]), points)
     hits[:, 2] = points[:, 2] + pose[2]
     return ScanHits(scan.stamp_ns, hits, pose)
+
+
+def pile_stage(settings: Settings, registration: Registration | None = None) -> PileStage | Figure9Stage | None:
+    """Return the stage of `pile.method`, None for `off`; `registration`: how far poses may be wrong, if not as set."""
+    match settings.pile.method:
+        case "off":
+            return None
+        case "figure9":
+            return Figure9Stage(settings.pile, settings.figure9)
+        case "figure9_repaired":
+            return Figure9Stage(settings.pile, settings.figure9_repaired)
+    return PileStage(settings.pile, registration)

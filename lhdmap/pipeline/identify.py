@@ -13,18 +13,18 @@ from lhdmap.errors import InputError
 from lhdmap.geometry import se3
 from lhdmap.logs.source import LogSource
 from lhdmap.machine import Machine
-from lhdmap.messages import LaserScan, Mount
+from lhdmap.messages import FloatArray, LaserScan, Mount
 from lhdmap.odometry.scan_points import half_sweep_ns
 from lhdmap.pile.face import Registration
 from lhdmap.pile.result import PileReport
-from lhdmap.pile.stage import PileStage
 from lhdmap.pipeline.given import given_rows
 from lhdmap.pipeline.mapping import MappingPipeline, own_boxes
 from lhdmap.pipeline.mounts import Mounts, level_sensor
-from lhdmap.pipeline.pile import scan_hits
+from lhdmap.pipeline.pile import pile_stage, scan_hits
 from lhdmap.pipeline.track import FinalTrack, Rows
 
 _ROLES = ("tf_static", "front", "rear", "inclinometer", "joints", "tachometer", "wheel_odometry")
+_HALF_STEP_NS = 25_000_000
 _GIVEN_POSES = Registration(scale=2e-4, pitch_rad=math.radians(0.15))  # the mounting's tilt is still the log's
 
 
@@ -58,7 +58,9 @@ def identify_along(
 ) -> PileReport:
     """Run the pile stage alone, on poses that are known: given ones, or those of a map whose loops were closed."""
     track, mounts = FinalTrack(rows), Mounts(machine)
-    stage, boxes = PileStage(settings.pile, _GIVEN_POSES), own_boxes(machine, settings.integration.body_margin_m)
+    stage, boxes = pile_stage(settings, _GIVEN_POSES), own_boxes(machine, settings.integration.body_margin_m)
+    if stage is None:
+        return PileReport(None, None, method=settings.pile.method)
     with LogSource(list(logs), topics) as source:
         for _, message in source.messages([role for role in ("tf_static", "front") if role in source.roles]):
             if isinstance(message, Mount):
@@ -71,5 +73,15 @@ def identify_along(
                 roll, pitch, heading = se3.to_rpy(T)
                 pose = np.array([*T[:3, 3], heading])
                 T_level_sensor = level_sensor(mounts.of(message.frame_id, "front"), roll, pitch)
-                stage.update(scan_hits(message, T_level_sensor, np.zeros(3), boxes, pose))
+                velocity = _velocity(track, time_ns)
+                stage.update(scan_hits(message, T_level_sensor, velocity, boxes, pose))
     return stage.report()
+
+
+def _velocity(track: FinalTrack, time_ns: int) -> FloatArray:
+    """Return forward, lateral and turning speed (3,) at a time, from the poses around it."""
+    before, after = track.matrices_at(np.array([time_ns - _HALF_STEP_NS, time_ns + _HALF_STEP_NS]))
+    step = np.linalg.inv(before) @ after
+    duration_s = 2e-9 * _HALF_STEP_NS
+    velocity: FloatArray = np.array([step[0, 3], step[1, 3], math.atan2(step[1, 0], step[0, 0])]) / duration_s
+    return velocity
