@@ -37,8 +37,9 @@ def run(arguments: argparse.Namespace, console: Console) -> int:
     from lhdmap.config import load_settings, settings_table
     from lhdmap.machine import load_machine
     from lhdmap.mapfolder import MapFolderWriter, MapInfo
-    from lhdmap.pile.run import identify
+    from lhdmap.pipeline.identify import identify
     from lhdmap.report.pile_page import write_pile_report
+    from lhdmap.report.pile_recording import write_pile_recording
 
     settings = load_settings(arguments.config, arguments.set)
     machine = load_machine(arguments.machine) if arguments.machine else None
@@ -47,6 +48,7 @@ def run(arguments: argparse.Namespace, console: Console) -> int:
         values = report.to_json()
         folder.write_json("pile.json", values)
         write_pile_report(report, folder.path / "report.html", f"Ore pile, {arguments.input.name}")
+        write_pile_recording(report, folder.path / "pile.rrd", arguments.input.name)
         path = folder.complete(MapInfo([arguments.input], settings_table(settings), warnings=values["warnings"]))
     for text in values["warnings"]:
         console.warn(text)

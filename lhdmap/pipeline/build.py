@@ -33,6 +33,7 @@ from lhdmap.provenance import source_entry
 from lhdmap.report import charts
 from lhdmap.report.data import ReportData, Summary, TopicRow
 from lhdmap.report.page import write_report
+from lhdmap.report.pile_recording import add_pile
 from lhdmap.report.recording import RecordingWriter, record_run
 from lhdmap.smoothing.smoother import corrected
 from lhdmap.trajectory import Trajectory
@@ -220,6 +221,8 @@ def _write(folder: MapFolderWriter, outcome: _Outcome, recording: RecordingWrite
         folder.write_json("pile.json", outcome.pile.to_json())
     data = outcome.report()
     record_run(recording, data, outcome.pipeline.machine or Machine(bodies={}))
+    if outcome.pile is not None:
+        add_pile(recording, outcome.pile)
     write_report(data, folder.path / "report.html")
 
 

@@ -106,6 +106,10 @@ class RecordingWriter:
         self._at(self._start_ns if stamp_ns is None else stamp_ns)
         self._stream.log("log", self._rr.TextLog(text, level=level))
 
+    def add_shape(self, entity: str, shape: Any) -> None:
+        """Record something that is there all the time."""
+        self._stream.log(entity, shape, static=True)
+
     def add_path(self, name: str, trajectory: Trajectory, rgba: int) -> None:
         """Record a whole trajectory as a line, 0xRRGGBBAA."""
         step = max(1, len(trajectory.positions_m) // 5000)
