@@ -235,6 +235,8 @@ def _mean_cells(
     x: FloatArray, y: FloatArray, values: FloatArray
 ) -> tuple[FloatArray, tuple[float, float, float, float]]:
     """Return the mean of values (N,) in cells, NaN where none is, and the extent x0, x1, y0, y1."""
+    if not len(values):
+        return np.full((1, 1), math.nan), (-1.0, 1.0, 0.0, 1.0)
     edges: list[npt.NDArray[np.float64]] = [
         np.arange(math.floor(float(a.min()) / _CELL_M), math.ceil(float(a.max()) / _CELL_M) + 1.5) * _CELL_M
         for a in (x, y)

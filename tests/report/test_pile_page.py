@@ -109,6 +109,12 @@ def test_any_inclination_is_drawn(report: PileReport, inclination_deg: float) ->
     assert len(_pictures(pile_sections(replace(report, last=last)))) == 4
 
 
+def test_fit_that_misses_its_own_face_is_drawn(report: PileReport) -> None:
+    """As those of the paper's constants may be: nothing is left to colour, and nothing falls over."""
+    far = pile(face_m=pile().face_m + np.array([0.0, 0.0, 50.0]))
+    assert len(_pictures(pile_sections(replace(report, last=Snapshot(0, 12.0, far), around_m=np.zeros((0, 3)))))) == 4
+
+
 def test_own_frame_of_the_pile() -> None:
     frame = Ahead.of(pile())
     assert math.remainder(frame.heading_rad - HEADING_RAD, 2.0 * math.pi) == pytest.approx(0.0, abs=1e-9)
