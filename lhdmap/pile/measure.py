@@ -102,11 +102,8 @@ def _attack(scene: Scene, seen: Relief) -> AttackPoint | None:
     limits = scene.limits
     left, right = limits.left_m - _MACHINE_HALF_M - 0.2, limits.right_m + _MACHINE_HALF_M + 0.2
     middle = 0.5 * (limits.left_m + limits.right_m)
-    columns = (
-        np.nan_to_num(np.nanmean(np.where(np.isfinite(seen.proud_m), seen.proud_m, np.nan), axis=0), nan=0.0)
-        if np.isfinite(seen.proud_m).any()
-        else np.zeros_like(seen.y_m)
-    )
+    seen_cells = np.isfinite(seen.proud_m)
+    columns = np.where(seen_cells, seen.proud_m, 0.0).sum(axis=0) / np.maximum(seen_cells.sum(axis=0), 1)
     weight = np.clip(0.3 + columns, 0.05, 1.0)
     y = float(np.clip(np.average(seen.y_m, weights=weight), min(right, middle), max(left, middle)))
     point = _toe(scene, np.array([y]))[0]

@@ -25,6 +25,7 @@ _WALL_GAP_M = 0.3
 _CLEAR_M = 0.08
 _WALL_CELL_M = 0.1
 _MOUTH_M = 1.2
+_WIDER_M = 0.22  # a wall at the face so much farther out is a stope's: the drift's mouth counts
 _BLURRED_DEG = 5.0
 _ROUND_M = 9.0  # what lies farther from the face says nothing of it
 _WALL_SLACK_M = 0.45  # a wall at the face stands no farther from the line of the wall before
@@ -186,7 +187,7 @@ def _limits(points: FloatArray, face: Face, floor_m: float, half_m: float) -> Li
     off = max(0.15, 0.2 * math.sqrt(1.0 + face.c**2))
     at_face = (before > -0.75 - off) & (before < -off) & (height > 0.3) & (height < 1.5)
     sides = [_wall(points, at_face, side, half_m) for side in (1.0, -1.0)]
-    opens = any(side is None for side in sides)
+    opens = any(side is None or side[0] > half_m + _WIDER_M for side in sides)
     if opens:
         drift = (before > -8.0) & (before < -0.15 - off) & (height > 0.3) & (height < 1.5)
         sides = [_mouth(points, drift, side, half_m) for side in (1.0, -1.0)]

@@ -25,6 +25,7 @@ FILES = {
     "odometry.tum",
     "diagnostics.parquet",
     "cloud.ply",
+    "pile.json",
     "recording.rrd",
     "report.html",
 }
