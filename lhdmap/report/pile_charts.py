@@ -81,11 +81,8 @@ def cut_chart(report: PileReport, pile: PileEstimate) -> Figure:
     _dots(axes, x, face[:, 2], FACE, "face, at its own place of the toe")
     heights = np.linspace(0.0, max(2.0, float(face[:, 2].max(initial=0.0))), 40)
     hinge = float(np.median(face[:, 2])) if len(face) else 0.8
-    x_fit = slope * heights
-    ends = [
-        slope * hinge + _slope(pile.inclination_deg + k * pile.inclination_std_deg) * (heights - hinge)
-        for k in (-2.0, 2.0)
-    ]
+    x_fit, std_deg = slope * heights, float(np.nan_to_num(pile.inclination_std_deg))
+    ends = [slope * hinge + _slope(pile.inclination_deg + k * std_deg) * (heights - hinge) for k in (-2.0, 2.0)]
     axes.fill_betweenx(
         heights, ends[0], ends[1], color=charts.ODOMETRY, alpha=0.35, linewidth=0, label="± 2 deviations"
     )
@@ -185,7 +182,7 @@ def _limits(axes: Axes, frame: Ahead, pile: PileEstimate) -> None:
     ends = frame.local(np.vstack([pile.left_limit_m, pile.right_limit_m]))
     axes.errorbar(
         *(ends[:, 0], ends[:, 1]),
-        yerr=2.0 * pile.width_std_m / math.sqrt(2.0),
+        yerr=2.0 * float(np.nan_to_num(pile.width_std_m)) / math.sqrt(2.0),
         fmt="D",
         color=charts.INK,
         markersize=4.5,
@@ -221,7 +218,9 @@ def _attack(axes: Axes, frame: Ahead, pile: PileEstimate) -> None:
 
 
 def _toe_at(toe: FloatArray, y: FloatArray) -> FloatArray:
-    """Return x of the toe (K, 3) at y (N,)."""
+    """Return x of the toe (K, 3) at y (N,); of one that is not known, zero: it runs from limit to limit."""
+    if not len(toe):
+        return np.zeros_like(y)
     order = np.argsort(toe[:, 1])
     return np.interp(y, toe[order, 1], toe[order, 0])
 
@@ -249,7 +248,7 @@ def _mean_cells(
 
 def _band(axes: Axes, x: FloatArray, values: FloatArray, name: str, least: float) -> None:
     """Draw values and deviations (N, 2) as a line in a band; the scale follows the nearer half."""
-    middle, std = values.T
+    middle, std = values[:, 0], np.nan_to_num(values[:, 1])  # a method may not know its deviation
     axes.fill_between(x, middle - 2.0 * std, middle + 2.0 * std, color=charts.FINAL, alpha=0.25, linewidth=0)
     axes.plot(x, middle, ".-", color=charts.FINAL, markersize=3.0)
     near = np.argsort(x)[: max(len(x) * 2 // 3, 1)]

@@ -7,6 +7,8 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from lhdmap.messages import FloatArray
 from lhdmap.pile.result import STATUSES, PileEstimate, PileReport
 from lhdmap.report import charts, markup, pile_charts
@@ -49,7 +51,7 @@ def pile_sections(report: PileReport) -> str:
         words = "No face was found that closes the drift, so there is nothing to draw.\n"
         return "".join([*parts, f"<p>{words}</p>\n"])
     with charts.styled():
-        if len(pile.face_m):
+        if len(pile.face_m) and np.isfinite([pile.left_limit_m, pile.right_limit_m]).all():
             parts.append(markup.section("The pile from above", _picture(pile_charts.above_chart(report, pile), ABOVE)))
             parts.append(markup.section("The face from the side", _picture(pile_charts.cut_chart(report, pile), CUT)))
             parts.append(
@@ -71,12 +73,12 @@ def _figures(report: PileReport, pile: PileEstimate) -> Iterator[tuple[str, str,
     chance = 100.0 * pile.probabilities.get(pile.status, 0.0)
     yield "status", pile.status.replace("_", " "), f"{_MEANING[pile.status]}; probability {chance:.0f} %"
     if pile.found:
-        width = f"± {pile.width_std_m:.2f} m, one standard deviation; wall to wall before the face"
+        width = f"{_deviation(pile.width_std_m, 2, ' m')}, one standard deviation; wall to wall before the face"
         yield "width", f"{pile.width_m:.2f} m", width
-        slope = f"± {pile.inclination_std_deg:.1f}°; 0 is the floor, -90 an upright wall"
+        slope = f"{_deviation(pile.inclination_std_deg, 1, '°')}; 0 is the floor, -90 an upright wall"
         yield "inclination", f"{pile.inclination_deg:.1f}°", slope
     if math.isfinite(pile.volume_m3):
-        volume = f"± {pile.volume_std_m3:.1f} m³; above the floor, as far up as the face was seen"
+        volume = f"{_deviation(pile.volume_std_m3, 1, ' m³')}; above the floor, as far up as the face was seen"
         yield "volume", f"{pile.volume_m3:.1f} m³", volume
     if report.decision is not None:
         distance = report.decision.distance_m
@@ -104,6 +106,10 @@ def _tables(pile: PileEstimate) -> str:
         places.append((heading, *_xyz(pile.attack.point_m)))
     first = markup.table(("status", "probability, %", "meaning"), shares, numbers_from=1, numbers_to=2)
     return first + markup.table(("in map", "x, m", "y, m", "z, m"), places, numbers_from=1)
+
+
+def _deviation(value: float, digits: int, unit: str) -> str:
+    return f"± {value:.{digits}f}{unit}" if math.isfinite(value) else "± unknown"
 
 
 def _xyz(point_m: FloatArray) -> tuple[str, str, str]:

@@ -70,7 +70,7 @@ def _shapes(pile: PileEstimate) -> dict[str, Any]:
     pixels = rr.Radius.ui_points
     limits = np.vstack([pile.left_limit_m, pile.right_limit_m])
     across = (limits[0] - limits[1]) / max(float(np.linalg.norm(limits[0] - limits[1])), 1e-9)
-    reach = 2.0 * pile.width_std_m / math.sqrt(2.0) * across
+    reach = 2.0 * float(np.nan_to_num(pile.width_std_m)) / math.sqrt(2.0) * across
     shapes = {
         "face": rr.Points3D(pile.face_m, colors=residual_colours(pile.residuals_m), radii=pixels(2.5)),
         "toe": rr.LineStrips3D([pile.toe_m], colors=0xCC79A7FF, radii=pixels(2.5)),

@@ -115,6 +115,16 @@ def test_fit_that_misses_its_own_face_is_drawn(report: PileReport) -> None:
     assert len(_pictures(pile_sections(replace(report, last=Snapshot(0, 12.0, far), around_m=np.zeros((0, 3)))))) == 4
 
 
+def test_unknown_deviations_are_said(report: PileReport) -> None:
+    """The paper's method states none."""
+    nan = math.nan
+    bare = pile(width_std_m=nan, inclination_std_deg=nan, volume_m3=nan, volume_std_m3=nan, toe_m=np.zeros((0, 3)))
+    page = pile_sections(replace(report, last=Snapshot(0, 12.0, bare), history=(Snapshot(0, 12.0, bare),)))
+    assert len(_pictures(page)) == 4
+    assert "± unknown" in page
+    assert "nan" not in re.sub(r'src="[^"]+"', "", page)
+
+
 def test_own_frame_of_the_pile() -> None:
     frame = Ahead.of(pile())
     assert math.remainder(frame.heading_rad - HEADING_RAD, 2.0 * math.pi) == pytest.approx(0.0, abs=1e-9)
