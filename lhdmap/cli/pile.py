@@ -89,13 +89,18 @@ def _measures(values: dict[str, Any]) -> list[str]:
     chance = values["probabilities"][values["status"]]
     lines = [f"status       {values['status']} ({100 * chance:.0f} %)"]
     if values["width_m"] is not None:
-        lines.append(f"width        {values['width_m']:.2f} m ± {values['width_std_m']:.2f}")
+        lines.append(f"width        {values['width_m']:.2f} m{_deviation(values['width_std_m'], 2)}")
     if values["inclination_deg"] is not None:
-        lines.append(f"inclination  {values['inclination_deg']:.1f}° ± {values['inclination_std_deg']:.1f}")
+        lines.append(f"inclination  {values['inclination_deg']:.1f}°{_deviation(values['inclination_std_deg'], 1)}")
     if values["volume_m3"] is not None:
-        lines.append(f"volume seen  {values['volume_m3']:.1f} m³ ± {values['volume_std_m3']:.1f}")
+        lines.append(f"volume seen  {values['volume_m3']:.1f} m³{_deviation(values['volume_std_m3'], 1)}")
     lines.extend(f"boulder      {one['size_m']:.1f} m" for one in values["boulders"])
     return lines
+
+
+def _deviation(value: float | None, digits: int) -> str:
+    """Return the standard deviation in words; the paper's method states none."""
+    return "" if value is None else f" ± {value:.{digits}f}"
 
 
 def _cloud_text(values: dict[str, Any]) -> str:
