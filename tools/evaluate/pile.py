@@ -131,8 +131,9 @@ def table(rows: Sequence[Row], seeds: str) -> str:
     head = (
         "# The ore pile\n\nWritten by `python -m tools.evaluate.pile`; not edited by hand. Scenes of `lhdmap simulate pile` "
         f"({seeds}); truth from the mesh. At a true 15 m from the toe: errors of width (m) and inclination (deg) as median, mean "
-        "and 90th percentile of the absolute value, share within two standard deviations (width/inclination, %), inclination at 25 m, "
-        "status right (%), scenes that are not loadable and called so with more than 90 %, scenes with a boulder found.\n\n"
+        "and 90th percentile of the absolute value, share within two standard deviations (width/inclination, %), "
+        "inclination at 25 m, status right (%), "
+        "scenes that are not loadable and called so with more than 90 %, scenes with a boulder found.\n\n"
         "| variant | poses | n | width median | mean | p90 | inclination median | mean | p90 | in 2 σ | 25 m: median | mean | p90 "
         "| status | falsely loadable | boulders |\n" + "|---" * 16 + "|\n"
     )
