@@ -40,7 +40,11 @@ class Ahead(NamedTuple):
         """Return the frame of an estimate that was found."""
         across = pile.left_limit_m - pile.right_limit_m
         heading = math.atan2(-float(across[0]), float(across[1]))
-        return cls(0.5 * (pile.left_limit_m + pile.right_limit_m), heading, 0.5 * float(np.hypot(*across[:2])))
+        frame = cls(0.5 * (pile.left_limit_m + pile.right_limit_m), heading, 0.5 * float(np.hypot(*across[:2])))
+        if not len(pile.toe_m):
+            return frame
+        x, _, z = np.median(frame.local(pile.toe_m), axis=0)  # the limits of Fig. 9 are not at the toe
+        return frame._replace(origin_m=frame.origin_m + np.array([x * math.cos(heading), x * math.sin(heading), z]))
 
     def local(self, points_m: FloatArray) -> FloatArray:
         """Return points (N, 3) of the map in this frame."""
