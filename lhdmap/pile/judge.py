@@ -57,6 +57,7 @@ def probabilities(evidence: Evidence) -> dict[str, float]:
     closes = _ramp(evidence.covered, 0.4, 0.7) * (1.0 - _ramp(evidence.beyond, 0.1, 0.3))
     if angle > STEEP_DEG:  # the outer wall of a bend: on the inner side the drift goes on
         closes *= 1.0 - _ramp(evidence.gap_m, 1.2, 2.5)
+        closes *= 1.0 - _ramp(evidence.std_deg, 4.5, 7.0)  # ... is curved besides, and fits no plane
     if angle < FLOOR_DEG:
         closes = 0.0
     result = {name: share.get(name, 0.0) * closes for name in STATUSES}

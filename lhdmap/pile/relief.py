@@ -53,6 +53,7 @@ def relief(scene: Scene) -> Relief:
 def boulders(scene: Scene, seen: Relief) -> tuple[Boulder, ...]:
     """Return the connected patches that stand out of the face by more than rubble does."""
     proud = np.nan_to_num(seen.proud_m, nan=-1.0) > _PROUD_M
+    standing = np.nan_to_num(seen.proud_m, nan=-1.0) > 0.5 * _PROUD_M
     joined = ndimage.binary_closing(proud, np.ones((3, 3)))
     labels, count = ndimage.label(joined, np.ones((3, 3)))
     found = []
@@ -64,11 +65,11 @@ def boulders(scene: Scene, seen: Relief) -> tuple[Boulder, ...]:
         if cells.sum() * CELL_M**2 * slant < _PATCH_M2:
             continue
         y, z = seen.y_m[columns], seen.z_m[rows]
-        extent = max(float(np.ptp(y)), float(np.ptp(z)) * slant) + 2.0 * CELL_M
-        depth = float(seen.proud_m[rows, columns].max())
+        # its size is that of all that stands out about it: what is proud by more is only its top
+        foot_rows, foot_columns = np.nonzero(ndimage.binary_dilation(cells, iterations=2) & standing)
+        extent = max(float(np.ptp(foot_rows)), float(np.ptp(foot_columns))) * CELL_M + CELL_M
+        fronts = scene.face.x_at(y, z) - seen.proud_m[rows, columns] * slant
         middle_y, middle_z = 0.5 * float(y.min() + y.max()), 0.5 * float(z.min() + z.max())
-        front = scene.face.x_at(np.array(middle_y), np.array(middle_z))
-        # the middle of the rock lies behind its front by half its size
-        x = float(front) - depth * slant + 0.5 * extent
+        x = float(np.percentile(fronts, 10.0)) + 0.5 * extent  # its middle lies behind its front by half its size
         found.append(Boulder(scene.frame.map(np.array([x, middle_y, middle_z])), extent))
     return tuple(found)
