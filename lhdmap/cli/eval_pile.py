@@ -75,7 +75,7 @@ def run(arguments: argparse.Namespace, console: Console) -> int:
 def _runner(arguments: argparse.Namespace) -> Runner:
     """Return what identifies the pile in a log with the settings of the command line."""
     from lhdmap.config import load_settings
-    from lhdmap.pile.run import identify
+    from lhdmap.pipeline.identify import identify
 
     settings = load_settings(arguments.config, arguments.set)
     return lambda log: identify(log, settings, arguments.poses)
