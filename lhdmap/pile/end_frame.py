@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
@@ -13,6 +14,7 @@ from lhdmap.pile.corridor import BIN_M, Corridor
 _WALLS_M = 7.0  # length of wall before the face that its heading is taken from
 _FEWEST_BINS = 4
 _MOST_TURN = 0.35
+_STOPE_M = 0.35
 
 
 class Frame2(NamedTuple):
@@ -46,6 +48,20 @@ class End(NamedTuple):
     half_m: float
 
 
+def _mouth_first(corridor: Corridor, face_x_m: float) -> Callable[[FloatArray, float], float]:
+    """Return a rule that takes a wall (K,) of the drift before a stope where the line of the last metres runs outside it."""
+    before = (corridor.x_m < face_x_m - 5.0) & (corridor.x_m > face_x_m - 12.0)
+
+    def inside(wall: FloatArray, at_face_m: float) -> float:
+        seen = before & np.isfinite(wall)
+        if seen.sum() < _FEWEST_BINS:
+            return at_face_m
+        usual = float(np.median(wall[seen]))
+        return usual if at_face_m > usual + _STOPE_M else at_face_m
+
+    return inside
+
+
 def end_of(corridor: Corridor, face_x_m: float) -> End | None:
     """Return the end before a face at x, from the walls of the last metres; None where they were not seen."""
     last = (corridor.x_m < face_x_m - 0.8) & (corridor.x_m > face_x_m - _WALLS_M)
@@ -62,6 +78,8 @@ def end_of(corridor: Corridor, face_x_m: float) -> End | None:
     middle, half = float(corridor.centre_at(at)[0]), float(corridor.half_at(at)[0])
     if len(lines) == 2:
         left, right = (offset + own * (face_x_m - 0.5) for own, offset in lines)
+        inside = _mouth_first(corridor, face_x_m)
+        left, right = inside(corridor.left_m, left), -inside(-corridor.right_m, -right)
         middle, half = 0.5 * (left + right), 0.5 * (left - right)
     return End(math.atan(slope), middle, half)
 

@@ -14,7 +14,7 @@ from lhdmap.pile.surface import HIGH_M, LOW_M, Scene
 
 _UNSEEN_DEG = 5.0  # the slope of the heights that were not seen
 _DEFINITION_DEG = 0.4  # rubble within the height that the inclination is defined over
-_WIDTH_DEFINITION_M = 0.04
+_WIDTH_DEFINITION_M = 0.07
 _BEYOND_M = 1.5
 _WORTH = 0.5  # probability of a pile below which nobody should drive into it
 _MACHINE_HALF_M = 1.3
@@ -51,7 +51,8 @@ def measure(scene: Scene) -> PileEstimate:
         center_m=scene.frame.map(middle),
         left_limit_m=scene.frame.map(toe[0]),
         right_limit_m=scene.frame.map(toe[-1]),
-        width_m=limits.left_m - limits.right_m,
+        # in the plane of the face, which may stand askew; a mouth is what one sees along the drift
+        width_m=(limits.left_m - limits.right_m) * (1.0 if limits.opens else math.sqrt(1.0 + face.b**2)),
         width_std_m=math.sqrt(limits.left_std_m**2 + limits.right_std_m**2 + _WIDTH_DEFINITION_M**2),
         inclination_deg=face.inclination_deg,
         inclination_std_deg=std_deg,

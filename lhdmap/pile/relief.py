@@ -15,6 +15,7 @@ from lhdmap.pile.surface import Scene
 CELL_M = 0.1
 _PROUD_M = 0.28  # findings: a boulder protrudes by more, over more than _PATCH_M2
 _PATCH_M2 = 0.25
+_SMALLEST_M = 0.8  # smaller rocks go into the bucket
 
 
 class Relief(NamedTuple):
@@ -68,6 +69,8 @@ def boulders(scene: Scene, seen: Relief) -> tuple[Boulder, ...]:
         # its size is that of all that stands out about it: what is proud by more is only its top
         foot_rows, foot_columns = np.nonzero(ndimage.binary_dilation(cells, iterations=2) & standing)
         extent = max(float(np.ptp(foot_rows)), float(np.ptp(foot_columns))) * CELL_M + CELL_M
+        if extent < _SMALLEST_M:
+            continue
         fronts = scene.face.x_at(y, z) - seen.proud_m[rows, columns] * slant
         middle_y, middle_z = 0.5 * float(y.min() + y.max()), 0.5 * float(z.min() + z.max())
         x = float(np.percentile(fronts, 10.0)) + 0.5 * extent  # its middle lies behind its front by half its size
