@@ -86,6 +86,7 @@ def progress_of(console: Console) -> Any:
     """Return a wrapper that shows progress by the stamps of the messages."""
 
     def wrap(messages: Iterable[Any], duration_s: float) -> Iterable[Any]:
+        """Return the messages (role, message), shown as they go by."""
         start: list[int] = []
 
         def position(item: Any) -> float:

@@ -78,9 +78,10 @@ def _target(arguments: argparse.Namespace) -> Path:
 def _text(values: dict[str, Any], folder: Path) -> str:
     """Return the result in words."""
     lines = [f"folder       {folder}", *_measures(values)]
-    if values["identified"]:
-        lines.append(f"decided      {values['distance_at_decision_m']:.1f} m before the toe")
-    else:
+    distance_m = values["distance_at_decision_m"]
+    if distance_m is not None:
+        lines.append(f"decided      {distance_m:.1f} m before the toe")
+    elif not values["identified"]:
         lines.append("decided      no: not identified")
     return "\n".join(lines)
 

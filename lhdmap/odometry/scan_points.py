@@ -35,10 +35,9 @@ def planar_points(
     count = _points(
         scan.ranges_m,
         (scan.angle_min_rad, scan.angle_increment_rad, scan.time_increment_s),
-        (scan.range_min_m, scan.range_max_m),
+        (scan.range_min_m, scan.range_max_m, min_height_m),
         T_level_sensor,
         velocity,
-        min_height_m,
         boxes_m,
         every,
         out,
@@ -52,7 +51,7 @@ def half_sweep_ns(scan: LaserScan) -> int:
 
 
 @nb.njit(cache=True)
-def _points(ranges, sweep, limits, T, velocity, min_height, boxes, every, out):  # type: ignore[no-untyped-def]
+def _points(ranges, sweep, limits, T, velocity, boxes, every, out):  # type: ignore[no-untyped-def]
     angle_min, increment, beam_s = sweep
     middle_s = 0.5 * beam_s * max(ranges.size - 1, 0)
     count = 0
@@ -65,7 +64,7 @@ def _points(ranges, sweep, limits, T, velocity, min_height, boxes, every, out): 
         x = T[0, 0] * x_s + T[0, 1] * y_s + T[0, 3]
         y = T[1, 0] * x_s + T[1, 1] * y_s + T[1, 3]
         z = T[2, 0] * x_s + T[2, 1] * y_s + T[2, 3]
-        if z < min_height or _inside(x, y, z, boxes):
+        if z < limits[2] or _inside(x, y, z, boxes):
             continue
         after = i * beam_s - middle_s
         turn = velocity[2] * after

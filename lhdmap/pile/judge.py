@@ -12,12 +12,39 @@ from typing import NamedTuple
 
 from lhdmap.pile.result import STATUSES
 
-# bounds of |inclination| in degrees: findings, section 1
-SHALLOW_DEG, STEEP_DEG, UPRIGHT_DEG, OVERHANG_DEG = 28.0, 60.0, 81.0, 98.0
 _MODEL_STD_DEG = 1.5  # rubble over the height that is seen
 _SMOOTH_M = 0.075  # spread of bare rock, unless the drift's own walls are rougher: then theirs, and so much more
 _ROUGHER = 1.2
 FLOOR_DEG = 8.0  # flatter is floor that rises
+
+
+class Bounds(NamedTuple):
+    """Bounds of the steepness in degrees between too shallow, loadable, steep, upright and overhanging."""
+
+    shallow_deg: float = 28.0
+    steep_deg: float = 60.0
+    upright_deg: float = 81.0
+    overhang_deg: float = 98.0
+
+
+BOUNDS = Bounds()  # measured in simulated scenes
+
+
+class Shares(NamedTuple):
+    """What a normal distribution of the steepness has of each range; they add up to 1."""
+
+    shallow: float
+    loadable: float
+    steep: float
+    upright: float
+    overhang: float
+
+
+def shares(steepness_deg: float, std_deg: float, bounds: Bounds = BOUNDS) -> Shares:
+    """Return the share of each range; rubble over the height that is seen adds to the standard deviation."""
+    std = math.hypot(std_deg, _MODEL_STD_DEG)
+    a, b, c, d = (0.5 * math.erfc((steepness_deg - bound) / (std * math.sqrt(2.0))) for bound in bounds)
+    return Shares(a, b - a, c - b, d - c, 1.0 - d)
 
 
 class Evidence(NamedTuple):
@@ -40,22 +67,17 @@ class Evidence(NamedTuple):
 def probabilities(evidence: Evidence) -> dict[str, float]:
     """Return the probability of each status."""
     angle = -evidence.inclination_deg
-    std = math.hypot(evidence.std_deg, _MODEL_STD_DEG)
-
-    def below(bound_deg: float) -> float:
-        return 0.5 * math.erfc((angle - bound_deg) / (std * math.sqrt(2.0)))
-
+    part = shares(angle, evidence.std_deg)
     usual = max(_SMOOTH_M, _ROUGHER * evidence.walls_m)
     rough = _ramp(evidence.spread_m, usual, 1.25 * usual)
-    upright = below(OVERHANG_DEG) - below(UPRIGHT_DEG)
     share = {
-        "too_shallow": below(SHALLOW_DEG),
-        "loadable": below(STEEP_DEG) - below(SHALLOW_DEG),
-        "hang_up": below(UPRIGHT_DEG) - below(STEEP_DEG) + 1.0 - below(OVERHANG_DEG) + upright * rough,
-        "wall": upright * (1.0 - rough),
+        "too_shallow": part.shallow,
+        "loadable": part.loadable,
+        "hang_up": part.steep + part.overhang + part.upright * rough,
+        "wall": part.upright * (1.0 - rough),
     }
     closes = _ramp(evidence.covered, 0.4, 0.7) * (1.0 - _ramp(evidence.beyond, 0.1, 0.3))
-    if angle > STEEP_DEG:  # the outer wall of a bend: on the inner side the drift goes on
+    if angle > BOUNDS.steep_deg:  # the outer wall of a bend: on the inner side the drift goes on
         closes *= 1.0 - _ramp(evidence.gap_m, 1.2, 2.5)
         closes *= 1.0 - _ramp(evidence.std_deg, 4.5, 7.0)  # ... is curved besides, and fits no plane
     if angle < FLOOR_DEG:

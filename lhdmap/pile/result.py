@@ -74,7 +74,7 @@ class Snapshot(NamedTuple):
 class PileReport:
     """Outcome of a drive: the decision (None: not identified), the last estimate, and how it came about.
 
-    `around_m` (N, 3): hits around the pile in the map, thinned, for pictures.
+    `around_m` (N, 3): hits around the pile in the map, thinned, for pictures; `warnings`: what is to be said of the log.
     """
 
     decision: Snapshot | None
@@ -82,11 +82,13 @@ class PileReport:
     history: tuple[Snapshot, ...] = ()
     method: str = "surface"
     around_m: FloatArray = field(default_factory=lambda: np.zeros((0, 3)))
+    warnings: tuple[str, ...] = ()
 
     def to_json(self) -> dict[str, Any]:
         """Return the content of `pile.json`: the last estimate, and when and how far away it was decided."""
         best = self.last.estimate if self.last is not None else PileEstimate()
         table = estimate_json(best)
+        table["warnings"] = [*self.warnings, *best.warnings]
         table["method"] = self.method
         table["identified"] = self.decision is not None
         table["decided_at_ns"] = self.decision.stamp_ns if self.decision else None

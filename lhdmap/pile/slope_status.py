@@ -5,11 +5,8 @@ It is not safe where the slope is the only evidence: of a bare wall or a hang-up
 
 from __future__ import annotations
 
-import math
-
 from lhdmap.pile.figure9_settings import Figure9Constants
-
-_MODEL_STD_DEG = 1.5  # rubble over the height that is seen
+from lhdmap.pile.judge import Bounds, shares
 
 
 def status_of(inclination_deg: float, constants: Figure9Constants) -> str:
@@ -24,11 +21,11 @@ def status_of(inclination_deg: float, constants: Figure9Constants) -> str:
 
 def status_probabilities(inclination_deg: float, std_deg: float, constants: Figure9Constants) -> dict[str, float]:
     """Return the probability of each status: what a normal distribution of the steepness has of each one's range."""
-    steepness, std = abs(inclination_deg), math.hypot(std_deg, _MODEL_STD_DEG)
-
-    def below(bound_deg: float) -> float:
-        return 0.5 * math.erfc((steepness - bound_deg) / (std * math.sqrt(2.0)))
-
-    shallow, steep = below(constants.shallow_deg), below(constants.steep_deg)
-    wall = below(constants.overhang_deg) - below(constants.wall_deg)
-    return {"too_shallow": shallow, "loadable": steep - shallow, "wall": wall, "hang_up": 1.0 - steep - wall}
+    bounds = Bounds(constants.shallow_deg, constants.steep_deg, constants.wall_deg, constants.overhang_deg)
+    part = shares(abs(inclination_deg), std_deg, bounds)
+    return {
+        "too_shallow": part.shallow,
+        "loadable": part.loadable,
+        "wall": part.upright,
+        "hang_up": part.steep + part.overhang,
+    }

@@ -101,7 +101,12 @@ class PileStage:
             return self._take(Snapshot(scan.stamp_ns, math.nan, PileEstimate()))
         self._scene = scene
         warning = tilt.warning()
-        estimate = replace(measure(scene), warnings=() if warning is None else (warning,))
+        warnings = [] if warning is None else [warning]
+        if not scene.floor_seen:
+            warnings.append(
+                "the floor before the pile was not seen: the toe is where the machine's path would reach the face"
+            )
+        estimate = replace(measure(scene), warnings=tuple(warnings))
         distance = float(np.linalg.norm(estimate.toe_m - scan.T_map_base[:3], axis=1).min())
         return self._take(Snapshot(scan.stamp_ns, distance, estimate))
 

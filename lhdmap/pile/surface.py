@@ -68,12 +68,6 @@ class Scene(NamedTuple):
         found: FloatArray = np.linalg.solve(A, local[:, 0]).astype(np.float64)
         return found
 
-    @property
-    def toe_x_m(self) -> float:
-        """X of the toe in the middle."""
-        y = 0.5 * (self.limits.left_m + self.limits.right_m)
-        return self.face.a + self.face.b * y + self.face.c * self.floor_m
-
 
 class View(NamedTuple):
     """From where one looks: the machine's frame, the grade of its path (m/m, rising ahead), how far poses may be wrong."""
@@ -112,7 +106,7 @@ def look(hits: FloatArray, view: View, reach_m: float, rng: np.random.Generator)
 def _measured(view: View, local: FloatArray, corridor: Corridor, seed: FloatArray) -> Scene | None:
     """Return the scene of a face x = a + b y + c z in the machine's frame, with the end's frame and its limits."""
     base = view.base
-    face_x = _crossing(seed, corridor.centre_at)
+    face_x = _crossing(seed, corridor)
     end = end_of(corridor, face_x)
     if end is None:
         return None
@@ -124,11 +118,11 @@ def _measured(view: View, local: FloatArray, corridor: Corridor, seed: FloatArra
     return _refined(frame, frame.local(near), model, end.half_m, floor, view.registration)
 
 
-def _crossing(seed: FloatArray, centre_at) -> float:  # type: ignore[no-untyped-def]
+def _crossing(seed: FloatArray, corridor: Corridor) -> float:
     """Return x where the corridor's middle meets the face, at the height of the machine's floor."""
     x = float(seed[0])
     for _ in range(3):
-        x = float(seed[0] + seed[1] * centre_at(np.array([x]))[0])
+        x = float(seed[0] + seed[1] * corridor.centre_at(np.array([x]))[0])
     return x
 
 

@@ -26,6 +26,7 @@ from lhdmap.pipeline.given import given_rows
 from lhdmap.pipeline.identify import identify_along
 from lhdmap.pipeline.interruption import Interruption
 from lhdmap.pipeline.mapping import MappingPipeline
+from lhdmap.pipeline.mounts import machine_of
 from lhdmap.pipeline.sweeps import SweepIntegration
 from lhdmap.pipeline.track import FinalTrack, Rows, resample, trajectory_of
 from lhdmap.proprioception.wheels import WheelOdometry
@@ -84,7 +85,9 @@ def build_map(request: BuildRequest) -> BuildResult:
             RecordingWriter(folder.path / "recording.rrd", request.target.name, source.start_ns or 0) as recording,
         ):
             primary: Literal["front", "points"] = "front" if "front" in source.roles else "points"
-            pipeline = MappingPipeline(request.settings, _machine(request, source), _sweep_sink(recording), primary)
+            pipeline = MappingPipeline(
+                request.settings, machine_of(source, request.machine), _sweep_sink(recording), primary
+            )
             interrupted = _run(pipeline, source, request.progress)
             outcome = _Outcome(request, source, pipeline, started, given)
             _write(folder, outcome, recording)
@@ -165,7 +168,7 @@ class _Outcome:
             return None
         if not moved:
             return stage.report()
-        machine = self.pipeline.machine or Machine()
+        machine = self.pipeline.machine
         return identify_along(rows, request.logs, request.settings, machine, request.topics)
 
     def report(self) -> ReportData:
@@ -224,15 +227,6 @@ def _write(folder: MapFolderWriter, outcome: _Outcome, recording: RecordingWrite
     if outcome.pile is not None:
         add_pile(recording, outcome.pile)
     write_report(data, folder.path / "report.html")
-
-
-def _machine(request: BuildRequest, source: LogSource) -> Machine | None:
-    """Return the machine given, else the default loader where the log is one's (it has the joints of an LHD), else none."""
-    if request.machine is not None:
-        return request.machine
-    if "joints" in source.roles or ("rear" in source.roles and "tf_static" in source.roles):
-        return Machine()
-    return None
 
 
 def _sweep_sink(recording: RecordingWriter) -> Callable[[str, int, Any], None]:

@@ -4,26 +4,32 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
 from lhdmap.config import Settings
-from lhdmap.errors import InputError
+from lhdmap.errors import InputError, UsageError
 from lhdmap.geometry import se3
 from lhdmap.logs.source import LogSource
 from lhdmap.machine import Machine
 from lhdmap.messages import FloatArray, LaserScan, Mount
 from lhdmap.odometry.scan_points import half_sweep_ns
 from lhdmap.pile.face import Registration
-from lhdmap.pile.result import PileReport
+from lhdmap.pile.heap import measure_cloud
+from lhdmap.pile.result import PileReport, Snapshot
 from lhdmap.pipeline.given import given_rows
 from lhdmap.pipeline.mapping import MappingPipeline, own_boxes
-from lhdmap.pipeline.mounts import Mounts, level_sensor
+from lhdmap.pipeline.mounts import Mounts, level_sensor, machine_of
 from lhdmap.pipeline.pile import pile_stage, scan_hits
 from lhdmap.pipeline.track import FinalTrack, Rows
 
-_ROLES = ("tf_static", "front", "rear", "inclinometer", "joints", "tachometer", "wheel_odometry")
+_ROLES = ("tf_static", "front", "rear", "points", "inclinometer", "joints", "tachometer", "wheel_odometry")
+_LEVEL = (
+    "no inclinometer in the log: no pile was looked for, its slope shows only where roll and pitch are known; "
+    "--poses gives them"
+)
 _HALF_STEP_NS = 25_000_000
 _GIVEN_POSES = Registration(scale=2e-4, pitch_rad=math.radians(0.15))  # the mounting's tilt is still the log's
 
@@ -38,23 +44,56 @@ def identify(
     """Find and measure the pile at the end of the drive in `log`; `poses`, `machine`, `topics`: as for `build-map`.
 
     Raises:
-        InputError: the log holds no scan of a front scanner.
+        InputError: the log holds no usable scan.
+        UsageError: the settings say that no pile is looked for.
     """
-    if poses:
-        rows = given_rows(poses, [log], topics or {})
-        return identify_along(rows, [log], settings, machine or Machine(), topics)
+    if settings.pile.method == "off":
+        raise UsageError("pile.method = off: there is nothing to do; surface was wanted, or figure9")
     with LogSource([log], topics) as source:
-        pipeline = MappingPipeline(settings, machine or Machine(), cloud=False)
-        for role, message in source.messages([role for role in _ROLES if role in source.roles]):
-            pipeline.update(role, message)
-        pipeline.finish()
+        body = machine_of(source, machine)
+        told = (*source.warnings, *source.damage)
+        if "front" not in source.roles:
+            return _warned(_in_cloud(source, settings, body), told)
+        if poses:
+            rows = given_rows(poses, [log], topics or {})
+            return _warned(identify_along(rows, [log], settings, body, topics), (*told, *source.damage))
+        pipeline = MappingPipeline(settings, body, cloud=False)
+        _feed(pipeline, source)
     if pipeline.pile is None or not len(pipeline.track):
-        raise InputError(f"{log}: no scan of a front scanner in it; lhdmap doctor tells what is in it")
-    return pipeline.pile.report()
+        raise InputError(f"{log}: no usable scan of a front scanner in it; lhdmap doctor tells what is wrong")
+    level = () if pipeline.has_inclinometer else (_LEVEL,)
+    return _warned(pipeline.pile.report(), (*told, *source.damage, *pipeline.warnings, *level))
+
+
+def _feed(pipeline: MappingPipeline, source: LogSource) -> None:
+    for role, message in source.messages([role for role in _ROLES if role in source.roles]):
+        pipeline.update(role, message)
+    pipeline.finish()
+
+
+def _in_cloud(source: LogSource, settings: Settings, machine: Machine | None) -> PileReport:
+    """Look for the pile in the cloud of a 3D scanner: it sees the face at once, no drive is needed to climb it."""
+    pipeline = MappingPipeline(settings, machine, primary="points")
+    _feed(pipeline, source)
+    if not len(pipeline.track):
+        raise InputError(f"{source.paths[0]}: no usable cloud in it; lhdmap doctor tells what is wrong")
+    estimate = measure_cloud(pipeline.sweeps.cloud().points_m.astype(np.float64), "z").estimate
+    last = Snapshot(pipeline.track.last_ns or 0, math.nan, estimate)
+    decision = last if estimate.found and estimate.status != "none" else None
+    return PileReport(decision, last, (last,), "cloud")
+
+
+def _warned(report: PileReport, told: Sequence[str]) -> PileReport:
+    """Return the report with what is to be said of its log, each once."""
+    return replace(report, warnings=(*report.warnings, *dict.fromkeys(told)))
 
 
 def identify_along(
-    rows: Rows, logs: Sequence[Path], settings: Settings, machine: Machine, topics: Mapping[str, str] | None = None
+    rows: Rows,
+    logs: Sequence[Path],
+    settings: Settings,
+    machine: Machine | None,
+    topics: Mapping[str, str] | None = None,
 ) -> PileReport:
     """Run the pile stage alone, on poses that are known: given ones, or those of a map whose loops were closed."""
     track, mounts = FinalTrack(rows), Mounts(machine)

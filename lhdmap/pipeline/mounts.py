@@ -6,6 +6,7 @@ import numpy as np
 
 from lhdmap.geometry import se3
 from lhdmap.integration.self_filter import BODY_FRAMES
+from lhdmap.logs.source import LogSource
 from lhdmap.machine import Machine
 from lhdmap.messages import FloatArray, Mount
 
@@ -62,6 +63,15 @@ class Mounts:
             return Mount(0, "base_link", frame, se3.from_rpy(0.0, 0.0, np.pi))
         self.warnings.append(f"no mount of '{frame}' in the log: a level sensor at base_link is assumed")
         return Mount(0, "base_link", frame, np.eye(4))
+
+
+def machine_of(source: LogSource, given: Machine | None) -> Machine | None:
+    """Return the machine given, else the default loader where the log is one's (it has the joints of an LHD), else none."""
+    if given is not None:
+        return given
+    if "joints" in source.roles or ("rear" in source.roles and "tf_static" in source.roles):
+        return Machine()
+    return None
 
 
 def level_sensor(mount: Mount, roll_rad: float, pitch_rad: float) -> FloatArray:

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from lhdmap.config import Settings
+from lhdmap.geometry import se2, se3
 from lhdmap.kinematics import T_base_rear
 from lhdmap.logs.source import LogSource
 from lhdmap.machine import Machine
@@ -72,8 +73,8 @@ def log(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def end_error(log: Path, *, rear: bool, joint_deg: float = 0.0) -> tuple[float, float]:
-    """Return the error of the drive's end relative to its start: metres in the plane and degrees of heading."""
-    pipeline = MappingPipeline(Settings(), Machine())
+    """Return the error of the drive's end, seen from its start: metres in the plane and degrees of heading."""
+    pipeline = MappingPipeline(Settings(), Machine(), cloud=False)
     roles = ["front", "inclinometer", "joints", "tachometer", "tf_static"] + ["rear"] * rear
     with LogSource([log]) as source:
         for role, message in source.messages(roles):
@@ -83,19 +84,24 @@ def end_error(log: Path, *, rear: bool, joint_deg: float = 0.0) -> tuple[float, 
             pipeline.update(role, message)
     pipeline.finish()
     truth = read_tum(log.with_suffix(".truth.tum"))
-    true = np.hypot(*(truth.positions_m[-1] - truth.positions_m[0])[:2])
-    rows = pipeline.track.rows().poses
-    return abs(float(np.hypot(*(rows[-1] - rows[0])[:2])) - float(true)), float(rows[-1, 5] - rows[0, 5])
+    heading = se3.rpy_from_quaternions(truth.quaternions_xyzw)[:, 2]
+    true = [np.array([*truth.positions_m[k, :2], heading[k]]) for k in (0, -1)]
+    rows = pipeline.track.rows().poses[[0, -1]][:, [0, 1, 5]]
+    error = se2.between(se2.between(*true), se2.between(*rows))
+    return float(np.hypot(error[0], error[1])), abs(math.degrees(float(error[2])))
 
 
 def test_a_tilted_drive_gets_better_by_the_rear_scanner_and_survives_a_wrong_joint(log: Path) -> None:
-    without, _ = end_error(log, rear=False)
-    good, heading = end_error(log, rear=True)
-    wrong, turned = end_error(log, rear=True, joint_deg=0.3)
-    assert good < 0.06
-    assert good < without + 0.01
-    assert wrong < 0.12
-    assert math.degrees(abs(turned - heading)) < 0.8
+    """Ends of 40 m: the target of level drives, 0.05 %, is out of reach; 0.25 % is what the cloud's target needs."""
+    without_m, without_deg = end_error(log, rear=False)
+    good_m, good_deg = end_error(log, rear=True)
+    wrong_m, wrong_deg = end_error(log, rear=True, joint_deg=0.3)
+    assert good_m < 0.05
+    assert good_deg < 0.2
+    assert good_m < without_m
+    assert good_deg < without_deg
+    assert wrong_m < 0.15
+    assert wrong_deg < 0.5
 
 
 def test_the_rear_body_is_behind_the_joint() -> None:
