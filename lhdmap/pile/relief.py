@@ -6,25 +6,31 @@ import math
 from typing import NamedTuple
 
 import numpy as np
+import numpy.typing as npt
 from scipy import ndimage
 
 from lhdmap.messages import FloatArray
 from lhdmap.pile.result import Boulder
-from lhdmap.pile.surface import Scene
+from lhdmap.pile.surface import Mask, Scene
 
 CELL_M = 0.1
 _PROUD_M = 0.28  # findings: a boulder protrudes by more, over more than _PATCH_M2
-_PATCH_M2 = 0.25
+_PATCH_M2 = 0.2
 _SMALLEST_M = 0.8  # smaller rocks go into the bucket
+_ALONG_M = 0.15  # deviation of the depths in a cell of which the drift's own surface has more, a rock's front less
+_MIXED_M = 0.5  # the same of a cell that is left out: it holds a rock's edge and, farther back, the face
+_BY_WALL_M = 0.4  # what reaches less far from the wall is less than half the smallest boulder: the wall's own roughness
 
 
 class Relief(NamedTuple):
     """Cells (rows: height, columns: y): by how much the rock stands out along the normal (m, NaN: not seen).
 
-    `y_m`, `z_m`: middles of columns and rows, end frame.
+    `depth_std_m`: standard deviation of x of the hits in each cell (NaN: fewer than two); large where one looks along a
+    surface. `y_m`, `z_m`: middles of columns and rows, end frame.
     """
 
     proud_m: FloatArray
+    depth_std_m: FloatArray
     y_m: FloatArray
     z_m: FloatArray
 
@@ -42,37 +48,56 @@ def relief(scene: Scene) -> Relief:
     iy = np.clip(((points[near, 1] - limits.right_m) / CELL_M).astype(np.int64), 0, columns - 1)
     iz = np.clip((height[near] / CELL_M).astype(np.int64), 0, rows - 1)
     flat = iz * columns + iy
-    total = np.bincount(flat, proud[near], rows * columns)
-    count = np.bincount(flat, minlength=rows * columns)
-    with np.errstate(invalid="ignore"):
-        mean = np.where(count > 0, total / np.maximum(count, 1), math.nan).reshape(rows, columns)
+    shape = (rows, columns)
+    mean, _ = _moments(flat, proud[near], shape)
+    _, depth_std = _moments(flat, points[near, 0], shape)
     y: FloatArray = limits.right_m + (np.arange(columns, dtype=np.float64) + 0.5) * CELL_M
     z: FloatArray = scene.floor_m + (np.arange(rows, dtype=np.float64) + 0.5) * CELL_M
-    return Relief(mean, y, z)
+    return Relief(mean, depth_std, y, z)
+
+
+def _moments(flat: npt.NDArray[np.int64], values: FloatArray, shape: tuple[int, int]) -> tuple[FloatArray, FloatArray]:
+    """Return mean and standard deviation of the values in each cell; NaN where there are none, or fewer than two."""
+    size = shape[0] * shape[1]
+    count = np.bincount(flat, minlength=size)
+    mean = np.bincount(flat, values, size) / np.maximum(count, 1)
+    variance = np.bincount(flat, (values - mean[flat]) ** 2, size) / np.maximum(count - 1, 1)
+    std = np.where(count > 1, np.sqrt(variance), math.nan)
+    return np.where(count > 0, mean, math.nan).reshape(shape), std.reshape(shape)
 
 
 def boulders(scene: Scene, seen: Relief) -> tuple[Boulder, ...]:
-    """Return the connected patches that stand out of the face by more than rubble does."""
-    proud = np.nan_to_num(seen.proud_m, nan=-1.0) > _PROUD_M
-    standing = np.nan_to_num(seen.proud_m, nan=-1.0) > 0.5 * _PROUD_M
-    joined = ndimage.binary_closing(proud, np.ones((3, 3)))
-    labels, count = ndimage.label(joined, np.ones((3, 3)))
-    found = []
-    for index in range(1, count + 1):
-        patch = labels == index
-        cells = patch & proud
-        rows, columns = np.nonzero(cells)
-        slant = math.sqrt(1.0 + scene.face.c**2)
-        if cells.sum() * CELL_M**2 * slant < _PATCH_M2:
-            continue
-        y, z = seen.y_m[columns], seen.z_m[rows]
-        # its size is that of all that stands out about it: what is proud by more is only its top
-        foot_rows, foot_columns = np.nonzero(ndimage.binary_dilation(cells, iterations=2) & standing)
-        extent = max(float(np.ptp(foot_rows)), float(np.ptp(foot_columns))) * CELL_M + CELL_M
-        if extent < _SMALLEST_M:
-            continue
-        fronts = scene.face.x_at(y, z) - seen.proud_m[rows, columns] * slant
-        middle_y, middle_z = 0.5 * float(y.min() + y.max()), 0.5 * float(z.min() + z.max())
-        x = float(np.percentile(fronts, 10.0)) + 0.5 * extent  # its middle lies behind its front by half its size
-        found.append(Boulder(scene.frame.map(np.array([x, middle_y, middle_z])), extent))
-    return tuple(found)
+    """Return the connected patches that stand out of the face by more than rubble does.
+
+    Walls, floor and roof stand out of the face, too, where they meet it. One looks along them: hits of many depths share a
+    cell, while the front of a rock has one.
+    """
+    across = np.nan_to_num(seen.depth_std_m, nan=0.0) < _MIXED_M
+    proud = (np.nan_to_num(seen.proud_m, nan=-1.0) > _PROUD_M) & across
+    standing = (np.nan_to_num(seen.proud_m, nan=-1.0) > 0.5 * _PROUD_M) & across
+    labels, count = ndimage.label(ndimage.binary_closing(proud, np.ones((3, 3))), np.ones((3, 3)))
+    found = [_boulder(scene, seen, (labels == index) & proud, standing) for index in range(1, count + 1)]
+    return tuple(one for one in found if one is not None)
+
+
+def _boulder(scene: Scene, seen: Relief, cells: Mask, standing: Mask) -> Boulder | None:
+    """Return the boulder of a patch; None where it is too small, or the drift's own surface."""
+    face, limits = scene.face, scene.limits
+    slant = math.sqrt(1.0 + face.c**2)
+    if cells.sum() * CELL_M**2 * slant < _PATCH_M2:
+        return None
+    rows, columns = np.nonzero(cells)
+    y, z = seen.y_m[columns], seen.z_m[rows]
+    depths = seen.depth_std_m[cells]
+    along = bool(np.isfinite(depths).any()) and float(np.nanmedian(depths)) > _ALONG_M
+    if along or min(limits.left_m - float(y.min()), float(y.max()) - limits.right_m) < _BY_WALL_M:
+        return None
+    # its size is that of all that stands out about it: what is proud by more is only its top
+    foot_rows, foot_columns = np.nonzero(ndimage.binary_dilation(cells, iterations=2) & standing)
+    extent = max(float(np.ptp(foot_rows)), float(np.ptp(foot_columns))) * CELL_M + CELL_M
+    if extent < _SMALLEST_M:
+        return None
+    fronts = face.x_at(y, z) - seen.proud_m[rows, columns] * slant
+    middle_y, middle_z = 0.5 * float(y.min() + y.max()), 0.5 * float(z.min() + z.max())
+    x = float(np.percentile(fronts, 10.0)) + 0.5 * extent  # its middle lies behind its front by half its size
+    return Boulder(scene.frame.map(np.array([x, middle_y, middle_z])), extent)
