@@ -6,10 +6,12 @@ import math
 from collections.abc import Callable
 from typing import NamedTuple
 
+import numba as nb
 import numpy as np
 
 from lhdmap.messages import FloatArray
 from lhdmap.pile.corridor import BIN_M, Corridor
+from lhdmap.pile.order import quantile
 
 _WALLS_M = 7.0  # length of wall before the face that its heading is taken from
 _FEWEST_BINS = 4
@@ -38,6 +40,21 @@ class Frame2(NamedTuple):
     def turned(self, at: FloatArray, turn_rad: float) -> Frame2:
         """Return the frame with its origin at a point (3,) of this one, turned left."""
         return Frame2(self.map(at), self.heading_rad + turn_rad)
+
+
+@nb.njit(cache=True, nogil=True)
+def turned_near(points, at, turn_rad, near_m):  # type: ignore[no-untyped-def]
+    """Return the hits (N, 4) less than `near_m` along x from a point `at` (2,), in the frame that begins there, turned left."""
+    c, s = math.cos(turn_rad), math.sin(turn_rad)
+    out = np.empty_like(points)
+    used = 0
+    for i in range(points.shape[0]):
+        x, y = points[i, 0] - at[0], points[i, 1] - at[1]
+        if abs(x) < near_m:
+            out[used, 0], out[used, 1] = c * x + s * y, c * y - s * x
+            out[used, 2], out[used, 3] = points[i, 2], points[i, 3]
+            used += 1
+    return out[:used]
 
 
 class End(NamedTuple):
@@ -94,12 +111,22 @@ def _line(x: FloatArray, y: FloatArray) -> tuple[float, float]:
     return slope, float(np.median(y - slope * x))
 
 
-def floor_before(points: FloatArray, toe_x_m: float, half_m: float) -> float | None:
-    """Return z of the floor in the metres before a toe, from hits (N, 3+) in the end frame; None where it was not seen."""
-    x, y, z = points[:, 0], points[:, 1], points[:, 2]
-    before = (x > toe_x_m - 5.0) & (x < toe_x_m - 0.4) & (np.abs(y) < half_m - 0.6)
-    if before.sum() < 12:
-        return None
-    low = np.percentile(z[before], 20.0)
-    flat = z[before & (z < low + 0.25)]
-    return float(np.median(flat)) if flat.size >= 12 else None
+@nb.njit(cache=True, nogil=True)
+def floor_before(points, toe_x_m, half_m):  # type: ignore[no-untyped-def]
+    """Return z of the floor in the metres before a toe, from hits (N, 3+) in the end frame; NaN where it was not seen."""
+    z = np.empty(points.shape[0])
+    before = 0
+    for i in range(points.shape[0]):
+        x = points[i, 0]
+        if x > toe_x_m - 5.0 and x < toe_x_m - 0.4 and abs(points[i, 1]) < half_m - 0.6:
+            z[before] = points[i, 2]
+            before += 1
+    if before < 12:
+        return math.nan
+    high = quantile(z, before, 0.2) + 0.25
+    flat = 0
+    for i in range(before):
+        if z[i] < high:
+            z[flat] = z[i]
+            flat += 1
+    return quantile(z, flat, 0.5) if flat >= 12 else math.nan

@@ -10,10 +10,11 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
+import numba as nb
 import numpy as np
-import numpy.typing as npt
 
 from lhdmap.messages import FloatArray
+from lhdmap.pile.order import cell_numbers, weighted_median
 
 CELL_M = 0.1
 BLOCK_M = 0.3  # rocks are as large: residuals of cells nearer than this are alike
@@ -63,72 +64,150 @@ def find(points: FloatArray, rng: np.random.Generator, known: FloatArray | None 
 
     `known` (3,): the face of the estimate before, tried as well.
     """
-    cells, first = np.unique(_cells(points, CELL_M), return_index=True)
-    thin = points[first]
-    if len(cells) < 12:
+    x, y, z = _first_of_cells(points, CELL_M)
+    if len(x) < 12:
         return None
-    picks = rng.integers(0, len(thin), (_TRIES, 3))
-    corners = thin[picks]
-    A = np.concatenate([np.ones((_TRIES, 3, 1)), corners[:, :, 1:3]], axis=2)
-    solvable = np.abs(np.linalg.det(A)) > 1e-3
-    models = np.linalg.solve(A[solvable], corners[solvable, :, :1])[:, :, 0]
-    likely = (models[:, 2] > _STEEPEST) & (models[:, 2] < _FLATTEST) & (np.abs(models[:, 1]) < _MOST_ASKEW)
-    models = models[likely]
-    if known is not None:
-        models = np.concatenate([models, known[None]])
-    if not len(models):
-        return None
-    off = thin[:, 0] - (models[:, :1] + models[:, 1:2] * thin[:, 1] + models[:, 2:3] * thin[:, 2])
-    near_m = _NEAR_M * np.maximum(1.0, np.abs(models[:, 2:3]))
-    # a flat model needs room along x for its rocks; it must not win by that
-    score = (np.clip(1.0 - np.abs(off) / near_m, 0.0, None)).sum(axis=1) / np.sqrt(near_m[:, 0] / _NEAR_M)
-    return models[int(score.argmax())]
+    picks = rng.integers(0, len(x), (_TRIES, 3))
+    tried = np.full((1, 3), math.nan) if known is None else known[None]
+    model: FloatArray = _most_on(x, y, z, picks, tried)
+    return model if math.isfinite(model[0]) else None
 
 
 def fit(points: FloatArray, start: FloatArray, registration: Registration) -> Face:
     """Refine a face by Tukey-weighted regression with one weight for each (y, z) cell; points rows x, y, z, travelled."""
-    points = points[:: 1 + len(points) // _MOST_POINTS]
-    weights = _cell_weights(points)
-    s = points[:, 3] - points[:, 3].mean()
-    J = np.column_stack([np.ones(len(points)), points[:, 1], points[:, 2], s])
-    model = np.array([*start, 0.0])
-    spread = 0.3
-    for _ in range(12):
-        prior = np.diag([0.0, 1.0 / 0.7**2, 1e-6, 1.0 / _drift_variance(registration, model[2])])
-        off = points[:, 0] - J @ model
-        flat = max(1.0, abs(float(model[2])))
-        spread = max(1.4826 * _weighted_median(np.abs(off), weights), 0.02 * flat)
-        u = off / (_TUKEY * spread)
-        w = weights * np.where(np.abs(u) < 1.0, (1.0 - u * u) ** 2, 0.0)
-        blocks = max(len(np.unique(_cells(points[w > 0.0], BLOCK_M))), 1)
-        w *= blocks / max(w.sum(), 1e-9) / spread**2
-        H = J.T @ (w[:, None] * J) + prior
-        change = np.linalg.solve(H, J.T @ (w * off) - prior @ np.array([0.0, model[1], 0.0, model[3]]))
-        model = model + change
-        if np.abs(change[:3]).max() < 1e-4:
-            break
+    thin = np.ascontiguousarray(points[:: 1 + len(points) // _MOST_POINTS])
+    model, H, spread, blocks = _regression(thin, start, registration.scale**2, registration.pitch_rad**2)
     a, b, c, drift = (float(value) for value in model)
     return Face(a, b, c, drift, np.linalg.inv(H), spread, blocks)
 
 
-def _drift_variance(registration: Registration, slope: float) -> float:
-    """Scale and pitch move the hits of a face alike: x by e s and, a pitch error d, by c d times the distance."""
-    return registration.scale**2 + (slope * registration.pitch_rad) ** 2 + 1e-10
+@nb.njit(cache=True, nogil=True)
+def _first_of_cells(points, cell_m):  # type: ignore[no-untyped-def]
+    """Return x, y, z of the first point in each (y, z) cell, by cell."""
+    numbers, count = cell_numbers(points[:, 1].copy(), points[:, 2].copy(), cell_m)
+    first = np.full(count, -1)
+    for i in range(numbers.size):
+        if first[numbers[i]] < 0:
+            first[numbers[i]] = i
+    thin = points[first[first >= 0]]
+    return thin[:, 0].copy(), thin[:, 1].copy(), thin[:, 2].copy()
 
 
-def _cells(points: FloatArray, cell_m: float) -> npt.NDArray[np.int64]:
-    """Return a number for the (y, z) cell of each point."""
-    cells = np.floor(points[:, 1:3] / cell_m).astype(np.int64)
-    return cells[:, 0] * 100_003 + cells[:, 1]
+@nb.njit(cache=True, nogil=True, fastmath={"reassoc", "nsz"})
+def _near_sum(x, y, z, model, near_m):  # type: ignore[no-untyped-def]
+    """Return how many points (K,) lie on a face: 1 for each that is on it, less for those that are off, down to 0."""
+    a, b, c = model
+    total, per_m = 0.0, 1.0 / near_m
+    for i in range(x.size):
+        total += max(1.0 - abs(x[i] - (a + b * y[i] + c * z[i])) * per_m, 0.0)
+    return total
 
 
-def _cell_weights(points: FloatArray) -> FloatArray:
+@nb.njit(cache=True, nogil=True)
+def _plane(x, y, z, pick):  # type: ignore[no-untyped-def]
+    """Return a, b, c of the face through three points; NaN where it is none or no likely one."""
+    i, j, k = pick
+    x1, y1, z1 = x[j] - x[i], y[j] - y[i], z[j] - z[i]
+    x2, y2, z2 = x[k] - x[i], y[k] - y[i], z[k] - z[i]
+    det = y1 * z2 - y2 * z1
+    if abs(det) <= 1e-3:
+        return math.nan, math.nan, math.nan
+    b, c = (x1 * z2 - x2 * z1) / det, (y1 * x2 - y2 * x1) / det
+    if c <= _STEEPEST or c >= _FLATTEST or abs(b) >= _MOST_ASKEW:
+        return math.nan, math.nan, math.nan
+    return x[i] - b * y[i] - c * z[i], b, c
+
+
+@nb.njit(cache=True, nogil=True)
+def _most_on(x, y, z, picks, known):  # type: ignore[no-untyped-def]
+    """Return a, b, c of the face with the best score of those through `picks` (K, 3) and of `known` (L, 3); NaN: none."""
+    best, most = np.full(3, math.nan), -1.0
+    for i in range(picks.shape[0] + known.shape[0]):
+        if i < picks.shape[0]:
+            model = _plane(x, y, z, (picks[i, 0], picks[i, 1], picks[i, 2]))
+        else:
+            last = known[i - picks.shape[0]]
+            model = (last[0], last[1], last[2])
+        if math.isnan(model[0]):
+            continue
+        # a flat model needs room along x for its rocks; it must not win by that
+        wider = max(1.0, abs(model[2]))
+        score = _near_sum(x, y, z, model, _NEAR_M * wider) / math.sqrt(wider)
+        if score > most:
+            best[0], best[1], best[2] = model
+            most = score
+    return best
+
+
+@nb.njit(cache=True, nogil=True)
+def _regression(points, start, scale_variance, pitch_variance):  # type: ignore[no-untyped-def]
+    """Return a, b, c, drift (4,), the information H (4, 4), the residuals' spread and the number of blocks."""
+    x, y, z, s = points[:, 0].copy(), points[:, 1].copy(), points[:, 2].copy(), points[:, 3] - points[:, 3].mean()
+    weights = _cell_weights(y, z)
+    blocks_of, most_blocks = cell_numbers(y, z, BLOCK_M)
+    seen = np.empty(most_blocks, np.bool_)
+    off, size, mass = np.empty(x.size), np.empty(x.size), np.empty(x.size)
+    model, prior, J = np.zeros(4), np.zeros(4), np.ones(4)
+    model[:3] = start
+    H, g, spread, blocks = np.zeros((4, 4)), np.zeros(4), 0.3, 1
+    for _ in range(12):
+        for i in range(x.size):
+            off[i] = x[i] - (model[0] + model[1] * y[i] + model[2] * z[i] + model[3] * s[i])
+            size[i], mass[i] = abs(off[i]), weights[i]
+        spread = max(1.4826 * weighted_median(size, mass), 0.02 * max(1.0, abs(model[2])))
+        H[:], g[:], seen[:], total = 0.0, 0.0, False, 0.0
+        for i in range(x.size):
+            u = off[i] / (_TUKEY * spread)
+            if abs(u) >= 1.0:
+                continue
+            w = weights[i] * (1.0 - u * u) ** 2
+            seen[blocks_of[i]], total = True, total + w
+            J[1], J[2], J[3] = y[i], z[i], s[i]
+            for k in range(4):
+                g[k] += w * off[i] * J[k]
+                for m in range(k + 1):
+                    H[k, m] += w * J[k] * J[m]
+        blocks = max(seen.sum(), 1)
+        scale = blocks / max(total, 1e-9) / spread**2
+        # scale and pitch move the hits of a face alike: x by e s and, a pitch error d, by c d times the distance
+        drift_variance = scale_variance + model[2] ** 2 * pitch_variance + 1e-10
+        prior[1], prior[2], prior[3] = 1.0 / 0.7**2, 1e-6, 1.0 / drift_variance
+        for k in range(4):
+            for m in range(k + 1):
+                H[k, m] *= scale
+                H[m, k] = H[k, m]
+            H[k, k] += prior[k]
+            g[k] = scale * g[k] - (prior[k] * model[k] if k != 2 else 0.0)
+        change = _solved(H, g)
+        model += change
+        if np.abs(change[:3]).max() < 1e-4:
+            break
+    return model, H, spread, blocks
+
+
+@nb.njit(cache=True, nogil=True)
+def _cell_weights(y, z):  # type: ignore[no-untyped-def]
     """Return weights (N,) that add up to 1 in each cell: near hits are many and must not outvote."""
-    _, inverse, counts = np.unique(_cells(points, CELL_M), return_inverse=True, return_counts=True)
-    return 1.0 / counts[inverse]
+    numbers, count = cell_numbers(y, z, CELL_M)
+    hits = np.zeros(count)
+    for number in numbers:
+        hits[number] += 1.0
+    return 1.0 / hits[numbers]
 
 
-def _weighted_median(values: FloatArray, weights: FloatArray) -> float:
-    order = np.argsort(values)
-    total = np.cumsum(weights[order])
-    return float(values[order[int(np.searchsorted(total, 0.5 * total[-1]))]])
+@nb.njit(cache=True, nogil=True)
+def _solved(H, g):  # type: ignore[no-untyped-def]
+    """Return the solution of H x = g, H symmetric and positive definite: elimination needs no pivots."""
+    A, x = H.copy(), g.copy()
+    size = x.size
+    for k in range(size):
+        for i in range(k + 1, size):
+            factor = A[i, k] / A[k, k]
+            x[i] -= factor * x[k]
+            for j in range(k, size):
+                A[i, j] -= factor * A[k, j]
+    for k in range(size - 1, -1, -1):
+        for j in range(k + 1, size):
+            x[k] -= A[k, j] * x[j]
+        x[k] /= A[k, k]
+    return x

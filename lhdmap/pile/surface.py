@@ -10,41 +10,26 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
+import numba as nb
 import numpy as np
 import numpy.typing as npt
 
 from lhdmap.messages import FloatArray
 from lhdmap.pile.corridor import Corridor, trace
-from lhdmap.pile.end_frame import Frame2, end_of, floor_before
+from lhdmap.pile.end_frame import Frame2, end_of, floor_before, turned_near
 from lhdmap.pile.face import Face, Registration, find, fit
+from lhdmap.pile.limits import Limits, limits_of
+from lhdmap.pile.order import quantile
 from lhdmap.pile.tilt import Tilt
 
 Mask = npt.NDArray[np.bool_]
 LOW_M, HIGH_M = 0.2, 1.6  # heights over the floor at the toe that the inclination is defined over
 _WALL_GAP_M = 0.3
 _CLEAR_M = 0.08
-_WALL_CELL_M = 0.1
-_MOUTH_M = 1.2
-_WIDER_M = 0.22  # a wall at the face so much farther out is a stope's: the drift's mouth counts
 _BLURRED_DEG = 5.0
 _ROUND_M = 9.0  # what lies farther from the face says nothing of it
-_WALL_SLACK_M = 0.45  # a wall at the face stands no farther from the line of the wall before
 _FEWEST_HITS = 40
 _FEWEST_BLOCKS = 6
-
-
-class Limits(NamedTuple):
-    """Left and right wall at the face, y in the end frame (m), with standard deviations.
-
-    `opens`: no wall reaches the face on some side; `gap_m`: length before the face on which the worse side's wall was not seen.
-    """
-
-    left_m: float
-    right_m: float
-    left_std_m: float
-    right_std_m: float
-    opens: bool
-    gap_m: float
 
 
 class Scene(NamedTuple):
@@ -81,18 +66,16 @@ class View(NamedTuple):
 
     def ahead(self, hits: FloatArray) -> FloatArray:
         """Return the hits (N, 4) that lie ahead, heights put right by the tilt."""
-        local = hits[hits[:, 0] > 1.0]
-        local[:, 2] -= self.tilt.angle_rad * (local[:, 0] + self.travelled_m - local[:, 3])
-        return local
+        return _ahead(hits, self.tilt.angle_rad, self.travelled_m)
 
 
 def look(hits: FloatArray, view: View, reach_m: float, rng: np.random.Generator) -> Scene | None:
     """Return what closes the drift ahead, or None; hits rows x, y, z (machine's frame, m), travelled (m)."""
     base, local = view.base, view.ahead(hits)
     corridor = trace(local, reach_m)
-    inside = np.abs(local[:, 1] - corridor.centre_at(local[:, 0])) < corridor.half_at(local[:, 0]) - _WALL_GAP_M
+    inside = corridor.inside(local, _WALL_GAP_M)
     known = view.known.face_in(base) if view.known is not None else None
-    seed = find(local[inside], rng, known) if inside.sum() >= _FEWEST_HITS else None
+    seed = find(inside, rng, known) if len(inside) >= _FEWEST_HITS else None
     if seed is None:
         return None
     scene = _measured(view, local, corridor, seed)
@@ -110,12 +93,11 @@ def _measured(view: View, local: FloatArray, corridor: Corridor, seed: FloatArra
     end = end_of(corridor, face_x)
     if end is None:
         return None
-    frame = base.turned(np.array([face_x, end.middle_m, 0.0]), end.turn_rad)
+    foot = np.array([face_x, end.middle_m, 0.0])
     model = _turned(seed, end.turn_rad)
     floor = _Floor(view.grade * face_x, view.grade)
-    near = local[np.abs(local[:, 0] - face_x) < _ROUND_M]
-    near[:, :3] = base.map(near[:, :3])
-    return _refined(frame, frame.local(near), model, end.half_m, floor, view.registration)
+    near = turned_near(local, foot, end.turn_rad, _ROUND_M)
+    return _refined(base.turned(foot, end.turn_rad), near, model, end.half_m, floor, view.registration)
 
 
 def _crossing(seed: FloatArray, corridor: Corridor) -> float:
@@ -139,14 +121,6 @@ class _Floor(NamedTuple):
     z_m: float
     grade: float
 
-    def at_toe(self, points: FloatArray, model: FloatArray, on: FloatArray, half_m: float) -> tuple[float, bool]:
-        """Return z of the floor at the toe and whether it was seen; never above the lowest hits of the face."""
-        toe_x = float(model[0] + model[2] * self.z_m)
-        seen = floor_before(points, toe_x, half_m)
-        lowest = float(np.percentile(on[:, 2], 1.0))
-        floor = seen if seen is not None else self.z_m + self.grade * toe_x
-        return min(floor, lowest), seen is not None
-
 
 def _refined(
     frame: Frame2, points: FloatArray, model: FloatArray, half_m: float, path: _Floor, registration: Registration
@@ -155,81 +129,55 @@ def _refined(
     left, right = half_m, -half_m
     scene = None
     for _ in range(3):
-        near = np.abs(points[:, 0] - (model[0] + model[1] * points[:, 1] + model[2] * points[:, 2]))
-        band = (points[:, 1] < left - _CLEAR_M) & (points[:, 1] > right + _CLEAR_M)
-        band &= near < 0.8 * max(1.0, abs(model[2]))
-        on = points[band]
-        if len(on) < _FEWEST_HITS:
-            return None
-        floor, seen = path.at_toe(points, model, on, 0.5 * (left - right))
-        used = band & (points[:, 2] > floor + LOW_M) & (points[:, 2] < floor + HIGH_M)
-        if used.sum() < _FEWEST_HITS:
+        used = np.zeros(len(points), np.bool_)
+        floor, seen, hits = _on_face(points, model, (left, right), path, used)
+        if hits < _FEWEST_HITS:
             return None
         face = fit(points[used], model, registration)
         model = np.array([face.a, face.b, face.c])
-        limits = _limits(points, face, floor, half_m)
+        limits = limits_of(points, face, floor, half_m)
         left, right = limits.left_m, limits.right_m
         scene = Scene(frame, points, face, used, floor, seen, limits)
     return scene if scene is not None and scene.face.blocks >= _FEWEST_BLOCKS else None
 
 
-def _limits(points: FloatArray, face: Face, floor_m: float, half_m: float) -> Limits:
-    """Return the walls in the last metre before the face; where the drift opens there, its mouth."""
-    before = points[:, 0] - face.x_at(points[:, 1], points[:, 2])
-    height = points[:, 2] - floor_m
-    # rubble of a shallow face reaches far along the drift: off it by a distance along the normal
-    off = max(0.15, 0.2 * math.sqrt(1.0 + face.c**2))
-    at_face = (before > -0.75 - off) & (before < -off) & (height > 0.3) & (height < 1.5)
-    sides = [_wall(points, at_face, side, half_m) for side in (1.0, -1.0)]
-    opens = any(side is None or side[0] > half_m + _WIDER_M for side in sides)
-    if opens:
-        drift = (before > -8.0) & (before < -0.15 - off) & (height > 0.3) & (height < 1.5)
-        sides = [_mouth(points, drift, side, half_m) for side in (1.0, -1.0)]
-    (left, left_std), (right, right_std) = (one if one is not None else (half_m, 0.5) for one in sides)
-    gap = max(_gap(points, before, side, half_m) for side in (1.0, -1.0))
-    return Limits(left, -right, left_std, right_std, opens, gap)
+@nb.njit(cache=True, nogil=True)
+def _ahead(hits, tilt, travelled):  # type: ignore[no-untyped-def]
+    """Return the hits (N, 4) that lie ahead, heights put right by a tilt."""
+    out = np.empty_like(hits)
+    count = 0
+    for i in range(hits.shape[0]):
+        x, seen_at = hits[i, 0], hits[i, 3]
+        if x > 1.0:
+            out[count, 0], out[count, 1], out[count, 3] = x, hits[i, 1], seen_at
+            out[count, 2] = hits[i, 2] - tilt * (x + travelled - seen_at)
+            count += 1
+    return out[:count]
 
 
-def _gap(points: FloatArray, before: FloatArray, side: float, half_m: float) -> float:
-    """Return the distance from the last hits of a wall to the face."""
-    y = side * points[:, 1]
-    wall = (y > half_m - 0.7) & (y < half_m + 0.6) & (before < -0.1)
-    return float(-np.sort(before[wall])[-8]) if wall.sum() >= 8 else 99.0
+@nb.njit(cache=True, nogil=True)
+def _on_face(points, model, sides, path, used):  # type: ignore[no-untyped-def]
+    """Mark the hits on the face at the heights that the inclination is defined over.
 
-
-def _wall(points: FloatArray, at_face: Mask, side: float, half_m: float) -> tuple[float, float] | None:
-    """Return the distance of a wall from the middle and its standard deviation; None where none is near."""
-    y = _cell_medians(points[at_face], side)
-    y = y[(y > half_m - _WALL_SLACK_M) & (y < half_m + _WALL_SLACK_M)]
-    if y.size < 5:
-        return None
-    return float(np.median(y)), _deviation(y)
-
-
-def _cell_medians(points: FloatArray, side: float) -> FloatArray:
-    """Return how far to a side the wall is in each (x, z) cell: near patches have many hits and must not outvote."""
-    y = side * points[:, 1]
-    points, y = points[y > 0.5], y[y > 0.5]
-    cells = np.floor(points[:, [0, 2]] / _WALL_CELL_M).astype(np.int64) @ np.array([100_003, 1])
-    order = np.lexsort((y, cells))
-    _, first, count = np.unique(cells[order], return_index=True, return_counts=True)
-    return y[order][first + count // 2]
-
-
-def _mouth(points: FloatArray, drift: Mask, side: float, half_m: float) -> tuple[float, float] | None:
-    """Return how far to a side one can look past the drift's last metre of wall: what stands out most at each height."""
-    y = side * points[:, 1]
-    wall = drift & (np.abs(y - half_m) < _WALL_SLACK_M)
-    if wall.sum() < 16:
-        return None
-    last = np.sort(points[wall, 0])[-8]
-    wall &= points[:, 0] > last - _MOUTH_M
-    rows = np.floor(points[wall, 2] / _WALL_CELL_M).astype(np.int64)
-    inner = [float(np.percentile(y[wall][rows == row], 5.0)) for row in np.unique(rows)]
-    return float(np.median(inner)), _deviation(np.array(inner)) + 0.05
-
-
-def _deviation(y: FloatArray) -> float:
-    """Return the standard deviation of the middle of rough rock: few independent bumps in a metre."""
-    spread = 1.4826 * float(np.median(np.abs(y - np.median(y))))
-    return max(spread / math.sqrt(4.0), 0.03)
+    Returns z of the floor at the toe, never above the lowest hits of the face, whether it was seen, and how many hits are marked.
+    """
+    reach = 0.8 * max(1.0, abs(model[2]))
+    on, low = np.empty(points.shape[0], np.int64), np.empty(points.shape[0])
+    count = 0
+    for i in range(points.shape[0]):
+        x, y, z = points[i, 0], points[i, 1], points[i, 2]
+        between = y < sides[0] - _CLEAR_M and y > sides[1] + _CLEAR_M
+        if between and abs(x - (model[0] + model[1] * y + model[2] * z)) < reach:
+            on[count], low[count] = i, z
+            count += 1
+    if count < _FEWEST_HITS:
+        return math.nan, False, 0
+    toe_x = model[0] + model[2] * path[0]
+    floor = floor_before(points, toe_x, 0.5 * (sides[0] - sides[1]))
+    seen = not math.isnan(floor)
+    floor = min(floor if seen else path[0] + path[1] * toe_x, quantile(low, count, 0.01))
+    hits = 0
+    for i in on[:count]:
+        used[i] = points[i, 2] > floor + LOW_M and points[i, 2] < floor + HIGH_M
+        hits += used[i]
+    return floor, seen, hits

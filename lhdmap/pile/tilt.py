@@ -11,6 +11,7 @@ import math
 from collections import deque
 from typing import NamedTuple
 
+import numba as nb
 import numpy as np
 
 from lhdmap.messages import FloatArray
@@ -49,12 +50,9 @@ class TiltCheck:
 
     def update(self, local: FloatArray, travelled_m: float) -> None:
         """Take the hits around `base_link`: rows x, y, z (m, its level frame, z = 0 on the floor), travelled (m)."""
-        here = (np.abs(local[:, 0]) < _BOX_M[0]) & (np.abs(local[:, 1]) < _BOX_M[1])
-        here &= (np.abs(local[:, 2]) < _MOST_OFF_M) & (travelled_m - local[:, 3] > _NEAREST_M)
-        if here.sum() < 3:
-            return
-        ranges = travelled_m - local[here, 3] + local[here, 0]
-        self._steps.append((float(np.median(local[here, 2])), float(np.median(ranges))))
+        off, ranges = _floor_here(local, travelled_m)
+        if off.size >= 3:
+            self._steps.append((float(np.median(off)), float(np.median(ranges))))
 
     def tilt(self) -> Tilt:
         """Return the angle by weighted least squares over the steps, drawn to the mount by the prior."""
@@ -71,3 +69,16 @@ class TiltCheck:
         prior = 1.0 / self._prior_std_rad**2
         seen = float((off[kept] * ranges[kept]).sum() / (ranges[kept] ** 2).sum())
         return Tilt(information * seen / (information + prior), 1.0 / math.sqrt(information + prior))
+
+
+@nb.njit(cache=True, nogil=True)
+def _floor_here(local, travelled):  # type: ignore[no-untyped-def]
+    """Return z of the hits that the machine stands on and that were seen from afar, and the ranges they were seen at."""
+    off, ranges = np.empty(local.shape[0]), np.empty(local.shape[0])
+    count = 0
+    for i in range(local.shape[0]):
+        x, y, z, ago = local[i, 0], local[i, 1], local[i, 2], travelled - local[i, 3]
+        if abs(x) < _BOX_M[0] and abs(y) < _BOX_M[1] and abs(z) < _MOST_OFF_M and ago > _NEAREST_M:
+            off[count], ranges[count] = z, ago + x
+            count += 1
+    return off[:count], ranges[:count]

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numba as nb
 import numpy as np
 
@@ -22,6 +24,7 @@ class HitWindow:
     def __init__(self, reach_m: float) -> None:
         self._reach_m = reach_m
         self._rows = np.full((_ROOM, 4), np.nan)
+        self._out = np.empty_like(self._rows)
         self._next = 0
         self._last_m = -np.inf
 
@@ -35,13 +38,13 @@ class HitWindow:
     def hits(self, pose: FloatArray, travelled_m: float) -> FloatArray:
         """Return the hits around and ahead of a pose: rows x, y, z in its frame (m), travelled (m), shape (N, 4).
 
-        `pose`: x, y, z (m), heading (rad), shape (4,); only hits of the last `reach_m` of travel.
+        `pose`: x, y, z (m), heading (rad), shape (4,); only hits of the last `reach_m` of travel. The rows are a view of memory
+        that the next call writes anew.
         """
-        out = np.empty_like(self._rows)
-        return out[: _around(self._rows, pose, (travelled_m, self._reach_m), out)]
+        return self._out[: _around(self._rows, pose, (travelled_m, self._reach_m), self._out)]
 
 
-@nb.njit(cache=True)
+@nb.njit(cache=True, nogil=True)
 def _append(rows, at, points, position, limits):  # type: ignore[no-untyped-def]
     """Write the thinned hits at `at`, round and round; return the next place."""
     travelled, reach, apart = limits
@@ -49,7 +52,7 @@ def _append(rows, at, points, position, limits):  # type: ignore[no-untyped-def]
     for i in range(points.shape[0]):
         x, y = points[i, 0], points[i, 1]
         far = (x - position[0]) ** 2 + (y - position[1]) ** 2 > reach * reach
-        if far or (x - last_x) ** 2 + (y - last_y) ** 2 < apart * apart:
+        if far or not math.isfinite(x + y + points[i, 2]) or (x - last_x) ** 2 + (y - last_y) ** 2 < apart * apart:
             continue
         rows[at, 0], rows[at, 1], rows[at, 2], rows[at, 3] = x, y, points[i, 2], travelled
         last_x, last_y = x, y
@@ -57,7 +60,7 @@ def _append(rows, at, points, position, limits):  # type: ignore[no-untyped-def]
     return at
 
 
-@nb.njit(cache=True)
+@nb.njit(cache=True, nogil=True)
 def _around(rows, pose, limits, out):  # type: ignore[no-untyped-def]
     """Fill `out` with what lies ahead, in the frame of the pose; return how many."""
     c, s = np.cos(pose[3]), np.sin(pose[3])
