@@ -109,11 +109,15 @@ def _side(values, side, predicted, scratch):  # type: ignore[no-untyped-def]
 
 @nb.njit(cache=True, nogil=True)
 def _begin(values, side, scratch):  # type: ignore[no-untyped-def]
-    """Return where the wall is wherever the machine stands between the walls; NaN where few hits are clear of the middle."""
-    clear = side * values[side * values > 0.6]
-    if clear.size < _FEWEST:
-        return math.nan
-    return _side(clear, 1.0, quantile(clear, clear.size, 0.5), scratch)
+    """Return whether enough hits are clear of the middle, and where the wall is, wherever the machine stands between the walls."""
+    clear, count = np.empty(values.size), 0
+    for y in values:
+        if side * y > 0.6:
+            clear[count] = side * y
+            count += 1
+    if count < _FEWEST:
+        return False, math.nan
+    return True, _side(clear[:count], 1.0, quantile(clear, count, 0.5), scratch)
 
 
 @nb.njit(cache=True, nogil=True)
@@ -127,9 +131,9 @@ def _follow(y, starts, out):  # type: ignore[no-untyped-def]
         centre += slope
         left, right = _side(values, 1.0, centre + half, scratch), -_side(values, -1.0, half - centre, scratch)
         if known < 4:  # the machine may stand anywhere between the walls
-            above, below = (values > 0.6).sum(), (values < -0.6).sum()
-            if above >= _FEWEST and below >= _FEWEST:
-                left, right = _begin(values, 1.0, scratch), -_begin(values, -1.0, scratch)
+            above, below = _begin(values, 1.0, scratch), _begin(values, -1.0, scratch)
+            if above[0] and below[0]:
+                left, right = above[1], -below[1]
         both = not (math.isnan(left) or math.isnan(right))
         if both:
             found = 0.5 * (left + right)

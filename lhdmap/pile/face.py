@@ -84,13 +84,29 @@ def fit(points: FloatArray, start: FloatArray, registration: Registration) -> Fa
 @nb.njit(cache=True, nogil=True)
 def _first_of_cells(points, cell_m):  # type: ignore[no-untyped-def]
     """Return x, y, z of the first point in each (y, z) cell, by cell."""
-    numbers, count = cell_numbers(points[:, 1].copy(), points[:, 2].copy(), cell_m)
-    first = np.full(count, -1)
-    for i in range(numbers.size):
-        if first[numbers[i]] < 0:
-            first[numbers[i]] = i
-    thin = points[first[first >= 0]]
-    return thin[:, 0].copy(), thin[:, 1].copy(), thin[:, 2].copy()
+    x, y, z, _ = _columns(points)
+    numbers, count = cell_numbers(y, z, cell_m)
+    first = np.zeros(count, np.int64)
+    for i in range(numbers.size - 1, -1, -1):
+        first[numbers[i]] = i + 1
+    used = 0
+    x_out, y_out, z_out = np.empty(count), np.empty(count), np.empty(count)
+    for k in range(count):
+        if first[k]:
+            i = first[k] - 1
+            x_out[used], y_out[used], z_out[used] = x[i], y[i], z[i]
+            used += 1
+    return x_out[:used], y_out[:used], z_out[:used]
+
+
+@nb.njit(cache=True, nogil=True)
+def _columns(points):  # type: ignore[no-untyped-def]
+    """Return the columns of points (N, 4), each by itself."""
+    size = points.shape[0]
+    a, b, c, d = np.empty(size), np.empty(size), np.empty(size), np.empty(size)
+    for i in range(size):
+        a[i], b[i], c[i], d[i] = points[i, 0], points[i, 1], points[i, 2], points[i, 3]
+    return a, b, c, d
 
 
 @nb.njit(cache=True, nogil=True, fastmath={"reassoc", "nsz"})
@@ -121,7 +137,8 @@ def _plane(x, y, z, pick):  # type: ignore[no-untyped-def]
 @nb.njit(cache=True, nogil=True)
 def _most_on(x, y, z, picks, known):  # type: ignore[no-untyped-def]
     """Return a, b, c of the face with the best score of those through `picks` (K, 3) and of `known` (L, 3); NaN: none."""
-    best, most = np.full(3, math.nan), -1.0
+    best, most = np.zeros(3), -1.0
+    best[0] = math.nan
     for i in range(picks.shape[0] + known.shape[0]):
         if i < picks.shape[0]:
             model = _plane(x, y, z, (picks[i, 0], picks[i, 1], picks[i, 2]))
@@ -142,36 +159,43 @@ def _most_on(x, y, z, picks, known):  # type: ignore[no-untyped-def]
 @nb.njit(cache=True, nogil=True)
 def _regression(points, start, scale_variance, pitch_variance):  # type: ignore[no-untyped-def]
     """Return a, b, c, drift (4,), the information H (4, 4), the residuals' spread and the number of blocks."""
-    x, y, z, s = points[:, 0].copy(), points[:, 1].copy(), points[:, 2].copy(), points[:, 3] - points[:, 3].mean()
+    x, y, z, s = _columns(points)
+    size, middle = x.size, 0.0
+    for i in range(size):
+        middle += s[i] / size
     weights = _cell_weights(y, z)
     blocks_of, most_blocks = cell_numbers(y, z, BLOCK_M)
-    seen = np.empty(most_blocks, np.bool_)
-    off, size, mass = np.empty(x.size), np.empty(x.size), np.empty(x.size)
-    model, prior, J = np.zeros(4), np.zeros(4), np.ones(4)
-    model[:3] = start
-    H, g, spread, blocks = np.zeros((4, 4)), np.zeros(4), 0.3, 1
+    off, apart, mass = np.empty(size), np.empty(size), np.empty(size)
+    model, J, H = np.zeros(4), np.ones(4), np.zeros((4, 4))
+    model[0], model[1], model[2] = start[0], start[1], start[2]
+    spread, blocks = 0.3, 1
     for _ in range(12):
-        for i in range(x.size):
-            off[i] = x[i] - (model[0] + model[1] * y[i] + model[2] * z[i] + model[3] * s[i])
-            size[i], mass[i] = abs(off[i]), weights[i]
-        spread = max(1.4826 * weighted_median(size, mass), 0.02 * max(1.0, abs(model[2])))
-        H[:], g[:], seen[:], total = 0.0, 0.0, False, 0.0
-        for i in range(x.size):
+        for i in range(size):
+            s_i = s[i] - middle
+            off[i] = x[i] - (model[0] + model[1] * y[i] + model[2] * z[i] + model[3] * s_i)
+            apart[i], mass[i] = abs(off[i]), weights[i]
+        spread = max(1.4826 * weighted_median(apart, mass), 0.02 * max(1.0, abs(model[2])))
+        H, g, seen = np.zeros((4, 4)), np.zeros(4), np.zeros(most_blocks, np.bool_)
+        total, blocks = 0.0, 0
+        for i in range(size):
             u = off[i] / (_TUKEY * spread)
             if abs(u) >= 1.0:
                 continue
             w = weights[i] * (1.0 - u * u) ** 2
-            seen[blocks_of[i]], total = True, total + w
-            J[1], J[2], J[3] = y[i], z[i], s[i]
+            total += w
+            if not seen[blocks_of[i]]:
+                seen[blocks_of[i]] = True
+                blocks += 1
+            J[1], J[2], J[3] = y[i], z[i], s[i] - middle
             for k in range(4):
                 g[k] += w * off[i] * J[k]
                 for m in range(k + 1):
                     H[k, m] += w * J[k] * J[m]
-        blocks = max(seen.sum(), 1)
+        blocks = max(blocks, 1)
         scale = blocks / max(total, 1e-9) / spread**2
         # scale and pitch move the hits of a face alike: x by e s and, a pitch error d, by c d times the distance
         drift_variance = scale_variance + model[2] ** 2 * pitch_variance + 1e-10
-        prior[1], prior[2], prior[3] = 1.0 / 0.7**2, 1e-6, 1.0 / drift_variance
+        prior = (0.0, 1.0 / 0.7**2, 1e-6, 1.0 / drift_variance)
         for k in range(4):
             for m in range(k + 1):
                 H[k, m] *= scale
@@ -179,8 +203,9 @@ def _regression(points, start, scale_variance, pitch_variance):  # type: ignore[
             H[k, k] += prior[k]
             g[k] = scale * g[k] - (prior[k] * model[k] if k != 2 else 0.0)
         change = _solved(H, g)
-        model += change
-        if np.abs(change[:3]).max() < 1e-4:
+        for k in range(4):
+            model[k] += change[k]
+        if max(abs(change[0]), abs(change[1]), abs(change[2])) < 1e-4:
             break
     return model, H, spread, blocks
 
@@ -189,25 +214,26 @@ def _regression(points, start, scale_variance, pitch_variance):  # type: ignore[
 def _cell_weights(y, z):  # type: ignore[no-untyped-def]
     """Return weights (N,) that add up to 1 in each cell: near hits are many and must not outvote."""
     numbers, count = cell_numbers(y, z, CELL_M)
-    hits = np.zeros(count)
+    hits, weights = np.zeros(count), np.empty(y.size)
     for number in numbers:
         hits[number] += 1.0
-    return 1.0 / hits[numbers]
+    for i in range(y.size):
+        weights[i] = 1.0 / hits[numbers[i]]
+    return weights
 
 
 @nb.njit(cache=True, nogil=True)
 def _solved(H, g):  # type: ignore[no-untyped-def]
-    """Return the solution of H x = g, H symmetric and positive definite: elimination needs no pivots."""
+    """Return the solution (4,) of H x = g, H symmetric and positive definite: elimination needs no pivots."""
     A, x = H.copy(), g.copy()
-    size = x.size
-    for k in range(size):
-        for i in range(k + 1, size):
+    for k in range(4):
+        for i in range(k + 1, 4):
             factor = A[i, k] / A[k, k]
             x[i] -= factor * x[k]
-            for j in range(k, size):
+            for j in range(k, 4):
                 A[i, j] -= factor * A[k, j]
-    for k in range(size - 1, -1, -1):
-        for j in range(k + 1, size):
+    for k in range(3, -1, -1):
+        for j in range(k + 1, 4):
             x[k] -= A[k, j] * x[j]
         x[k] /= A[k, k]
     return x

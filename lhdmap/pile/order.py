@@ -59,7 +59,9 @@ def spread_about(values, count, middle):  # type: ignore[no-untyped-def]
 @nb.njit(cache=True, nogil=True)
 def weighted_median(values, weights):  # type: ignore[no-untyped-def]
     """Return the smallest value up to which lies half the weight; both arrays lose their order."""
-    target = 0.5 * weights.sum()
+    target = 0.0
+    for weight in weights:
+        target += 0.5 * weight
     low, high, below = 0, values.size - 1, 0.0
     while low < high:
         pivot = values[(low + high) // 2]
@@ -91,26 +93,30 @@ def weighted_median(values, weights):  # type: ignore[no-untyped-def]
 @nb.njit(cache=True, nogil=True)
 def cell_numbers(u, v, cell_m):  # type: ignore[no-untyped-def]
     """Return the number of the cell of each (u, v), by u and then v, and how many numbers there may be; all are finite."""
-    size = u.size
-    rows, columns = np.empty(size, np.int64), np.empty(size, np.int64)
-    for i in range(size):
-        rows[i], columns[i] = math.floor(u[i] / cell_m), math.floor(v[i] / cell_m)
-    if size == 0:
-        return rows, 0
-    first_row, first_column = rows.min(), columns.min()
-    width = columns.max() - first_column + 1
-    return (rows - first_row) * width + columns - first_column, (rows.max() - first_row + 1) * width
+    numbers = np.zeros(u.size, np.int64)
+    if u.size == 0:
+        return numbers, 0
+    lowest_u = highest_u = u[0]
+    lowest_v = highest_v = v[0]
+    for i in range(u.size):
+        lowest_u, highest_u = min(lowest_u, u[i]), max(highest_u, u[i])
+        lowest_v, highest_v = min(lowest_v, v[i]), max(highest_v, v[i])
+    row, column = int(math.floor(lowest_u / cell_m)), int(math.floor(lowest_v / cell_m))
+    width = int(math.floor(highest_v / cell_m)) - column + 1
+    for i in range(u.size):
+        numbers[i] = (int(math.floor(u[i] / cell_m)) - row) * width + int(math.floor(v[i] / cell_m)) - column
+    return numbers, (int(math.floor(highest_u / cell_m)) - row + 1) * width
 
 
 @nb.njit(cache=True, nogil=True)
 def grouped(values, numbers, count):  # type: ignore[no-untyped-def]
     """Return values by their number, as they come, and where each number's begin, shape (count + 1,)."""
-    starts = np.zeros(count + 1, np.int64)
+    at, starts, out = np.zeros(count + 1, np.int64), np.zeros(count + 1, np.int64), np.empty(values.size)
     for i in range(numbers.size):
         starts[numbers[i] + 1] += 1
     for k in range(count):
         starts[k + 1] += starts[k]
-    at, out = starts.copy(), np.empty_like(values)
+        at[k + 1] = starts[k + 1]
     for i in range(numbers.size):
         out[at[numbers[i]]] = values[i]
         at[numbers[i]] += 1
