@@ -26,6 +26,7 @@ _NEAR_WALL_M = 0.25
 _NEAR_FACE_M = 0.28
 _PROUD_M = 0.5  # end of the colours
 _CELL_M = 0.1
+_ELSEWHERE_M = 5.0
 
 
 class Ahead(NamedTuple):
@@ -128,7 +129,7 @@ def relief_chart(report: PileReport, pile: PileEstimate) -> Figure:
 
 def convergence_chart(report: PileReport) -> Figure:
     """Draw width, inclination and the statuses' probabilities over the distance to the toe, bands of two deviations."""
-    seen = [one for one in report.history if one.estimate.found and math.isfinite(one.distance_m)]
+    seen = _of_the_end([one for one in report.history if one.estimate.found and math.isfinite(one.distance_m)])
     figure = charts.new_figure(6.4)
     rows = figure.subplots(3, 1, sharex=True)
     x = np.array([one.distance_m for one in seen])
@@ -147,6 +148,12 @@ def convergence_chart(report: PileReport) -> Figure:
     rows[2].legend(loc="center right", fontsize=8.0)
     rows[0].invert_xaxis()
     return figure
+
+
+def _of_the_end(seen: list[Snapshot]) -> list[Snapshot]:
+    """Return the estimates of what the last one is of: on the way something else may have been taken for the end."""
+    last = seen[-1].estimate.center_m
+    return [one for one in seen if not np.linalg.norm((one.estimate.center_m - last)[:2]) > _ELSEWHERE_M]
 
 
 def _segments(axes: Axes, frame: Ahead, pile: PileEstimate, points_m: FloatArray) -> None:

@@ -1,4 +1,4 @@
-"""The ore pile on a page: figures with their deviations and four pictures; a page of its own, or a section of build-map's."""
+"""The ore pile on a page: figures with their deviations and five pictures; a page of its own, or a section of build-map's."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import numpy as np
 
 from lhdmap.messages import FloatArray
 from lhdmap.pile.result import STATUSES, PileEstimate, PileReport
-from lhdmap.report import charts, markup, pile_charts
+from lhdmap.report import charts, markup, pile_charts, pile_normals
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -27,6 +27,11 @@ CUT = (
 RELIEF = (
     "The face as the machine sees it: red stands out of the fitted face towards the machine, blue lies behind it. "
     "Dashed: the limits."
+)
+NORMALS = (
+    "The cloud from behind and above the machine, coloured by n_y, the part of its normal across the drift (Fig. 10 of the "
+    "autonomous loading paper): blue is left wall, red is right wall, and where it is near zero there is pile or floor. A red and "
+    "a blue patch side by side on the face are the flanks of something that stands out of it."
 )
 CONVERGENCE = "How the estimate came about on the way to the pile, bands of two standard deviations; dashed: where it was decided."
 _MEANING = {
@@ -57,6 +62,7 @@ def pile_sections(report: PileReport) -> str:
             parts.append(
                 markup.section("The face from the machine", _picture(pile_charts.relief_chart(report, pile), RELIEF))
             )
+            parts.append(markup.section("Normals across", _picture(pile_normals.normals_chart(report, pile), NORMALS)))
         if any(one.estimate.found and math.isfinite(one.distance_m) for one in report.history):
             picture = _picture(pile_charts.convergence_chart(report), CONVERGENCE)
             parts.append(markup.section("How the estimate converged", picture))

@@ -1,4 +1,4 @@
-"""The ore pile in a Rerun recording: face coloured by how far it stands out, toe, limits, boulders, where to drive in.
+"""The ore pile in a Rerun recording: face coloured by how far it stands out, hits by n_y, toe, limits, boulders, the attack point.
 
 Entities: `map/pile/…`, `map/around` (static), `pile/…` (curves of the estimate over time).
 """
@@ -14,6 +14,7 @@ import numpy.typing as npt
 
 from lhdmap.messages import FloatArray
 from lhdmap.pile.result import STATUSES, PileEstimate, PileReport
+from lhdmap.report.pile_normals import across_colours, normal_cloud
 from lhdmap.report.recording import RecordingWriter
 
 CURVES = (
@@ -52,15 +53,18 @@ def add_pile(writer: RecordingWriter, report: PileReport, around_m: FloatArray |
         writer.add_text(text)
     for name, shape in _shapes(pile).items():
         writer.add_shape(f"map/pile/{name}", shape)
+    normals = normal_cloud(report, pile)
+    if len(normals.across):
+        writer.add_shape("map/pile/n_y", _dots(normals.points_m, across_colours(normals.across), 2.0))
     if around_m is not None and len(around_m):
         writer.add_shape("map/around", _dots(around_m))
         writer.widen(around_m)
 
 
-def _dots(points_m: FloatArray) -> Any:
+def _dots(points_m: FloatArray, colours: int | npt.NDArray[np.uint32] = 0x8A949EFF, size: float = 1.2) -> Any:
     import rerun as rr
 
-    return rr.Points3D(points_m, colors=0x8A949EFF, radii=rr.Radius.ui_points(1.2))
+    return rr.Points3D(points_m, colors=colours, radii=rr.Radius.ui_points(size))
 
 
 def _shapes(pile: PileEstimate) -> dict[str, Any]:

@@ -79,14 +79,15 @@ def test_page_is_one_file_with_figures_and_pictures(report: PileReport, tmp_path
     for words in ("4.00 m", "± 0.07 m", "-45.0°", "5.5 m³", "22.0 m", "loadable"):
         assert words in page
     assert not re.search(r'(src|href)="(?!data:)', page)
-    assert len(_pictures(page)) == 4
+    assert len(_pictures(page)) == 5
 
 
 def test_pictures_name_what_they_show(report: PileReport) -> None:
-    above, cut, relief, course = (_words(picture) for picture in _pictures(pile_sections(report)))
+    above, cut, relief, normals, course = (_words(picture) for picture in _pictures(pile_sections(report)))
     assert all(word in above for word in ("toe", "attack", "boulder", "limits", "walls"))
     assert "fit, -45.0°" in cut
     assert "stands out, m" in relief
+    assert all(word in normals for word in ("left wall", "right wall", "toe", "limits"))
     assert all(word in course for word in ("width, m", "inclination, °", "loadable", "hang up", "decided"))
 
 
@@ -99,20 +100,20 @@ def test_nothing_found_is_said_and_not_drawn() -> None:
 def test_face_without_surroundings_or_course_is_drawn() -> None:
     only = PileReport(None, Snapshot(0, 12.0, pile(attack=None, boulders=())))
     page = pile_sections(only)
-    assert len(_pictures(page)) == 3
+    assert len(_pictures(page)) == 4
     assert "not identified" in page
 
 
 @pytest.mark.parametrize("inclination_deg", [-15.0, -90.0, -120.0])
 def test_any_inclination_is_drawn(report: PileReport, inclination_deg: float) -> None:
     last = Snapshot(0, 12.0, pile(inclination_deg=inclination_deg))
-    assert len(_pictures(pile_sections(replace(report, last=last)))) == 4
+    assert len(_pictures(pile_sections(replace(report, last=last)))) == 5
 
 
 def test_fit_that_misses_its_own_face_is_drawn(report: PileReport) -> None:
     """As those of the paper's constants may be: nothing is left to colour, and nothing falls over."""
     far = pile(face_m=pile().face_m + np.array([0.0, 0.0, 50.0]))
-    assert len(_pictures(pile_sections(replace(report, last=Snapshot(0, 12.0, far), around_m=np.zeros((0, 3)))))) == 4
+    assert len(_pictures(pile_sections(replace(report, last=Snapshot(0, 12.0, far), around_m=np.zeros((0, 3)))))) == 5
 
 
 def test_unknown_deviations_are_said(report: PileReport) -> None:
@@ -120,7 +121,7 @@ def test_unknown_deviations_are_said(report: PileReport) -> None:
     nan = math.nan
     bare = pile(width_std_m=nan, inclination_std_deg=nan, volume_m3=nan, volume_std_m3=nan, toe_m=np.zeros((0, 3)))
     page = pile_sections(replace(report, last=Snapshot(0, 12.0, bare), history=(Snapshot(0, 12.0, bare),)))
-    assert len(_pictures(page)) == 4
+    assert len(_pictures(page)) == 5
     assert "± unknown" in page
     assert "nan" not in re.sub(r'src="[^"]+"', "", page)
 
@@ -138,3 +139,10 @@ def test_section_of_build_map(report: PileReport) -> None:
     page = render_report(replace(data, pile=report))
     assert "<h2>Ore pile</h2>" in page
     assert "4.00 m" in page
+
+
+def test_estimates_of_something_else_are_not_joined_to_the_course(report: PileReport) -> None:
+    wrong = pile(width_m=99.0, center_m=_map(-20.0, 0.0, 0.9))
+    with_wrong = replace(report, history=(Snapshot(0, 12.0, wrong), *report.history))
+    *_, course = (_words(picture) for picture in _pictures(pile_sections(with_wrong)))
+    assert course == _words(_pictures(pile_sections(report))[-1])

@@ -22,7 +22,7 @@ def test_pile_is_recorded_with_its_course(tmp_path: Path) -> None:
     found = read(tmp_path / "p.rrd")
     shown = {name for name in found if name.startswith("map/")}
     parts = ("face", "toe", "limits", "limits/deviation", "boulders", "attack")
-    assert shown >= {"map/around", *(f"map/pile/{name}" for name in parts)}
+    assert shown >= {"map/around", "map/pile/n_y", *(f"map/pile/{name}" for name in parts)}
     assert count(found["map/pile/face"]) == len(history[-1].estimate.face_m)
     assert count(found["map/around"]) == 50
     assert [value[0] for value in column(found["pile/width/value"], ":scalars")] == pytest.approx(
