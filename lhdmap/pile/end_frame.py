@@ -101,14 +101,20 @@ def end_of(corridor: Corridor, face_x_m: float) -> End | None:
     return End(math.atan(slope), middle, half)
 
 
-def _line(x: FloatArray, y: FloatArray) -> tuple[float, float]:
+@nb.njit(cache=True, nogil=True)
+def _line(x, y):  # type: ignore[no-untyped-def]
     """Return slope and offset by Theil and Sen: the median of the slopes of all pairs that are metres apart."""
-    i, j = np.triu_indices(len(x), 1)
-    far = x[j] - x[i] > 2.0 * BIN_M
-    if not far.any():
-        return 0.0, float(np.median(y))
-    slope = float(np.median((y[j] - y[i])[far] / (x[j] - x[i])[far]))
-    return slope, float(np.median(y - slope * x))
+    slopes, count = np.empty(x.size * x.size), 0
+    for i in range(x.size):
+        for j in range(i + 1, x.size):
+            if x[j] - x[i] > 2.0 * BIN_M:
+                slopes[count] = (y[j] - y[i]) / (x[j] - x[i])
+                count += 1
+    slope = quantile(slopes, count, 0.5) if count else 0.0
+    offsets = np.empty(x.size)
+    for i in range(x.size):
+        offsets[i] = y[i] - slope * x[i]
+    return slope, quantile(offsets, x.size, 0.5)
 
 
 @nb.njit(cache=True, nogil=True)

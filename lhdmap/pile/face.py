@@ -159,55 +159,77 @@ def _most_on(x, y, z, picks, known):  # type: ignore[no-untyped-def]
 @nb.njit(cache=True, nogil=True)
 def _regression(points, start, scale_variance, pitch_variance):  # type: ignore[no-untyped-def]
     """Return a, b, c, drift (4,), the information H (4, 4), the residuals' spread and the number of blocks."""
-    x, y, z, s = _columns(points)
-    size, middle = x.size, 0.0
-    for i in range(size):
-        middle += s[i] / size
-    weights = _cell_weights(y, z)
-    blocks_of, most_blocks = cell_numbers(y, z, BLOCK_M)
-    off, apart, mass = np.empty(size), np.empty(size), np.empty(size)
-    model, J, H = np.zeros(4), np.ones(4), np.zeros((4, 4))
+    columns = _columns(points)
+    _centre(columns[3])
+    weights = _cell_weights(columns[1], columns[2])
+    blocks_of, most_blocks = cell_numbers(columns[1], columns[2], BLOCK_M)
+    off, model, H = np.empty(weights.size), np.zeros(4), np.zeros((4, 4))
     model[0], model[1], model[2] = start[0], start[1], start[2]
     spread, blocks = 0.3, 1
     for _ in range(12):
-        for i in range(size):
-            s_i = s[i] - middle
-            off[i] = x[i] - (model[0] + model[1] * y[i] + model[2] * z[i] + model[3] * s_i)
-            apart[i], mass[i] = abs(off[i]), weights[i]
-        spread = max(1.4826 * weighted_median(apart, mass), 0.02 * max(1.0, abs(model[2])))
-        H, g, seen = np.zeros((4, 4)), np.zeros(4), np.zeros(most_blocks, np.bool_)
-        total, blocks = 0.0, 0
-        for i in range(size):
-            u = off[i] / (_TUKEY * spread)
-            if abs(u) >= 1.0:
-                continue
-            w = weights[i] * (1.0 - u * u) ** 2
-            total += w
-            if not seen[blocks_of[i]]:
-                seen[blocks_of[i]] = True
-                blocks += 1
-            J[1], J[2], J[3] = y[i], z[i], s[i] - middle
-            for k in range(4):
-                g[k] += w * off[i] * J[k]
-                for m in range(k + 1):
-                    H[k, m] += w * J[k] * J[m]
-        blocks = max(blocks, 1)
-        scale = blocks / max(total, 1e-9) / spread**2
+        spread = max(_residuals(columns, model, weights, off), 0.02 * max(1.0, abs(model[2])))
+        H, g, blocks = _equations(columns, off, weights, spread, (blocks_of, most_blocks))
         # scale and pitch move the hits of a face alike: x by e s and, a pitch error d, by c d times the distance
         drift_variance = scale_variance + model[2] ** 2 * pitch_variance + 1e-10
         prior = (0.0, 1.0 / 0.7**2, 1e-6, 1.0 / drift_variance)
         for k in range(4):
-            for m in range(k + 1):
-                H[k, m] *= scale
-                H[m, k] = H[k, m]
             H[k, k] += prior[k]
-            g[k] = scale * g[k] - (prior[k] * model[k] if k != 2 else 0.0)
+            g[k] -= prior[k] * model[k] if k != 2 else 0.0
         change = _solved(H, g)
         for k in range(4):
             model[k] += change[k]
         if max(abs(change[0]), abs(change[1]), abs(change[2])) < 1e-4:
             break
     return model, H, spread, blocks
+
+
+@nb.njit(cache=True, nogil=True)
+def _residuals(columns, model, weights, off):  # type: ignore[no-untyped-def]
+    """Fill `off` with how far the hits lie behind the face along x; return their spread: 1.4826 times the median of its size."""
+    x, y, z, s = columns
+    apart, mass = np.empty(off.size), np.empty(off.size)
+    for i in range(off.size):
+        off[i] = x[i] - (model[0] + model[1] * y[i] + model[2] * z[i] + model[3] * s[i])
+        apart[i], mass[i] = abs(off[i]), weights[i]
+    return 1.4826 * weighted_median(apart, mass)
+
+
+@nb.njit(cache=True, nogil=True)
+def _equations(columns, off, weights, spread, blocks):  # type: ignore[no-untyped-def]
+    """Return H (4, 4) and g (4,) of Tukey's weights, as if each block with a hit that counts were one, and how many these are."""
+    H, g, J = np.zeros((4, 4)), np.zeros(4), np.ones(4)
+    seen, count, total = np.zeros(blocks[1], np.bool_), 0, 0.0
+    for i in range(off.size):
+        u = off[i] / (_TUKEY * spread)
+        if abs(u) >= 1.0:
+            continue
+        w = weights[i] * (1.0 - u * u) ** 2
+        total += w
+        count += not seen[blocks[0][i]]
+        seen[blocks[0][i]] = True
+        J[1], J[2], J[3] = columns[1][i], columns[2][i], columns[3][i]
+        for k in range(4):
+            g[k] += w * off[i] * J[k]
+            for m in range(k + 1):
+                H[k, m] += w * J[k] * J[m]
+    count = max(count, 1)
+    scale = count / max(total, 1e-9) / spread**2
+    for k in range(4):
+        g[k] *= scale
+        for m in range(k + 1):
+            H[k, m] *= scale
+            H[m, k] = H[k, m]
+    return H, g, count
+
+
+@nb.njit(cache=True, nogil=True)
+def _centre(values):  # type: ignore[no-untyped-def]
+    """Subtract the mean."""
+    middle = 0.0
+    for value in values:
+        middle += value / values.size
+    for i in range(values.size):
+        values[i] -= middle
 
 
 @nb.njit(cache=True, nogil=True)

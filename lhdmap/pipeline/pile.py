@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-import numpy as np
+import math
+
+import numba as nb
 
 from lhdmap.config import Settings
-from lhdmap.geometry import se2
 from lhdmap.messages import FloatArray, LaserScan
 from lhdmap.odometry.scan_points import planar_points
 from lhdmap.pile.face import Registration
@@ -26,9 +27,18 @@ def scan_hits(
         pose: x, y, z (m), heading (rad) of `base_link` in the map, shape (4,).
     """
     points = planar_points(scan, T_level_sensor, velocity, boxes_m=boxes_m)
-    hits = se2.transform(np.array([pose[0], pose[1], pose[3]]), points)
-    hits[:, 2] = points[:, 2] + pose[2]
-    return ScanHits(scan.stamp_ns, hits, pose)
+    _place(points, pose)
+    return ScanHits(scan.stamp_ns, points, pose)
+
+
+@nb.njit(cache=True, nogil=True)
+def _place(points, pose):  # type: ignore[no-untyped-def]
+    """Move points (N, 3) from the level frame of `base_link` into the map, in place."""
+    c, s = math.cos(pose[3]), math.sin(pose[3])
+    for i in range(points.shape[0]):
+        x, y = points[i, 0], points[i, 1]
+        points[i, 0], points[i, 1] = pose[0] + c * x - s * y, pose[1] + s * x + c * y
+        points[i, 2] += pose[2]
 
 
 def pile_stage(settings: Settings, registration: Registration | None = None) -> PileStage | Figure9Stage | None:
