@@ -19,6 +19,7 @@ from lhdmap.proprioception.attitude import AttitudeSettings
 from lhdmap.proprioception.slip import SlipSettings
 from lhdmap.proprioception.wheels import WheelSettings
 from lhdmap.report.recording import RecordingSettings
+from lhdmap.rockbreaker.settings import RockbreakerSettings
 from lhdmap.settings import load_section, nearest, section_toml
 from lhdmap.smoothing.settings import SmoothingSettings
 
@@ -46,6 +47,7 @@ class Settings:
     figure9: Figure9Constants = field(default_factory=Figure9Constants)
     figure9_repaired: RepairedConstants = field(default_factory=RepairedConstants)
     recording: RecordingSettings = field(default_factory=RecordingSettings)
+    rockbreaker: RockbreakerSettings = field(default_factory=RockbreakerSettings)
 
 
 SECTIONS: dict[str, Any] = {section.name: section.default_factory for section in dataclasses.fields(Settings)}

@@ -27,6 +27,7 @@ COMMANDS = {
     "doctor": "what is in a log and what is wrong with it",
     "build-map": "the main job: log in, map folder out",
     "pile": "find and measure the ore pile at the end of a drive",
+    "rockbreaker": "plan trajectories of a rockbreaker over its grizzly",
     "simulate": "write a simulated log and its truth",
     "eval": "compare results with ground truth",
     "view": "open a map, log or run in Rerun",

@@ -121,13 +121,16 @@ class RecordingWriter:
         order = np.argsort(trajectory.stamps_ns, kind="stable")
         step = max(1, len(order) // 10_000)
         rows = order[::step]
-        poses = self._rr.Transform3D.columns(
-            translation=trajectory.positions_m[rows], quaternion=trajectory.quaternions_xyzw[rows]
-        )
-        self._stream.send_columns("map/base_link", [self._times(trajectory.stamps_ns[rows])], poses)
+        stamps_ns, quaternions = trajectory.stamps_ns[rows], trajectory.quaternions_xyzw[rows]
+        self.add_moving("map/base_link", stamps_ns, trajectory.positions_m[rows], quaternions)
         self._boxes("map/base_link/front_body", machine.boxes("base_link"))
         self._floor = trajectory.stamps_ns[order], trajectory.positions_m[order, 2]
         self.widen(trajectory.positions_m)
+
+    def add_moving(self, entity: str, stamps_ns: Stamps, positions_m: FloatArray, quaternions_xyzw: FloatArray) -> None:
+        """Record the poses (M, 3) and (M, 4) of a frame in that of its parent entity over time."""
+        poses = self._rr.Transform3D.columns(translation=positions_m, quaternion=quaternions_xyzw)
+        self._stream.send_columns(entity, [self._times(stamps_ns)], poses)
 
     def add_articulation(self, stamps_ns: Stamps, angles_rad: FloatArray, machine: Machine) -> None:
         """Record the rear body, which follows the joint angles (M,), positive when the machine bends to the left."""
@@ -135,8 +138,7 @@ class RecordingWriter:
         x, y = -front_m - rear_m * np.cos(angles_rad), rear_m * np.sin(angles_rad)
         zero = np.zeros(len(x))
         quaternions = np.column_stack([zero, zero, np.sin(-angles_rad / 2), np.cos(-angles_rad / 2)])
-        poses = self._rr.Transform3D.columns(translation=np.column_stack([x, y, zero]), quaternion=quaternions)
-        self._stream.send_columns("map/base_link/rear_link", [self._times(stamps_ns)], poses)
+        self.add_moving("map/base_link/rear_link", stamps_ns, np.column_stack([x, y, zero]), quaternions)
         self._boxes("map/base_link/rear_link/rear_body", machine.boxes("rear_link"))
 
     def add_cloud(self, cloud: Cloud) -> None:

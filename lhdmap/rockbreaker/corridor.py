@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from dataclasses import dataclass
 
@@ -58,7 +59,7 @@ def _connected(sigma: FloatArray, intervals: FloatArray, phi_from: float, phi_to
     """Follow the intervals (N, K, 2) that overlap from node to node: forwards what is reachable, then back from the end."""
     holds_start = (intervals[0, :, 0] <= phi_from + _TOUCH) & (phi_from - _TOUCH <= intervals[0, :, 1])
     reached = [holds_start]
-    for before, now in zip(intervals[:-1], intervals[1:], strict=True):
+    for before, now in itertools.pairwise(intervals):
         overlap = (before[:, None, 0] <= now[None, :, 1]) & (now[None, :, 0] <= before[:, None, 1])
         reached.append((reached[-1][:, None] & overlap).any(axis=0))
         if not reached[-1].any():

@@ -35,11 +35,6 @@ class FlowCurve:
     loads: FloatArray
     highest: FloatArray
 
-    @property
-    def pump_volume_m3(self) -> float:
-        """Oil that the pump delivers along the path, whatever its timing; `loads` of the pump are in m³ here."""
-        return float(np.trapezoid(self.loads[:, 4], self.sigma))
-
 
 def flow_curve(path: Path, sigma: FloatArray) -> FlowCurve:
     """Return the limits along `path` at σ (N,): valves, pump, cylinder speeds, and for DSJM the swing rate C5 (erratum 8)."""
@@ -63,6 +58,6 @@ def speed_loads(machine: Rockbreaker, rho_rates: FloatArray) -> FloatArray:
 def least_duration_s(machine: Rockbreaker, rho_from: FloatArray, rho_to: FloatArray) -> float:
     """Return a bound from below for any path and timing between two cylinder configurations (5,).
 
-    What a valve must let through is at least the net stroke times the area that is fed, and its flow is limited; likewise the pump.
+    What a valve must let through is at least the net stroke times the area that is fed; likewise the pump.
     """
     return float(np.max(flows_m3ps(machine, rho_to - rho_from) / machine.flow_limits_m3ps))

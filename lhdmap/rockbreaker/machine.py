@@ -21,8 +21,10 @@ from lhdmap.settings import load_section, nearest, section_toml, setting
 
 PAPER = "rockbreaker_trajectories, Table 1"
 TEXT = "rockbreaker_trajectories, section 4"
+TABLE2 = "rockbreaker_trajectories, Table 2: corners of the work plane"
 ASSUMED = "assumed, typical of stationary breaker booms"
 JOINTS = ("swing", "inner_boom", "outer_boom", "breaker")
+SECTIONS = ("name", "base", "joint", "grizzly")
 _LPM = 1.0 / 60_000.0  # litres a minute in m³/s
 
 
@@ -66,10 +68,31 @@ class Joint:
         1.33e-2, unit="m²", source=PAPER, minimum=1e-6, maximum=10.0, doc="A_rod: fed when the cylinder retracts."
     )
     max_speed_mps: float = setting(
-        0.0, unit="m/s", source=ASSUMED, minimum=0.0, maximum=10.0, doc="Largest cylinder speed; 0: what the valve gives."
+        0.0,
+        unit="m/s",
+        source=ASSUMED,
+        minimum=0.0,
+        maximum=10.0,
+        doc="Largest cylinder speed; 0: what the valve gives.",
     )
     radius_m: float = setting(
         0.25, unit="m", source=ASSUMED, minimum=0.0, maximum=5.0, doc="Radius of the capsule around the link."
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class Grizzly:
+    """The grizzly under the machine, in the base's frame."""
+
+    min_m: tuple[float, float] = setting((2.20, -2.15), unit="m", source=TABLE2, doc="Corner with the least x and y.")
+    max_m: tuple[float, float] = setting((6.27, 2.15), unit="m", source=TABLE2, doc="Corner with the largest x and y.")
+    opening_m: float = setting(
+        0.4,
+        unit="m",
+        source=ASSUMED,
+        minimum=0.05,
+        maximum=5.0,
+        doc="Side of an opening: what does not pass is oversize.",
     )
 
 
@@ -90,6 +113,7 @@ class Rockbreaker:
     name: str = "rockbreaker_table1"
     base: Base = field(default_factory=Base)
     joints: tuple[Joint, ...] = field(default_factory=_table1)
+    grizzly: Grizzly = field(default_factory=Grizzly)
 
     def per_joint(self, name: str) -> FloatArray:
         """Return one setting of the four joints, shape (4,)."""
@@ -133,7 +157,7 @@ class Rockbreaker:
         from lhdmap.rockbreaker.kinematics import rho_of_theta
 
         theta = np.zeros((20_001, 4))
-        theta[:, 0] = np.linspace(*self.theta_limits[:, 0], len(theta))
+        theta[:, 0] = np.linspace(self.theta_limits[0, 0], self.theta_limits[1, 0], len(theta))
         rate = np.abs(np.gradient(rho_of_theta(self, theta)[:, :2], theta[:, 0], axis=0))
         swing = self.joints[0]
         return float(self.flow_limits_m3ps[0] / np.max(rate @ [swing.rod_area_m2, swing.blind_area_m2]))
@@ -149,8 +173,8 @@ class Rockbreaker:
 def load_rockbreaker(path: Path | None = None) -> Rockbreaker:
     """Return the machine that a TOML file describes, or Table 1 where `path` is None.
 
-    A file has `name`, `[base]`, and `[joint.swing]`, `[joint.inner_boom]`, `[joint.outer_boom]`, `[joint.breaker]`; what is left
-    out keeps the value of Table 1.
+    A file has `name`, `[base]`, `[grizzly]`, and `[joint.swing]`, `[joint.inner_boom]`, `[joint.outer_boom]`,
+    `[joint.breaker]`; what is left out keeps the value of Table 1.
 
     Raises:
         InputError: the file cannot be read or is not TOML.
@@ -170,8 +194,8 @@ def load_rockbreaker(path: Path | None = None) -> Rockbreaker:
 
 def _machine(table: Mapping[str, Any], default_name: str) -> Rockbreaker:
     for key in table:
-        if key not in ("name", "base", "joint"):
-            raise ConfigError(f"unknown section '{key}'{nearest(key, ('name', 'base', 'joint'))}")
+        if key not in SECTIONS:
+            raise ConfigError(f"unknown section '{key}'{nearest(key, SECTIONS)}")
     given = table.get("joint", {})
     for key in given:
         if key not in JOINTS:
@@ -182,7 +206,10 @@ def _machine(table: Mapping[str, Any], default_name: str) -> Rockbreaker:
         joints.append(load_section(Joint, f"joint.{name}", values))
         _check_joint(f"joint.{name}", joints[-1])
     machine = Rockbreaker(
-        str(table.get("name", default_name)), load_section(Base, "base", table.get("base", {})), tuple(joints)
+        str(table.get("name", default_name)),
+        load_section(Base, "base", table.get("base", {})),
+        tuple(joints),
+        load_section(Grizzly, "grizzly", table.get("grizzly", {})),
     )
     low, high = machine.theta_limits
     for name, *limits in zip(JOINTS, low, high, strict=True):
@@ -204,5 +231,6 @@ def _check_joint(name: str, joint: Joint) -> None:
 def rockbreaker_toml(machine: Rockbreaker) -> str:
     """Print `machine` as a TOML file that `load_rockbreaker` reads back, each value with meaning, unit and source."""
     parts = [f'name = "{machine.name}"\n', section_toml("base", machine.base)]
+    parts.append(section_toml("grizzly", machine.grizzly))
     parts += [section_toml(f"joint.{name}", joint) for name, joint in zip(JOINTS, machine.joints, strict=True)]
     return "\n".join(parts)

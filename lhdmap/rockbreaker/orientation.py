@@ -1,8 +1,8 @@
 """Which orientations φ of the breaker a position of the tip allows: the twelve candidates of Section 3.1.
 
-At an end of the range a joint stands at a limit, so the ends are among the solutions of the inverse problem with one of θ_2, θ_3, θ_4 at
-one of its two limits: six cases of a two-link arm with two solutions each. Angles φ here are in (90°, 450°], so that the range of a
-breaker that points down does not wrap.
+At an end of the range a joint stands at a limit, so the ends are among the solutions of the inverse problem with one of θ_2, θ_3,
+θ_4 at one of its two limits: six cases of a two-link arm with two solutions each. Angles φ here are in (90°, 450°], so that the
+range of a breaker that points down does not wrap.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ import math
 import numpy as np
 
 from lhdmap.messages import FloatArray
-from lhdmap.rockbreaker.kinematics import pose_of_theta, planar_theta, within
+from lhdmap.rockbreaker.kinematics import planar_theta
 from lhdmap.rockbreaker.machine import Rockbreaker
 
 VERTICAL = math.radians(270.0)
@@ -50,7 +50,9 @@ def unwrapped(phi: FloatArray) -> FloatArray:
     return np.asarray(phi - 2.0 * np.pi * np.round((phi - VERTICAL) / (2.0 * np.pi)))
 
 
-def _two_link(along: FloatArray, up: FloatArray, first: float, second: float, sign: float) -> tuple[FloatArray, FloatArray]:
+def _two_link(
+    along: FloatArray, up: FloatArray, first: float, second: float, sign: float
+) -> tuple[FloatArray, FloatArray]:
     """Return direction of the first link and bend at the second of a two-link arm that reaches (along, up); NaN: out of reach."""
     cosine = (along**2 + up**2 - first**2 - second**2) / (2.0 * first * second)
     bend = sign * np.arccos(np.where(np.abs(cosine) <= 1.0, cosine, np.nan))
@@ -84,7 +86,7 @@ def _breaker_at(machine: Rockbreaker, along: FloatArray, up: FloatArray, limits:
 
 
 def phi_range(machine: Rockbreaker, planar_m: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return φ_min and φ_max (…) of tips with radius and height (…, 2), step 5 of Section 3.1; NaN where the tip is out of reach."""
+    """Return φ_min and φ_max (…) of tips with radius and height (…, 2), step 5 of Section 3.1; NaN: out of reach."""
     phi, _ = candidates(machine, planar_m)
     none = np.isnan(phi).all(axis=-1)
     low = np.min(np.where(np.isnan(phi), np.inf, phi), axis=-1)

@@ -1,4 +1,4 @@
-"""The two paths of the paper over σ in [0, 1]: decoupled swing (DSJM, Section 3.2) and straight line of the tip (CSLM, Section 3.3)."""
+"""The two paths of the paper over σ in [0, 1]: decoupled swing (DSJM, Section 3.2) and straight line (CSLM, Section 3.3)."""
 
 from __future__ import annotations
 
@@ -8,12 +8,13 @@ from typing import Literal
 import numpy as np
 
 from lhdmap.messages import FloatArray
-from lhdmap.rockbreaker import turning
 from lhdmap.rockbreaker.kinematics import planar_rates, planar_theta, rho_of_theta, rho_rate
 from lhdmap.rockbreaker.machine import Rockbreaker
+from lhdmap.rockbreaker.turning import Turning
 
 Kind = Literal["dsjm", "cslm"]
 KINDS: tuple[Kind, ...] = ("dsjm", "cslm")
+_Planar = tuple[tuple[FloatArray, FloatArray], FloatArray, FloatArray]
 
 
 @dataclass(frozen=True, slots=True)
@@ -24,9 +25,9 @@ class Path:
     kind: Kind
     start_m: FloatArray
     end_m: FloatArray
-    turning: turning.Turning
+    turning: Turning
 
-    def turned(self, changed: turning.Turning) -> Path:
+    def turned(self, changed: Turning) -> Path:
         """Return the same path of the tip with another turning of the breaker."""
         return replace(self, turning=changed)
 
@@ -51,14 +52,14 @@ class Path:
         rates = planar_rates(self.machine, np.column_stack([swing, arm]), np.column_stack([planar_rate, phi_rate]))
         return np.column_stack([swing, arm]), np.column_stack([swing_rate, rates])
 
-    def _planar(self, sigma: FloatArray) -> tuple[tuple[FloatArray, FloatArray], FloatArray, FloatArray]:
+    def _planar(self, sigma: FloatArray) -> _Planar:
         """Return (swing, its rate) (N,), radius and height (N, 2), and their rates over σ (N, 2)."""
         if self.kind == "dsjm":
             return _decoupled(self.start_m, self.end_m, sigma)
         return _straight_line(self.start_m, self.end_m, sigma)
 
 
-def _decoupled(start: FloatArray, end: FloatArray, sigma: FloatArray) -> tuple[tuple[FloatArray, FloatArray], FloatArray, FloatArray]:
+def _decoupled(start: FloatArray, end: FloatArray, sigma: FloatArray) -> _Planar:
     """Eqs. (9) and (10): swing, radius and height each change in proportion to σ."""
     first = np.array([np.arctan2(start[1], start[0]), np.hypot(start[0], start[1]), start[2]])
     change = np.array([np.arctan2(end[1], end[0]), np.hypot(end[0], end[1]), end[2]]) - first
@@ -67,7 +68,7 @@ def _decoupled(start: FloatArray, end: FloatArray, sigma: FloatArray) -> tuple[t
     return (all_three[:, 0], rates[:, 0]), all_three[:, 1:], rates[:, 1:]
 
 
-def _straight_line(start: FloatArray, end: FloatArray, sigma: FloatArray) -> tuple[tuple[FloatArray, FloatArray], FloatArray, FloatArray]:
+def _straight_line(start: FloatArray, end: FloatArray, sigma: FloatArray) -> _Planar:
     """Eq. (12): the tip moves in proportion to σ."""
     change = end - start
     x, y, z = (start + sigma[:, None] * change).T

@@ -1,7 +1,7 @@
-"""The paper's speed profile: polynomial ramps to and from a constant σ̇ (Section 3.5), and the best of its family under a flow curve.
+"""The paper's speed profile: polynomial ramps to and from a constant σ̇ (Section 3.5), and the best of its family.
 
-With s = t / t_r the ramp of Eqs. (13) to (15) is σ = σ̇_c t_r g(s), σ̇ = σ̇_c g'(s), g = (10 κ - 4) s³ + (7 - 15 κ) s⁴ + (6 κ - 3) s⁵, where
-κ = d_r / (σ̇_c t_r). C3 (erratum 6) is 0.4 ≤ κ ≤ 0.6.
+With s = t / t_r the ramp of Eqs. (13) to (15) is σ = σ̇_c t_r g(s), σ̇ = σ̇_c g'(s) with
+g = (10 κ - 4) s³ + (7 - 15 κ) s⁴ + (6 κ - 3) s⁵, κ = d_r / (σ̇_c t_r). C3 (erratum 6) is 0.4 ≤ κ ≤ 0.6.
 """
 
 from __future__ import annotations
@@ -14,8 +14,8 @@ import numpy as np
 from lhdmap.messages import FloatArray
 
 KAPPA = (0.4, 0.6)
-_RAMP_SAMPLES = 192
-_HALVINGS = 50
+_RAMP_SAMPLES = 128
+_HALVINGS = 36
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,6 +45,10 @@ class Ramps:
         third = 6.0 * c3 + 24.0 * c4 * s + 60.0 * c5 * s**2
         scale = self.cruise / self.t_r_s
         return float(np.abs(second).max() * scale), float(np.abs(third).max() * scale / self.t_r_s)
+
+    def slower(self, factor: float) -> Ramps:
+        """Return the same in `factor` times the time."""
+        return Ramps(self.t_r_s * factor, self.kappa, self.cruise / factor)
 
     def __call__(self, t_s: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return σ and σ̇ (N,) at times (N,) in [0, t_f]."""
@@ -127,14 +131,14 @@ def _duration(curve: FloatArray, least: FloatArray, t_r: float, kappa: float) ->
 def _best_kappa(curve: FloatArray, least: FloatArray, t_r: float) -> tuple[float, float]:
     """Return κ and σ̇_c of the shortest profile at a given ramp duration: a grid, made finer around its best."""
     best, width = 0.5, 0.1
-    for _ in range(6):
+    for _ in range(5):
         centre, found = best, np.inf
         for k in range(-5, 6):
             kappa = min(max(centre + width * k / 5.0, 0.4), 0.6)
             duration = _duration(curve, least, t_r, kappa)
             if duration < found - 1e-12:
                 best, found = kappa, duration
-        width *= 0.25
+        width *= 0.2
     return best, _highest_cruise(curve, least, t_r, best)
 
 
@@ -145,17 +149,19 @@ def _best_duration(curve: FloatArray, least: FloatArray, t_r: float) -> float:
 
 
 @nb.njit(cache=True, nogil=True)
-def _best_of_family(curve: FloatArray, least: FloatArray, shortest: float, longest: float) -> tuple[float, float, float]:
+def _best_of_family(
+    curve: FloatArray, least: FloatArray, shortest: float, longest: float
+) -> tuple[float, float, float]:
     """Return t_r, κ and σ̇_c of the shortest profile: t_r over an even grid, then made finer around the best of it."""
     best, width, found = shortest, 0.5 * (longest - shortest), np.inf
     centre = shortest + width
-    for _ in range(5):
+    for _ in range(4):
         for k in range(-12, 13):
             t_r = min(max(centre + width * k / 12.0, shortest), longest)
             duration = _best_duration(curve, least, t_r)
             if duration < found - 1e-12:
                 best, found = t_r, duration
         centre = best
-        width *= 0.15
+        width *= 0.1
     kappa, cruise = _best_kappa(curve, least, best)
     return best, kappa, cruise

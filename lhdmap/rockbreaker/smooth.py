@@ -1,9 +1,9 @@
 """A smooth timing that uses the flow all along the path: what the paper names as future work.
 
-1. The fastest σ̇(σ) under a curve and a limit of |σ̈| (one pass forwards, one backwards: exact for a limit that does not depend on σ̇).
+1. The fastest σ̇(σ) under a curve and a limit of |σ̈|: one pass forwards, one backwards, which is exact for a constant limit.
 2. In time, the mean over a window: σ̈ becomes continuous, |σ⃛| ≤ the change of σ̈ over the window, and |σ̈| does not grow.
-3. The mean cuts corners, so σ̇ may exceed the curve: it is lowered where it did, and the three steps are repeated. What is left in the end
-   is taken out by slowing down as a whole.
+3. The mean cuts corners, so σ̇ may exceed the curve: it is lowered where it did, and the three steps are repeated. What is left
+   in the end is taken out by slowing down as a whole.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ _WIDER = 4
 
 @dataclass(frozen=True, slots=True)
 class Sampled:
-    """A timing on an even grid of time from rest to rest: σ, σ̇, σ̈ (N,) each; in between the polynomial through both ends."""
+    """A timing on an even grid of time from rest to rest: σ̇ (N,), linear between nodes, and σ (N,), its integral."""
 
     step_s: float
     sigma: FloatArray
@@ -34,7 +34,7 @@ class Sampled:
         return self.step_s * (len(self.sigma) - 1)
 
     def __call__(self, t_s: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return σ and σ̇ (N,) at times (N,) in [0, t_f]: σ̇ is linear between nodes, σ its integral."""
+        """Return σ and σ̇ (N,) at times (N,) in [0, t_f]."""
         at = np.clip(t_s / self.step_s, 0.0, len(self.sigma) - 1.0)
         node = np.minimum(at.astype(np.int64), len(self.sigma) - 2)
         share = at - node
@@ -130,7 +130,9 @@ def _filtered_once(curve: FloatArray, peak: float, window_s: float, steps: int) 
 
 
 @nb.njit(cache=True, nogil=True)
-def _rounds(highest: FloatArray, peak: float, window_s: float, steps: int, rounds: int) -> tuple[FloatArray, FloatArray, float]:
+def _rounds(
+    highest: FloatArray, peak: float, window_s: float, steps: int, rounds: int
+) -> tuple[FloatArray, FloatArray, float]:
     """Lower the curve where the smoothed timing exceeds `highest`, round by round."""
     n = len(highest)
     curve = highest.copy()
@@ -154,5 +156,6 @@ def _rounds(highest: FloatArray, peak: float, window_s: float, steps: int, round
 
 
 def _filtered(highest: FloatArray, peak_second: float, window_s: float) -> Sampled:
-    sigma, rate, step_s = _rounds(highest, peak_second, window_s, _STEPS, _ROUNDS)
-    return Sampled(step_s, sigma, rate)
+    _, rate, step_s = _rounds(highest, peak_second, window_s, _STEPS, _ROUNDS)
+    sigma = np.concatenate([[0.0], np.cumsum(0.5 * step_s * (rate[1:] + rate[:-1]))])
+    return Sampled(step_s, sigma / sigma[-1], rate / sigma[-1])

@@ -1,0 +1,322 @@
+"""`lhdmap rockbreaker plan|workspace`: trajectories of a rockbreaker over its grizzly, and where its tip can be."""
+
+from __future__ import annotations
+
+import argparse
+import math
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from lhdmap.cli.console import Console
+from lhdmap.errors import UsageError
+
+if TYPE_CHECKING:
+    from lhdmap.messages import FloatArray
+    from lhdmap.rockbreaker.collision import Obstacles
+    from lhdmap.rockbreaker.machine import Rockbreaker
+    from lhdmap.rockbreaker.plan import Planner, Request, Trajectory
+    from lhdmap.rockbreaker.rocks import Scene
+    from lhdmap.rockbreaker.settings import RockbreakerSettings
+
+TASKS = {
+    "plan": "a trajectory between two tips, or from the cloud of a grizzly to above its largest oversize rock",
+    "workspace": "where the tip can be, and which orientations it allows at a point",
+}
+CLOUDS = (".ply", ".pcd", ".laz", ".las")
+EXIT_INFEASIBLE = 1
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the options of both tasks."""
+    tasks = parser.add_subparsers(dest="task", metavar="TASK", title="tasks", required=True)
+    for name, summary in TASKS.items():
+        sub = tasks.add_parser(name, help=summary, description=summary[0].upper() + summary[1:] + ".")
+        sub.add_argument("--machine", type=Path, metavar="FILE.toml", help="the machine (default: the paper's Table 1)")
+        sub.add_argument(
+            "-o", "--output", type=Path, metavar="DIR", help=f"folder to make (default: rockbreaker_{name})"
+        )
+        sub.add_argument(
+            "--no-pictures", action="store_true", help="no report and no recording: the figures and the table only"
+        )
+        (_add_plan if name == "plan" else _add_workspace)(sub)
+        for flag in ("--json", "--quiet", "--debug"):
+            sub.add_argument(flag, action="store_true", default=argparse.SUPPRESS, help=argparse.SUPPRESS)
+
+
+def _add_plan(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "--from", dest="start", metavar="X,Y,Z", help="tip at the start, m (default: base.park_m of the machine)"
+    )
+    parser.add_argument(
+        "--from-cylinders", metavar="R1,R2,R3,R4", help="instead: measured cylinder lengths ρ1 to ρ4, m"
+    )
+    parser.add_argument("--to", dest="end", metavar="X,Y,Z", help="tip at the end, m")
+    parser.add_argument(
+        "--cloud",
+        type=Path,
+        metavar="CLOUD",
+        help="instead of --to: a cloud of the grizzly with its rocks",
+    )
+    parser.add_argument(
+        "--path", default="dsjm", choices=("dsjm", "cslm"), help="decoupled swing (default), or straight line"
+    )
+    parser.add_argument(
+        "--timing", default="paper", choices=("paper", "paper-best", "smooth", "limit"), help="profile (default: paper)"
+    )
+    parser.add_argument("--phi-from", type=float, metavar="DEG", help="orientation at the start (default: Section 3.1)")
+    parser.add_argument("--phi-to", type=float, metavar="DEG", help="orientation at the end (default: Section 3.1)")
+    parser.add_argument(
+        "--obstacles",
+        type=Path,
+        action="append",
+        default=[],
+        metavar="FILE",
+        help="boxes (.toml) or a cloud not to touch; repeatable",
+    )
+    parser.add_argument(
+        "--config", type=Path, metavar="FILE.toml", help="settings over the defaults, section [rockbreaker]"
+    )
+    parser.add_argument(
+        "--set", action="append", default=[], metavar="rockbreaker.key=value", help="one setting; repeatable"
+    )
+
+
+def _add_workspace(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("--at", metavar="X,Y,Z", help="a tip, m: which orientations it allows")
+
+
+def run(arguments: argparse.Namespace, console: Console) -> int:
+    """Plan, or print the workspace; exit code 1 for a request that is not feasible."""
+    from lhdmap.rockbreaker.machine import load_rockbreaker
+
+    machine = load_rockbreaker(arguments.machine)
+    if arguments.task == "workspace":
+        return _run_workspace(arguments, console, machine)
+    return _run_plan(arguments, console, machine)
+
+
+@dataclass(frozen=True, slots=True)
+class Outcome:
+    """What was planned: the values of `--json`, the trajectories of all steps, and the scene of a cloud."""
+
+    values: dict[str, Any]
+    trajectories: tuple[Trajectory, ...]
+    scene: Scene | None
+    obstacles: Obstacles
+
+
+def _run_plan(arguments: argparse.Namespace, console: Console, machine: Rockbreaker) -> int:
+    from lhdmap.config import load_settings
+
+    settings = load_settings(arguments.config, arguments.set)
+    outcome = _plan(arguments, machine, settings.rockbreaker)
+    values = _write(arguments, settings, outcome)
+    console.result(values, _text(values))
+    return 0 if values["feasible"] else EXIT_INFEASIBLE
+
+
+def _plan(arguments: argparse.Namespace, machine: Rockbreaker, settings: RockbreakerSettings) -> Outcome:
+    from lhdmap.rockbreaker.outcome import plan_json
+    from lhdmap.rockbreaker.plan import Planner
+
+    if (arguments.end is None) == (arguments.cloud is None):
+        raise UsageError("one of --to and --cloud is needed: where the tip is to go, or the cloud to find a rock in")
+    obstacles, cloud_m = _obstacles(arguments, machine)
+    planner = Planner(machine, settings, obstacles)
+    request = _request(arguments, machine)
+    planner.warm_up(request)
+    if cloud_m is not None:
+        return _plan_to_rock(planner, request, cloud_m)
+    plan = planner.plan(request)
+    trajectories = () if plan.trajectory is None else (plan.trajectory,)
+    return Outcome(plan_json(plan), trajectories, None, obstacles)
+
+
+def _plan_to_rock(planner: Planner, request: Request, cloud_m: FloatArray) -> Outcome:
+    from lhdmap.rockbreaker.outcome import no_rock_json, task_json
+    from lhdmap.rockbreaker.rocks import find_rocks
+    from lhdmap.rockbreaker.task import plan_to_rock
+
+    scene = find_rocks(cloud_m, planner.machine.grizzly)
+    opening_m = planner.machine.grizzly.opening_m
+    task = plan_to_rock(planner, scene, request, opening_m)
+    if task is None:
+        return Outcome(no_rock_json(request, len(scene.rocks), opening_m), (), scene, planner.obstacles)
+    trajectories = tuple(step.trajectory for step in task.steps if step.trajectory is not None)
+    return Outcome(task_json(task), trajectories, scene, planner.obstacles)
+
+
+def _obstacles(arguments: argparse.Namespace, machine: Rockbreaker) -> tuple[Obstacles, FloatArray | None]:
+    """Return what must not be touched, and the cloud of the grizzly (N, 3), which is part of it."""
+    import numpy as np
+
+    from lhdmap.rockbreaker.collision import Obstacles
+    from lhdmap.rockbreaker.environment import cloud_in_base, read_boxes
+
+    clouds = [path for path in arguments.obstacles if path.suffix.lower() in CLOUDS]
+    boxes = [read_boxes(path) for path in arguments.obstacles if path not in clouds]
+    points = [cloud_in_base(path, machine) for path in clouds]
+    grizzly_m = cloud_in_base(arguments.cloud, machine) if arguments.cloud else None
+    points += [grizzly_m] if grizzly_m is not None else []
+    corners = [one.boxes_m for one in boxes if one.boxes_m is not None]
+    return Obstacles(
+        np.concatenate(corners) if corners else None,
+        tuple(name for one in boxes for name in one.names),
+        np.concatenate(points) if points else None,
+    ), grizzly_m
+
+
+def _request(arguments: argparse.Namespace, machine: Rockbreaker) -> Request:
+    import numpy as np
+
+    from lhdmap.rockbreaker.plan import Request
+
+    start, phi_from = _start(arguments, machine)
+    end = np.array(numbers(arguments.end, 3, "--to")) if arguments.end else start
+    phi_to = math.radians(_finite(arguments.phi_to, "--phi-to")) if arguments.phi_to is not None else math.nan
+    return Request(start, end, phi_from, phi_to, arguments.path, arguments.timing)
+
+
+def _start(arguments: argparse.Namespace, machine: Rockbreaker) -> tuple[FloatArray, float]:
+    """Return tip (3,) and orientation at the start, NaN: by Section 3.1."""
+    import numpy as np
+
+    from lhdmap.rockbreaker.kinematics import pose_of_theta, theta_of_rho
+
+    if arguments.start and arguments.from_cylinders:
+        raise UsageError("--from and --from-cylinders say the same: leave out one")
+    if arguments.from_cylinders:
+        lengths = np.array([0.0, *numbers(arguments.from_cylinders, 4, "--from-cylinders")])
+        pose = pose_of_theta(machine, theta_of_rho(machine, lengths))
+        if np.isnan(pose).any():
+            raise UsageError(
+                f"--from-cylinders {arguments.from_cylinders}: the pins of the machine do not allow these lengths"
+            )
+        return pose[:3], float(pose[3])
+    start = np.array(numbers(arguments.start, 3, "--from")) if arguments.start else np.array(machine.base.park_m)
+    return start, math.radians(
+        _finite(arguments.phi_from, "--phi-from")
+    ) if arguments.phi_from is not None else math.nan
+
+
+def numbers(text: str, count: int, option: str) -> list[float]:
+    """Return the numbers of `1,2,3`.
+
+    Raises:
+        UsageError: not as many finite numbers as wanted.
+    """
+    try:
+        values = [_finite(float(part), option) for part in text.split(",")]
+    except ValueError as error:
+        raise UsageError(f"{option} {text}: {count} numbers with commas between them were wanted") from error
+    if len(values) != count:
+        raise UsageError(f"{option} {text}: {count} numbers were wanted, {len(values)} were found")
+    return values
+
+
+def _finite(value: float, option: str) -> float:
+    if not math.isfinite(value):
+        raise UsageError(f"{option}: a finite number was wanted, {value} was found")
+    return value
+
+
+def _write(arguments: argparse.Namespace, settings: Any, outcome: Outcome) -> dict[str, Any]:
+    """Write the folder; return the values with the paths in it."""
+    from lhdmap.config import settings_table
+    from lhdmap.mapfolder import MapFolderWriter, MapInfo
+    from lhdmap.rockbreaker.table import joined, sampled, write_table
+
+    values = outcome.values
+    target = (arguments.output or Path("rockbreaker_plan")).resolve()
+    sources = [path for path in (arguments.machine, arguments.config, arguments.cloud, *arguments.obstacles) if path]
+    with MapFolderWriter(target) as folder:
+        rows = None
+        if values["feasible"]:
+            rows = joined([sampled(one, settings.rockbreaker.table_hz) for one in outcome.trajectories])
+            write_table(folder.path / "trajectory.csv", rows)
+        if not arguments.no_pictures:
+            _draw(folder.path, outcome, rows)
+        final = folder.path.with_name(folder.path.name.removesuffix(".partial"))
+        values |= {"csv": str(final / "trajectory.csv") if rows is not None else None, "folder": str(final)}
+        folder.write_json("plan.json", values)
+        path = folder.complete(
+            MapInfo(sources, {"rockbreaker": settings_table(settings)["rockbreaker"]}, frames=FRAMES)
+        )
+    return values | {"csv": str(path / "trajectory.csv") if rows is not None else None, "folder": str(path)}
+
+
+FRAMES = {"base": "origin on the swing axis, x along the grizzly's middle, y left, z up"}
+
+
+def _draw(folder: Path, outcome: Outcome, rows: FloatArray | None) -> None:
+    from lhdmap.report.rockbreaker_page import write_plan_report
+    from lhdmap.report.rockbreaker_recording import write_plan_recording
+
+    write_plan_report(folder / "report.html", outcome.values, outcome.trajectories, rows, outcome.scene)
+    if rows is not None:
+        write_plan_recording(folder / "recording.rrd", outcome.trajectories, rows, outcome.scene, outcome.obstacles)
+
+
+def _text(values: dict[str, Any]) -> str:
+    """Return the plan in words."""
+    lines = [f"folder       {values['folder']}"]
+    if values.get("rock"):
+        rock = values["rock"]
+        lines.append(f"rock         at {_point(rock['top_m'])} m: {rock['why']}")
+    if not values["feasible"]:
+        return "\n".join([*lines, f"not feasible {values['reason']['text']}"])
+    duration_s, bound_s = values["duration_s"], values["bound_s"]
+    ends = f"{_point(values['from_m'])} to {_point(values['to_m'])} m"
+    lines += [
+        f"trajectory   {values['path'].upper()}, {values['timing']}: {duration_s:.2f} s, {ends}",
+        f"orientation  {values['phi_from_deg']:.2f}° to {values['phi_to_deg']:.2f}°",
+        f"set by       {values['limiting']} at {values['limit_reached_at_s']:.1f} s; oil {values['pump_volume_l']:.2f} L",
+        f"bound        {bound_s:.2f} s on any path: {duration_s / max(bound_s, 1e-9):.2f} times that",
+        f"checked      {'yes' if values['checked'] else 'NO'}, highest flow over its limit {values['max_flow_ratio']:.5f}",
+        f"planned in   {values['planning_ms']:.1f} ms",
+    ]
+    if values["timing"] == "limit":
+        lines.append("note         a bound for this path, not a motion: speed jumps at its ends")
+    return "\n".join(lines)
+
+
+def _point(values: Any) -> str:
+    return "(" + ", ".join(f"{float(value):.2f}" for value in values) + ")"
+
+
+def _run_workspace(arguments: argparse.Namespace, console: Console, machine: Rockbreaker) -> int:
+    import numpy as np
+
+    from lhdmap.mapfolder import MapFolderWriter, MapInfo
+    from lhdmap.report.rockbreaker_page import write_workspace_report
+    from lhdmap.rockbreaker.reach import workspace_json
+
+    at_m = np.array(numbers(arguments.at, 3, "--at")) if arguments.at else None
+    values = workspace_json(machine, at_m)
+    target = (arguments.output or Path("rockbreaker_workspace")).resolve()
+    if not arguments.no_pictures:
+        with MapFolderWriter(target) as folder:
+            folder.write_json("workspace.json", values)
+            write_workspace_report(folder.path / "report.html", machine, values, at_m)
+            values["folder"] = str(
+                folder.complete(MapInfo([arguments.machine] if arguments.machine else [], frames=FRAMES))
+            )
+    console.result(values, _workspace_text(values))
+    return 0 if values["reached"] is not False else EXIT_INFEASIBLE
+
+
+def _workspace_text(values: dict[str, Any]) -> str:
+    lines = [f"folder       {values['folder']}"] if values["folder"] else []
+    lines += [
+        f"theta{k + 1}       {low:.3f} to {high:.3f} deg" for k, (low, high) in enumerate(values["theta_limits_deg"])
+    ]
+    lines.append(
+        f"slice        {values['area_m2']:.2f} m2 at theta1 = 0, {values['vertical_area_m2']:.2f} m2 with a vertical breaker"
+    )
+    if values["reached"] is False:
+        lines.append("phi          the tip cannot be there")
+    elif values["reached"]:
+        text = ", ".join(f"{low:.3f} to {high:.3f}" for low, high in values["phi_intervals_deg"])
+        lines.append(f"phi          {text} deg; nearest to vertical {values['phi_deg']:.3f} deg")
+    return "\n".join(lines)

@@ -1,0 +1,63 @@
+"""What the machine must not touch, read from files: boxes of a TOML file, points of a cloud."""
+
+from __future__ import annotations
+
+import tomllib
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from lhdmap.errors import ConfigError, InputError
+from lhdmap.geometry import se3
+from lhdmap.integration.cloud_io import read_cloud
+from lhdmap.messages import FloatArray
+from lhdmap.rockbreaker.collision import Obstacles
+from lhdmap.rockbreaker.machine import Rockbreaker
+from lhdmap.settings import load_section, nearest, setting
+
+
+@dataclass(frozen=True, slots=True)
+class ObstacleBox:
+    """A box in the base's frame."""
+
+    min_m: tuple[float, float, float] = setting((0.0, 0.0, 0.0), unit="m", doc="Lower corner (x, y, z).")
+    max_m: tuple[float, float, float] = setting((0.0, 0.0, 0.0), unit="m", doc="Upper corner (x, y, z).")
+
+
+def read_boxes(path: Path) -> Obstacles:
+    """Return the boxes of a TOML file, a section `[box.NAME]` with `min_m` and `max_m` each.
+
+    Raises:
+        InputError: the file cannot be read.
+        ConfigError: a key or value is wrong.
+    """
+    try:
+        table = tomllib.loads(path.read_text(encoding="utf-8"))
+    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+        raise InputError(f"{path}: not a readable file of boxes ({error})") from error
+    for key in table:
+        if key != "box":
+            raise ConfigError(f"{path}: unknown section '{key}'{nearest(key, ['box'])}")
+    boxes = {name: load_section(ObstacleBox, f"box.{name}", values) for name, values in table.get("box", {}).items()}
+    for name, box in boxes.items():
+        if any(low >= high for low, high in zip(box.min_m, box.max_m, strict=True)):
+            raise ConfigError(f"{path}: box.{name}: each value of min_m must be below that of max_m")
+    corners = np.array([[box.min_m, box.max_m] for box in boxes.values()], dtype=float).reshape(-1, 2, 3)
+    return Obstacles(corners, tuple(boxes))
+
+
+def cloud_in_base(path: Path, machine: Rockbreaker) -> FloatArray:
+    """Return the points (N, 3) of a cloud file in the base's frame, NaN and the machine's own post left out.
+
+    Raises:
+        InputError: the file cannot be read, or holds no point.
+    """
+    points = np.asarray(read_cloud(path).points_m, dtype=np.float64)
+    points = points[np.isfinite(points).all(axis=1)]
+    if not len(points):
+        raise InputError(f"{path}: the cloud holds no point")
+    T_base_cloud = se3.inverse(machine.T_cloud_base)
+    in_base = points @ T_base_cloud[:3, :3].T + T_base_cloud[:3, 3]
+    post_m = machine.links_m[0] + machine.joints[0].radius_m
+    return np.asarray(in_base[np.hypot(in_base[:, 0], in_base[:, 1]) > post_m])
