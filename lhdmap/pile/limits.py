@@ -14,22 +14,44 @@ from lhdmap.pile.order import cell_numbers, grouped, quantile, select, spread_ab
 
 _WALL_CELL_M = 0.1
 _MOUTH_M = 1.2
-_WIDER_M = 0.22  # a wall at the face so much farther out is a stope's: the drift's mouth counts
+_STEP_M = 0.3  # both walls together stand so much farther out at the face than at a mouth: as likely a stope as rock
+_WIDENS_M = 0.12  # the same against the line of the walls before, which rocks before the face do not draw in
+_BEYOND_TOE_M = 0.6  # a mouth lies before the toe: drift's wall seen so far beyond it is no stope's
+_STEP_STD_M = 0.05  # roughness of what these are measured on
+_UNSEEN_CHANCE, _UNSEEN_STEP_M = 0.95, 0.15  # of a stope where neither wall was seen at the face; what may hide a wall
+_VISIBLE = 0.75  # one looks along a wall: what stands in hides what lies behind, the seen part is the nearer one
+_HEIGHTS = 12.0  # cells in the heights that the width is defined over
+_BUMPS = 2.0  # independent bumps in these heights: rock is alike over half a metre
 _WALL_SLACK_M = 0.45  # a wall at the face stands no farther from the line of the wall before
 
 
 class Limits(NamedTuple):
     """Left and right wall at the face, y in the end frame (m), with standard deviations.
 
-    `opens`: no wall reaches the face on some side; `gap_m`: length before the face on which the worse side's wall was not seen.
+    Either the walls reach the face, or the drift opens into a stope and its mouth counts: `mouth_chance` is the probability of
+    the latter, and the limits are the mean of both, weighted by it. `step_m`: by how much the walls stand farther apart than the
+    mouth. `gap_m`: length before the face on which the worse side's wall was not seen. `rough_m`: spread of the smoother wall.
     """
 
     left_m: float
     right_m: float
     left_std_m: float
     right_std_m: float
-    opens: bool
+    mouth_chance: float
+    step_m: float
     gap_m: float
+    rough_m: float
+
+    def width_m(self, askew: float) -> tuple[float, float]:
+        """Return the width in the plane of a face that stands askew (dx/dy), and its standard deviation.
+
+        A mouth's width is what one sees along the drift. That it is not sure which of the two counts is part of the deviation.
+        """
+        mouth = self.left_m - self.right_m - (1.0 - self.mouth_chance) * self.step_m
+        wall_to_wall = (mouth + self.step_m) * math.sqrt(1.0 + askew * askew)
+        width = self.mouth_chance * mouth + (1.0 - self.mouth_chance) * wall_to_wall
+        doubt = self.mouth_chance * (1.0 - self.mouth_chance) * (wall_to_wall - mouth) ** 2
+        return width, math.sqrt(self.left_std_m**2 + self.right_std_m**2 + doubt)
 
 
 def limits_of(points: FloatArray, face: Face, floor_m: float, half_m: float) -> Limits:
@@ -47,21 +69,47 @@ def _limits(points, face, floor, half):  # type: ignore[no-untyped-def]
     height = points[:, 2] - floor
     standing = (height > 0.3) & (height < 1.5) & (before < -off) & (before > -8.0)
     hits, before_wall = points[standing], before[standing]
-    at_face = hits[before_wall > -0.75 - off]
+    at_face, drift = hits[before_wall > -0.75 - off], hits[before_wall < -0.15 - off]
     left, left_std = _wall(at_face, 1.0, half)
     right, right_std = _wall(at_face, -1.0, half)
-    # what is not there is not nearer either
-    opens = not (left <= half + _WIDER_M and right <= half + _WIDER_M)
-    if opens:
-        drift = hits[before_wall < -0.15 - off]
-        left, left_std = _mouth(drift, 1.0, half)
-        right, right_std = _mouth(drift, -1.0, half)
+    mouth_left, mouth_left_std, left_end = _mouth(drift, 1.0, half)
+    mouth_right, mouth_right_std, right_end = _mouth(drift, -1.0, half)
+    left_step, right_step, widens = left - mouth_left, right - mouth_right, left + right - 2.0 * half
+    beyond = min(left_end, right_end) - (a + c * floor)
+    chance, left_step, right_step = _opening(left_step, right_step, widens, beyond)
+    rough = 2.0 * min(left_std, right_std) if chance < 0.5 else 2.0 * min(mouth_left_std, mouth_right_std) + 0.1
     if math.isnan(left):
-        left, left_std = half, 0.5
+        left_std = math.hypot(mouth_left_std, _UNSEEN_STEP_M)
     if math.isnan(right):
-        right, right_std = half, 0.5
+        right_std = math.hypot(mouth_right_std, _UNSEEN_STEP_M)
     gap = max(_gap(points, before, 1.0, half), _gap(points, before, -1.0, half))
-    return left, -right, left_std, right_std, opens, gap
+    return (
+        mouth_left + (1.0 - chance) * left_step,
+        -(mouth_right + (1.0 - chance) * right_step),
+        math.sqrt(chance * mouth_left_std**2 + (1.0 - chance) * left_std**2),
+        math.sqrt(chance * mouth_right_std**2 + (1.0 - chance) * right_std**2),
+        chance,
+        left_step + right_step,
+        gap,
+        rough,
+    )
+
+
+@nb.njit(cache=True, nogil=True)
+def _opening(left, right, widens, beyond):  # type: ignore[no-untyped-def]
+    """Return the probability of a stope, and both steps from the mouth to the wall at the face (NaN: that was not seen).
+
+    A stope steps back on both sides, so that a wall which was not seen is taken to stand as the other does.
+    """
+    if math.isnan(left) and math.isnan(right):
+        return _UNSEEN_CHANCE, _UNSEEN_STEP_M, _UNSEEN_STEP_M
+    if math.isnan(left):
+        margin, left = 2.0 * right - _STEP_M, right
+    elif math.isnan(right):
+        margin, right = 2.0 * left - _STEP_M, left
+    else:
+        margin = min(left + right - _STEP_M, widens - _WIDENS_M, _BEYOND_TOE_M - beyond)
+    return 1.0 / (1.0 + math.exp(-margin / _STEP_STD_M)), left, right
 
 
 @nb.njit(cache=True, nogil=True)
@@ -83,8 +131,8 @@ def _wall(points, side, half):  # type: ignore[no-untyped-def]
     y = y[np.abs(y - half) < _WALL_SLACK_M]
     if y.size < 5:
         return math.nan, math.nan
-    middle = quantile(y, y.size, 0.5)
-    return middle, _deviation(y, middle)
+    wall = quantile(y, y.size, _VISIBLE)
+    return wall, _deviation(y, quantile(y, y.size, 0.5))
 
 
 @nb.njit(cache=True, nogil=True)
@@ -103,12 +151,16 @@ def _cell_medians(points, side):  # type: ignore[no-untyped-def]
 
 @nb.njit(cache=True, nogil=True)
 def _mouth(points, side, half):  # type: ignore[no-untyped-def]
-    """Return how far to a side one can look past the drift's last metre of wall: what stands out most at each height."""
+    """Return how far to a side one can look past the drift's last metre of wall: what stands out most at each height.
+
+    With its standard deviation, and where the wall ends (x). No wall: its line.
+    """
     wall = points[np.abs(side * points[:, 1] - half) < _WALL_SLACK_M]
     if wall.shape[0] < 16:
-        return math.nan, math.nan
+        return half, 0.5, -math.inf
     x = wall[:, 0].copy()
-    wall = wall[wall[:, 0] > select(x, x.size, x.size - 8) - _MOUTH_M]
+    end = select(x, x.size, x.size - 8)
+    wall = wall[wall[:, 0] > end - _MOUTH_M]
     rows, count = cell_numbers(wall[:, 2].copy(), np.zeros(wall.shape[0]), _WALL_CELL_M)
     y, starts = grouped(side * wall[:, 1], rows, count)
     inner, used = np.empty(count), 0
@@ -117,8 +169,9 @@ def _mouth(points, side, half):  # type: ignore[no-untyped-def]
         if hits:
             inner[used] = quantile(y[starts[k] : starts[k + 1]], hits, 0.05)
             used += 1
-    middle = quantile(inner, used, 0.5)
-    return middle, _deviation(inner[:used], middle) + 0.05
+    # a median over heights of which only these were seen: each is one draw, few of them independent
+    variance = inner[:used].var() * (1.0 / _BUMPS + max(_HEIGHTS / used - 1.0, 0.0))
+    return quantile(inner, used, 0.5), max(math.sqrt(variance), 0.03), end
 
 
 @nb.njit(cache=True, nogil=True)

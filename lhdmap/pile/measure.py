@@ -24,6 +24,7 @@ def measure(scene: Scene) -> PileEstimate:
     """Return the estimate of a scene, in the map."""
     face, limits = scene.face, scene.limits
     seen = relief(scene)
+    width, width_std = limits.width_m(face.b)
     on = scene.points[scene.on_face]
     unseen = max(1.0 - float(np.ptp(on[:, 2])) / (HIGH_M - LOW_M), 0.0)
     std_deg = math.hypot(face.inclination_std_deg, _DEFINITION_DEG + _UNSEEN_DEG * unseen)
@@ -37,7 +38,7 @@ def measure(scene: Scene) -> PileEstimate:
             covered,
             beyond,
             limits.gap_m,
-            min(limits.left_std_m, limits.right_std_m) * 2.0,
+            limits.rough_m,
         )
     )
     off = (face.x_at(on[:, 1], on[:, 2]) - on[:, 0]) / math.sqrt(1.0 + face.b**2 + face.c**2)
@@ -51,9 +52,8 @@ def measure(scene: Scene) -> PileEstimate:
         center_m=scene.frame.map(middle),
         left_limit_m=scene.frame.map(toe[0]),
         right_limit_m=scene.frame.map(toe[-1]),
-        # in the plane of the face, which may stand askew; a mouth is what one sees along the drift
-        width_m=(limits.left_m - limits.right_m) * (1.0 if limits.opens else math.sqrt(1.0 + face.b**2)),
-        width_std_m=math.sqrt(limits.left_std_m**2 + limits.right_std_m**2 + _WIDTH_DEFINITION_M**2),
+        width_m=width,
+        width_std_m=math.hypot(width_std, _WIDTH_DEFINITION_M),
         inclination_deg=face.inclination_deg,
         inclination_std_deg=std_deg,
         volume_m3=volume,

@@ -17,6 +17,7 @@ CELL_M = 0.1
 _PROUD_M = 0.28  # findings: a boulder protrudes by more, over more than _PATCH_M2
 _PATCH_M2 = 0.2
 _SMALLEST_M = 0.8  # smaller rocks go into the bucket
+_LARGEST = 0.5  # what stands out over more than this share of the drift's width is the face's own shape
 _ALONG_M = 0.15  # deviation of the depths in a cell of which the drift's own surface has more, a rock's front less
 _MIXED_M = 0.5  # the same of a cell that is left out: it holds a rock's edge and, farther back, the face
 _BY_WALL_M = 0.4  # what reaches less far from the wall is less than half the smallest boulder: the wall's own roughness
@@ -95,7 +96,7 @@ def _boulder(scene: Scene, seen: Relief, cells: Mask, standing: Mask) -> Boulder
     # its size is that of all that stands out about it: what is proud by more is only its top
     foot_rows, foot_columns = np.nonzero(ndimage.binary_dilation(cells, iterations=2) & standing)
     extent = max(float(np.ptp(foot_rows)), float(np.ptp(foot_columns))) * CELL_M + CELL_M
-    if extent < _SMALLEST_M:
+    if extent < _SMALLEST_M or extent > _LARGEST * (limits.left_m - limits.right_m):
         return None
     fronts = face.x_at(y, z) - seen.proud_m[rows, columns] * slant
     middle_y, middle_z = 0.5 * float(y.min() + y.max()), 0.5 * float(z.min() + z.max())

@@ -50,7 +50,7 @@ def _seen(points: FloatArray) -> FloatArray:
 def _scene(slope: float, *parts: FloatArray) -> Scene:
     points = _seen(np.concatenate([_plane(slope), *parts]))
     face = Face(0.0, 0.0, slope, 0.0, 1e-6 * np.eye(4), 0.05, 50)
-    limits = Limits(HALF_M, -HALF_M, 0.05, 0.05, False, 0.1)
+    limits = Limits(HALF_M, -HALF_M, 0.05, 0.05, 0.0, 0.0, 0.1, 0.1)
     on = (points[:, 2] > 0.2) & (points[:, 2] < 1.6)
     return Scene(Frame2(np.zeros(3), 0.0), points, face, on, 0.0, True, limits)
 
@@ -82,3 +82,11 @@ def test_depths_of_a_cell_tell_a_wall_from_a_face() -> None:
     column = int((HALF_M - 0.2 + HALF_M) / 0.1)
     assert np.nanmedian(seen.depth_std_m[:, column]) > 0.5
     assert np.nanmedian(seen.depth_std_m[:, :20]) < 0.05
+
+
+def test_bulge_over_most_of_the_width_is_no_boulder() -> None:
+    scene = _scene(STEEP)
+    points = scene.points.copy()
+    points[np.abs(points[:, 1]) < 1.3, 0] -= 0.6
+    scene = scene._replace(points=points)
+    assert boulders(scene, relief(scene)) == ()

@@ -116,11 +116,12 @@ def _line(variant: str, poses: str, rows: Sequence[Row]) -> str:
         if np.isfinite(row.width_sigmas)
     ]
     inside = "/".join(f"{100 * share:.0f}" for share in np.mean(sigmas, axis=0)) if sigmas else "-"
+    measured = sum(bool(np.isfinite(row.inclination_deg)) for row in rows)
     right = np.mean([row.status == row.found for row in rows])
     confident = sum(row.loadable > 0.9 for row in rows if row.status != "loadable")
     seen = f"{sum(row.boulders[1] > 0 for row in rows)} of {len(rows)}"
     return (
-        f"| {variant} | {poses} | {len(rows)} | {_statistics([row.width_m for row in rows])} "
+        f"| {variant} | {poses} | {measured} of {len(rows)} | {_statistics([row.width_m for row in rows])} "
         f"| {_statistics([row.inclination_deg for row in rows])} | {inside} | {_statistics([row.far_deg for row in rows])} "
         f"| {100 * right:.0f} | {confident} | {seen} |"
     )
@@ -130,11 +131,13 @@ def table(rows: Sequence[Row], seeds: str) -> str:
     """Return the document."""
     head = (
         "# The ore pile\n\nWritten by `python -m tools.evaluate.pile`; not edited by hand. Scenes of `lhdmap simulate pile` "
-        f"({seeds}); truth from the mesh. At a true 15 m from the toe: errors of width (m) and inclination (deg) as median, mean "
+        f"({seeds}); truth from the mesh. At a true 15 m from the toe: scenes in which a face with a true inclination was "
+        "measured, of all; of these errors of width (m) and inclination (deg) as median, mean "
         "and 90th percentile of the absolute value, share within two standard deviations (width/inclination, %), "
-        "inclination at 25 m, status right (%), "
+        "inclination at 25 m (of those that were measured there), status right (%), "
         "scenes that are not loadable and called so with more than 90 %, scenes with a boulder found.\n\n"
-        "| variant | poses | n | width median | mean | p90 | inclination median | mean | p90 | in 2 σ | 25 m: median | mean | p90 "
+        "| variant | poses | measured | width median | mean | p90 | inclination median | mean | p90 | in 2 σ "
+        "| 25 m: median | mean | p90 "
         "| status | falsely loadable | boulders |\n" + "|---" * 16 + "|\n"
     )
     lines = []
