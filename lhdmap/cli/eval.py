@@ -13,6 +13,7 @@ from lhdmap.cli.console import Console
 
 SUBJECTS = {
     "pile": "width, inclination and status of piles, as in Table 6 of the autonomous loading paper",
+    "rockbreaker": "durations of rockbreaker trajectories, as in Table 3 of the rockbreaker paper",
     "trajectory": "absolute, relative and segment errors of a trajectory, and relations",
 }
 

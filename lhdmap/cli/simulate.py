@@ -15,14 +15,16 @@ if TYPE_CHECKING:
     from lhdmap.messages import Record
     from lhdmap.simulation.scenario import DriftScenario
 
-BUILT_IN = ("drift", "pile")
+BUILT_IN = ("drift", "pile", "grizzly")
 FILES = ("log", "truth", "scenario", "mesh", "pile")
 DUST_SHARE, MIXED_PIXEL_SHARE, DROP_OUT_SHARE = 0.03, 0.5, 0.01
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command's arguments; an option that is not given keeps the scenario's value."""
-    parser.add_argument("scenario", metavar="SCENARIO", help="'drift', 'pile', or a scenario file (.toml)")
+    parser.add_argument(
+        "scenario", metavar="SCENARIO", help="'drift', 'pile', 'grizzly' (a cloud, not a log), or a scenario file"
+    )
     parser.add_argument(
         "-o", "--output", type=Path, metavar="LOG", help="log to write (default: a new name in this folder)"
     )
@@ -83,6 +85,8 @@ def _add_sensors(group: Any) -> None:
 
 def run(arguments: argparse.Namespace, console: Console) -> int:
     """Simulate and write; return the exit code."""
+    if arguments.scenario == "grizzly":
+        return _run_grizzly(arguments, console)
     from lhdmap.simulation.drive import simulate_drift
 
     if arguments.scenario != "pile" and (arguments.variant or arguments.flat_floor):
@@ -121,6 +125,26 @@ def run(arguments: argparse.Namespace, console: Console) -> int:
         text += (
             f"\n{drive.pile.status}, width {drive.pile.width_m:.2f} m, inclination {drive.pile.inclination_deg:.1f}°"
         )
+    console.result(values, text)
+    return 0
+
+
+def _run_grizzly(arguments: argparse.Namespace, console: Console) -> int:
+    """Write the cloud of a grizzly with rocks on it, for `lhdmap rockbreaker plan --cloud`; return the exit code."""
+    from lhdmap.rockbreaker.machine import load_rockbreaker
+    from lhdmap.simulation.grizzly import scene_json, simulate_grizzly, write_scene
+
+    machine = load_rockbreaker(Path(arguments.machine) if arguments.machine else None)
+    seed = arguments.seed or 0
+    path = arguments.output or Path(f"grizzly-{seed}.ply")
+    if path.exists():
+        raise UsageError(f"{path} exists already: another name is wanted (-o)")
+    scene = simulate_grizzly(machine, seed)
+    truth = write_scene(path, machine, scene)
+    told = scene_json(machine, scene)
+    values = {"cloud": str(path), "truth": str(truth), "points": len(scene.points_m)} | told
+    large = sum(one["oversize"] for one in told["rocks"])
+    text = f"cloud     {path}\ntruth     {truth}\n{len(scene.rocks)} rocks, {large} of them oversize"
     console.result(values, text)
     return 0
 

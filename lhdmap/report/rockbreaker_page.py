@@ -39,7 +39,7 @@ def write_plan_report(
 ) -> None:
     """Write one self-contained HTML page; `values` are those of `plan --json`, `rows` the sampled trajectory or None."""
     parts = [
-        markup.section("Rockbreaker plan", markup.cards(_figures(values)) + markup.listed(_notes(values), "warning"))
+        markup.section("What was planned", markup.cards(_figures(values)) + markup.listed(_notes(values), "warning"))
     ]
     if rows is not None:
         with charts.styled():

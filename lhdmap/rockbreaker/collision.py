@@ -21,6 +21,7 @@ _STEP_M = 0.04  # way of the tip between two positions that are checked
 _MOST_STEPS = 600
 _SPACING_M = 0.1  # of the points along a link
 _FAR_M = 1.0  # clearances beyond it are not told apart
+_CUBE_M = 0.1
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,10 +41,13 @@ class Obstacles:
     points_m: FloatArray | None = None
 
     @cached_property
-    def _tree(self) -> Any:
+    def _trees(self) -> tuple[Any, Any]:
+        """All points, and one in each small cube: most of the links is far from everything, and told so by few points."""
         from scipy.spatial import cKDTree
 
-        return cKDTree(self.points_m)
+        points = np.zeros((0, 3)) if self.points_m is None else self.points_m
+        _, first = np.unique(np.floor(points / _CUBE_M).astype(np.int64), axis=0, return_index=True)
+        return cKDTree(points), cKDTree(points[first])
 
     @property
     def none(self) -> bool:
@@ -56,8 +60,8 @@ class Obstacles:
             return Contact()
         sigma, half_step_m = _steps(path)
         axis_m, link = axis_points(path.machine, path.theta(sigma))
-        distance_m, names = self._distances(axis_m)
         radius = np.hypot(path.machine.per_joint("radius_m")[link], 0.5 * _SPACING_M)
+        distance_m, names = self._distances(axis_m, float(radius.max()) + half_step_m)
         clearance_m = distance_m - radius - half_step_m
         worst = np.min(clearance_m, axis=1)
         if (worst >= 0.0).all():
@@ -70,12 +74,17 @@ class Obstacles:
         )
         return Contact(float(worst.min()), Refusal("obstacle", text, float(sigma[step])))
 
-    def _distances(self, axis_m: FloatArray) -> tuple[FloatArray, Any]:
-        """Return the distance of each point of the links (T, P, 3) to the nearest obstacle (T, P), and its name."""
+    def _distances(self, axis_m: FloatArray, near_m: float) -> tuple[FloatArray, Any]:
+        """Return the distance of each point of the links (T, P, 3) to the nearest obstacle (T, P), and its name.
+
+        Distances to points are exact below `near_m`, above it up to the diagonal of a cube too large.
+        """
         distance_m = np.full(axis_m.shape[:2], _FAR_M)
         names = np.full(axis_m.shape[:2], "the cloud", dtype=object)
         if self.points_m is not None and len(self.points_m):
-            distance_m = np.minimum(self._tree.query(axis_m, distance_upper_bound=_FAR_M)[0], _FAR_M)
+            distance_m = np.minimum(self._trees[1].query(axis_m, distance_upper_bound=_FAR_M)[0], _FAR_M)
+            near = distance_m < near_m + math.sqrt(3.0) * _CUBE_M
+            distance_m[near] = self._trees[0].query(axis_m[near])[0]
         for box, name in zip(self.boxes_m if self.boxes_m is not None else (), self.names, strict=True):
             outside = np.maximum(np.maximum(box[0] - axis_m, axis_m - box[1]), 0.0)
             to_box_m = np.linalg.norm(outside, axis=-1)

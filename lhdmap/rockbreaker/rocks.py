@@ -16,10 +16,11 @@ from lhdmap.rockbreaker.machine import Grizzly
 _CELL_M = 0.05
 _BORDER_M = 0.3  # a rock may reach over the grizzly's edge by that
 _PLANE_M = 0.03  # from a plane's points
-_LEAST_SHARE = 0.02  # of the points that a plane must hold
+_LEAST_SHARE = 0.1  # of the area that is seen, which a plane must cover
+_PLANES = 4  # that are looked for
 _STEEPEST = math.tan(math.radians(15.0))
 _RISE_M = 0.12  # what stands higher over the bars is rock
-_SPLIT_M = 0.15  # how much narrower the neck between two rocks must be than the rocks
+_NECK = 0.3  # how much narrower the neck between two rocks must be than the lesser of them
 _FEWEST_CELLS = 12
 _TRIALS = 400
 
@@ -88,28 +89,53 @@ def find_rocks(points_m: FloatArray, grizzly: Grizzly) -> Scene:
 
 
 def _bars(points_m: FloatArray) -> tuple[float, float, float]:
-    """Return the nearly level plane that holds most points, by RANSAC and least squares."""
+    """Return the highest of the nearly level planes that cover a good part of the grizzly: below the bars the ore pass is seen."""
+    left = _thinned(points_m)
+    covered = len(np.unique(np.floor(left[:, :2] / _CELL_M), axis=0))
+    middle = left[:, :2].mean(axis=0)
+    planes: list[FloatArray] = []
     rng = np.random.default_rng(0)
-    used = points_m if len(points_m) <= 20_000 else points_m[rng.choice(len(points_m), 20_000, replace=False)]
-    best: FloatArray = np.zeros(3)
+    for _ in range(_PLANES):
+        plane = _level_plane(left, rng)
+        near = np.abs(_over(left, plane)) < _PLANE_M
+        if len(np.unique(np.floor(left[near, :2] / _CELL_M), axis=0)) < _LEAST_SHARE * covered:
+            break
+        planes.append(plane)
+        left = left[np.abs(_over(left, plane)) > 2.0 * _PLANE_M]
+        if len(left) < 100:
+            break
+    if not planes:
+        raise InputError("the cloud shows no bars of a grizzly: no level plane among the points over it")
+    best = max(planes, key=lambda plane: float(plane[0] + middle @ plane[1:]))
+    return float(best[0]), float(best[1]), float(best[2])
+
+
+def _thinned(points_m: FloatArray) -> FloatArray:
+    """Return one point of each small cube, at most 20,000 of them: near the scanner points lie dense."""
+    _, first = np.unique(np.floor(points_m / _CELL_M).astype(np.int64), axis=0, return_index=True)
+    rows = np.random.default_rng(0).permutation(first)[:20_000]
+    return points_m[rows]
+
+
+def _level_plane(points_m: FloatArray, rng: np.random.Generator) -> FloatArray:
+    """Return z = c + a x + b y (3,) of the nearly level plane that holds most points, by RANSAC and least squares."""
+    best: FloatArray = np.array([math.inf, 0.0, 0.0])
     most = 0
     for _ in range(_TRIALS):
-        three = used[rng.choice(len(used), 3, replace=False)]
+        three = points_m[rng.integers(0, len(points_m), 3)]
         design = np.column_stack([np.ones(3), three[:, :2]])
-        if abs(np.linalg.det(design)) < 1e-3:
+        if abs(np.linalg.det(design)) < 1e-2:
             continue
         plane: FloatArray = np.linalg.solve(design, three[:, 2]).astype(np.float64)
         if np.hypot(plane[1], plane[2]) > _STEEPEST:
             continue
-        count = int(np.count_nonzero(np.abs(_over(used, plane)) < _PLANE_M))
+        count = int(np.count_nonzero(np.abs(_over(points_m, plane)) < _PLANE_M))
         best, most = (plane, count) if count > most else (best, most)
-    if most < _LEAST_SHARE * len(used):
-        raise InputError("the cloud shows no bars of a grizzly: no level plane among the points over it")
-    for _ in range(3):
-        near = used[np.abs(_over(used, best)) < _PLANE_M]
+    for _ in range(3 if most else 0):
+        near = points_m[np.abs(_over(points_m, best)) < _PLANE_M]
         design = np.column_stack([np.ones(len(near)), near[:, :2]])
         best = np.linalg.lstsq(design, near[:, 2], rcond=None)[0].astype(np.float64)
-    return float(best[0]), float(best[1]), float(best[2])
+    return best
 
 
 def _over(points_m: FloatArray, plane: FloatArray) -> FloatArray:
@@ -128,19 +154,38 @@ def _height_map(xy_m: FloatArray, above_m: FloatArray, low: FloatArray, high: Fl
 
 
 def _parts(standing: npt.NDArray[np.bool_]) -> Labels:
-    """Return a number (X, Y) for each rock: connected cells, cut where the neck between two cores is narrow."""
-    depth = ndimage.distance_transform_edt(standing) * _CELL_M
-    whole, count = ndimage.label(standing, structure=np.ones((3, 3)))
-    markers = np.zeros_like(whole)
-    for k in range(1, count + 1):
-        inside = np.where(whole == k, depth, 0.0)
-        cores, found = ndimage.label(inside > max(0.5 * inside.max(), inside.max() - _SPLIT_M))
-        markers[cores > 0] = cores[cores > 0] + int(markers.max())
-        if found == 0:
-            markers[whole == k] = int(markers.max()) + 1
-    nearest = ndimage.distance_transform_edt(markers == 0, return_distances=False, return_indices=True)
-    labels: Labels = np.where(standing, markers[tuple(nearest)], 0).astype(np.int32)
-    return labels
+    """Return a number (X, Y) for each rock: connected cells, cut at a neck that is much narrower than what it joins.
+
+    A watershed on the distance to the outline: from the innermost cells outwards each cell joins its neighbours; where two parts
+    meet, they stay two if the lesser one has narrowed by `_NECK` of its own half width until there.
+    """
+    solid = ndimage.binary_closing(np.pad(standing, 3), structure=np.ones((3, 3)), iterations=1)
+    depth = ndimage.distance_transform_edt(solid)
+    labels = np.zeros(depth.shape, dtype=np.int32)
+    peak, joined = [0.0], [0]
+    rows, columns = np.nonzero(depth)
+    for k in np.argsort(-depth[rows, columns], kind="stable"):
+        i, j = int(rows[k]), int(columns[k])
+        around = {_root(joined, int(one)) for one in labels[i - 1 : i + 2, j - 1 : j + 2].flat if one}
+        if not around:
+            peak.append(float(depth[i, j]))
+            joined.append(len(joined))
+            around = {len(joined) - 1}
+        first, *others = sorted(around, key=lambda one: -peak[one])
+        for other in others:
+            if depth[i, j] > (1.0 - _NECK) * peak[other]:
+                joined[other] = first
+        labels[i, j] = first
+    roots = np.array([_root(joined, one) for one in range(len(joined))], dtype=np.int32)
+    numbers = np.unique(roots, return_inverse=True)[1].astype(np.int32)
+    return np.where(standing, numbers[labels[3:-3, 3:-3]], 0).astype(np.int32)
+
+
+def _root(joined: list[int], one: int) -> int:
+    """Return the part that a part was joined to in the end."""
+    while joined[one] != one:
+        one = joined[one]
+    return one
 
 
 def _rock(
