@@ -6,6 +6,7 @@ A heap seen from above becomes a height map; a drift (walls on both sides) is se
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -19,7 +20,7 @@ from lhdmap.pile.heap_axes import isolated, rotation_to_up, vertical_axis
 from lhdmap.pile.heap_faces import HeapFace, find_faces
 from lhdmap.pile.heap_floor import Floor, find_floor
 from lhdmap.pile.height_map import HeightMap, Mask, height_map
-from lhdmap.pile.result import PileEstimate
+from lhdmap.pile.result import AttackPoint, Boulder, PileEstimate
 from lhdmap.pile.slope_status import status_probabilities
 
 FEWEST_POINTS = 200
@@ -78,6 +79,7 @@ def measure_cloud(points_m: FloatArray, up: str = "auto", empty_m: FloatArray | 
         UsageError: the axis has no such name.
     """
     from lhdmap.pile.drift_cloud import drift_shell, measure_drift
+    from lhdmap.pile.drift_rocks import with_rocks
 
     if len(points_m) < FEWEST_POINTS:
         raise InputError(f"the cloud has {len(points_m)} points; at least {FEWEST_POINTS} were wanted")
@@ -87,6 +89,7 @@ def measure_cloud(points_m: FloatArray, up: str = "auto", empty_m: FloatArray | 
     shell = drift_shell(points)
     if shell is not None:
         estimate, figures = measure_drift(shell)
+        estimate = with_rocks(estimate, points) if estimate.found else estimate
     else:
         lonely = isolated(points)
         floor = None if empty_m is None else _floor_of(np.asarray(empty_m, dtype=np.float64) @ R_up_cloud.T)
@@ -268,8 +271,11 @@ def _face_json(face: HeapFace) -> dict[str, float]:
 
 
 def _turned(estimate: PileEstimate, R: FloatArray) -> PileEstimate:
-    """Return the estimate with its points in the cloud's own axes."""
-    from dataclasses import replace
-
+    """Return the estimate with its points in the cloud's own axes; a heading is one only where z points up."""
     names = ("center_m", "left_limit_m", "right_limit_m", "toe_m", "face_m")
-    return replace(estimate, **{name: getattr(estimate, name) @ R.T for name in names})
+    turned = {name: getattr(estimate, name) @ R.T for name in names}
+    rocks = tuple(Boulder(R @ rock.center_m, rock.size_m) for rock in estimate.boulders)
+    attack = estimate.attack if np.allclose(R[:, 2], (0.0, 0.0, 1.0)) else None
+    if attack is not None:
+        attack = AttackPoint(R @ attack.point_m, attack.heading_rad + math.atan2(R[1, 0], R[0, 0]))
+    return replace(estimate, boulders=rocks, attack=attack, **turned)

@@ -72,6 +72,9 @@ def _limits(points, face, floor, half):  # type: ignore[no-untyped-def]
     at_face, drift = hits[before_wall > -0.75 - off], hits[before_wall < -0.15 - off]
     left, left_std = _wall(at_face, 1.0, half)
     right, right_std = _wall(at_face, -1.0, half)
+    before_that = hits[(before_wall < -0.75 - off) & (before_wall > -1.75 - off)]
+    left_std = _farther(left, left_std, _wall(before_that, 1.0, half)[0], off)
+    right_std = _farther(right, right_std, _wall(before_that, -1.0, half)[0], off)
     mouth_left, mouth_left_std, left_end = _mouth(drift, 1.0, half)
     mouth_right, mouth_right_std, right_end = _mouth(drift, -1.0, half)
     left_step, right_step, widens = left - mouth_left, right - mouth_right, left + right - 2.0 * half
@@ -93,6 +96,12 @@ def _limits(points, face, floor, half):  # type: ignore[no-untyped-def]
         gap,
         rough,
     )
+
+
+@nb.njit(cache=True, nogil=True)
+def _farther(wall, std, wall_before, off):  # type: ignore[no-untyped-def]
+    """Return a wall's deviation at the face, from its measure as far off, where a metre before it stands somewhere else."""
+    return std if math.isnan(wall_before) else math.hypot(std, (wall - wall_before) * off)
 
 
 @nb.njit(cache=True, nogil=True)

@@ -16,7 +16,7 @@ _UNSEEN_DEG = 5.0  # the slope of the heights that were not seen
 _DEFINITION_DEG = 0.4  # rubble within the height that the inclination is defined over
 _WIDTH_DEFINITION_M = 0.07
 _BEYOND_M = 1.5
-_WORTH = 0.5  # probability of a pile below which nobody should drive into it
+WORTH = 0.5  # probability of a pile below which nobody should drive into it
 _MACHINE_HALF_M = 1.3
 
 
@@ -59,7 +59,7 @@ def measure(scene: Scene) -> PileEstimate:
         volume_m3=volume,
         volume_std_m3=volume_std,
         boulders=boulders(scene, seen),
-        attack=_attack(scene, seen) if share["loadable"] > _WORTH else None,
+        attack=attack_point(scene, seen) if share["loadable"] > WORTH else None,
         toe_m=scene.frame.map(toe),
         face_m=scene.frame.map(on[:, :3]),
         residuals_m=off,
@@ -99,7 +99,7 @@ def _volume(scene: Scene, seen: Relief) -> tuple[float, float]:
     return volume, volume * relative
 
 
-def _attack(scene: Scene, seen: Relief) -> AttackPoint | None:
+def attack_point(scene: Scene, seen: Relief) -> AttackPoint | None:
     """Return where the bucket meets rock on both sides: the middle, drawn to where the face stands out, clear of walls."""
     limits = scene.limits
     left, right = limits.left_m - _MACHINE_HALF_M - 0.2, limits.right_m + _MACHINE_HALF_M + 0.2

@@ -147,6 +147,29 @@ def test_pile_in_a_drift_is_found_without_poses(slope_deg: float, heading_rad: f
     np.testing.assert_allclose(right, [TOE_M, -2.0, 0.0], atol=0.3)
 
 
+@pytest.mark.parametrize("heading_rad", [0.0, 0.7, -2.0])
+def test_boulder_and_attack_point_in_the_cloud_of_a_drift(heading_rad: float) -> None:
+    drift = PiledDrift(slope_deg=45.0, heading_rad=heading_rad)
+    plain = measure_cloud(drift.cloud(), "z").estimate
+    assert plain.boulders == ()
+    assert plain.attack is not None
+    np.testing.assert_allclose(plain.attack.point_m, drift.R_map_drift @ [TOE_M, 0.0, 0.0], atol=0.3)
+    assert abs(math.remainder(plain.attack.heading_rad - heading_rad, 2.0 * math.pi)) < 0.05
+
+    face = drift.face()
+    y, z = face[:, 1] - 0.4, face[:, 2] - 0.8
+    ball = np.hypot(y, z) < 0.6
+    front = TOE_M + 0.8 - np.sqrt(np.maximum(0.36 - y**2 - z**2, 0.0))
+    face[ball, 0] = np.minimum(face, front[:, None])[ball, 0]
+    rest = drift.cloud()[: -len(face)]
+    found = measure_cloud(np.concatenate([rest, face @ drift.R_map_drift.T]), "z").estimate
+    (rock,) = found.boulders
+    assert rock.size_m == pytest.approx(1.2, rel=0.25)
+    assert (
+        np.linalg.norm(rock.center_m - drift.R_map_drift @ [TOE_M + 0.8, 0.4, 0.8]) < 0.35
+    )  # its lower half is not seen
+
+
 def test_drift_with_open_ends_is_none_with_a_reason() -> None:
     drift = PiledDrift(rubble_m=0.0)
     cloud = drift.cloud()
