@@ -96,3 +96,12 @@ def test_what_one_sees_along_a_rough_wall_is_its_nearer_part(seed: int) -> None:
     visible = y[seen & (x > 30.0)]
     assert np.median(visible) < every - 0.02
     assert abs(np.quantile(visible, _VISIBLE) - every) < abs(np.median(visible) - every)
+
+
+def test_wall_measured_farther_before_a_shallow_face_is_less_sure_where_it_varies() -> None:
+    wall = 1.9 + 0.15 * np.linspace(-8.0, 2.0, 2001)
+    widening, straight = (
+        limits_of(_walls(_face(3.5), one, one), _face(3.5), 0.0, 1.9) for one in (wall, _straight(1.9))
+    )
+    assert straight.left_std_m < 0.05
+    assert widening.left_std_m > 2.0 * straight.left_std_m
