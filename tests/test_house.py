@@ -31,7 +31,7 @@ FLOORS = [
     {"machine", "mapfolder"},
     {"kinematics"},
     {"logs", "proprioception", "odometry", "integration"},
-    {"pile"},
+    {"pile", "rockbreaker"},
     {"smoothing", "simulation", "evaluation"},
     {"report"},
     {"config"},

@@ -76,7 +76,13 @@ def plan_chart(trajectories: Sequence[Trajectory], machine: Rockbreaker, scene: 
         _circle(axes, rock.top_m, 0.5 * rock.length_m, charts.WHEELS if large else "#8a949e")
     for number, one in enumerate(trajectories):
         way = one.way_m()
-        axes.plot(way[:, 0], way[:, 1], color=COLOURS[number], linewidth=2.0, label=f"tip, {one.path.kind.upper()}")
+        axes.plot(
+            way[:, 0],
+            way[:, 1],
+            color=COLOURS[number],
+            linewidth=2.0,
+            label=f"step {number + 1}, {one.path.kind.upper()}",
+        )
         axes.plot(*way[0, :2], "o", color=COLOURS[number], markersize=5)
         axes.plot(*way[-1, :2], "s", color=COLOURS[number], markersize=6)
     axes.plot(0.0, 0.0, "^", color=charts.INK, markersize=8, label="swing axis")

@@ -95,7 +95,8 @@ def _add_surroundings(writer: RecordingWriter, machine: Rockbreaker, scene: Scen
         colours = [0xD55E00FF if one else 0x8A949EFF for one in large]
         writer.add_shape("map/rocks", rr.Ellipsoids3D(centers=middles, half_sizes=half, colors=colours))
     if obstacles.points_m is not None and len(obstacles.points_m):
-        seen = obstacles.points_m[:: max(1, len(obstacles.points_m) // _MOST_POINTS)]
+        seen = _near_grizzly(obstacles.points_m, scene)
+        seen = seen[:: max(1, len(seen) // _MOST_POINTS)]
         writer.add_shape("map/cloud", rr.Points3D(seen, colors=0x8A949EFF, radii=rr.Radius.ui_points(1.2)))
         writer.widen(np.percentile(seen, [2.0, 98.0], axis=0))
     if obstacles.boxes_m is not None and len(obstacles.boxes_m):
@@ -103,6 +104,14 @@ def _add_surroundings(writer: RecordingWriter, machine: Rockbreaker, scene: Scen
         writer.add_shape(
             "map/boxes", rr.Boxes3D(mins=low, sizes=high - low, colors=0xCC79A7FF, labels=list(obstacles.names))
         )
+
+
+def _near_grizzly(points_m: FloatArray, scene: Scene | None) -> FloatArray:
+    """Return the points around the bars: walls and roof would hide the arm."""
+    if scene is None:
+        return points_m
+    above_m = points_m[:, 2] - scene.plane[0] - points_m[:, :2] @ np.array(scene.plane[1:])
+    return np.asarray(points_m[(above_m > -0.6) & (above_m < 1.6)])
 
 
 def _bars(machine: Rockbreaker, scene: Scene | None) -> list[FloatArray]:

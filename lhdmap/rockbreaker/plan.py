@@ -22,6 +22,7 @@ from lhdmap.rockbreaker.timing import TIMINGS, TimeLaw, Timing
 from lhdmap.rockbreaker.validation import validated
 
 GRID = np.linspace(0.0, 1.0, 2001)  # σ at which limits are evaluated for timing
+_PEAKS = 40  # of the load over time, around which it is looked at more closely
 
 
 @dataclass(frozen=True, slots=True)
@@ -135,7 +136,15 @@ class Planner:
 
 def _within_limits(path: Path, law: TimeLaw) -> TimeLaw:
     """Slow the law down by what the limits are exceeded by between the nodes of the grid that it was made on."""
-    t = np.linspace(0.0, law.duration_s, 6001)
-    sigma, rate = law(t)
-    excess = float(np.max(rate / flow_curve(path, sigma).highest))
+    t, step_s = np.linspace(0.0, law.duration_s, 6001, retstep=True)
+    load = _load(path, law, t)
+    peaks = np.argsort(-load)[:_PEAKS]
+    near = (t[peaks, None] + step_s * np.linspace(-1.0, 1.0, 21)).ravel()
+    excess = max(float(load.max()), float(_load(path, law, np.clip(near, 0.0, law.duration_s)).max()))
     return law.slower(excess) if excess > 1.0 else law
+
+
+def _load(path: Path, law: TimeLaw, t_s: FloatArray) -> FloatArray:
+    """Return σ̇ over the highest that the limits allow (N,) at times (N,)."""
+    sigma, rate = law(t_s)
+    return np.asarray(rate / flow_curve(path, sigma).highest)

@@ -60,9 +60,7 @@ def _steps(planner: Planner, request: Request, rock: Rock, work_plane_m: float) 
 
 def _why(rock: Rock, oversize: tuple[Rock, ...], opening_m: float, passed_over: int) -> str:
     """Return in words which rock was chosen."""
-    text = (
-        f"{rock.length_m:.2f} x {rock.width_m:.2f} m, {rock.height_m:.2f} m high: it does not fall through {opening_m:.2f} m; "
-        f"{'the only' if len(oversize) == 1 else 'the largest'} of {len(oversize)} oversize "
-        f"{'rock' if len(oversize) == 1 else 'rocks'}"
-    )
+    rank = "the only oversize rock" if len(oversize) == 1 else f"the largest of {len(oversize)} oversize rocks"
+    size = f"{rock.length_m:.2f} x {rock.width_m:.2f} m, {rock.height_m:.2f} m high"
+    text = f"{size}: it does not fall through {opening_m:.2f} m; {rank}"
     return text + (f" that can be reached ({passed_over} larger cannot)" if passed_over else "")
