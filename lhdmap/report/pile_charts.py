@@ -200,7 +200,7 @@ def _limits(axes: Axes, frame: Ahead, pile: PileEstimate) -> None:
         capsize=4.0,
         label="limits ± 2 deviations",
     )
-    for (x, y, _), name, below in zip(ends, ("$E_L$", "$E_R$"), (False, True), strict=True):
+    for (x, y, _), name, below in zip(ends, ("E_L", "E_R"), (False, True), strict=True):
         axes.annotate(name, (x, y), (9.0, -12.0 if below else 6.0), textcoords="offset points")
 
 

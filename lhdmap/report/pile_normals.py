@@ -84,7 +84,7 @@ def normals_chart(report: PileReport, pile: PileEstimate) -> Figure:
     axes.grid(visible=False)
     for side in axes.spines.values():
         side.set_visible(False)
-    bar = figure.colorbar(image, cax=axes.inset_axes((1.015, 0.05, 0.018, 0.9)), label="$n_y$, left wall … right wall")
+    bar = figure.colorbar(image, cax=axes.inset_axes((1.015, 0.05, 0.018, 0.9)), label="n_y, left wall … right wall")
     bar.ax.grid(visible=False)
     charts.legend_above(axes)
     return figure
@@ -96,7 +96,7 @@ def _toe(axes: Axes, frame: Ahead, pile: PileEstimate) -> None:
     axes.plot(*toe.T, color=charts.INK, linewidth=1.6, label="toe")
     ends, _ = _projected(frame.local(np.vstack([pile.left_limit_m, pile.right_limit_m])))
     axes.plot(*ends.T, "D", color=charts.INK, markersize=4.5, label="limits")
-    for (x, y), name, shift in zip(ends, ("$E_L$", "$E_R$"), (6.0, -20.0), strict=True):
+    for (x, y), name, shift in zip(ends, ("E_L", "E_R"), (6.0, -20.0), strict=True):
         axes.annotate(name, (x, y), (shift, -14.0), textcoords="offset points", fontsize=11.0)
 
 
