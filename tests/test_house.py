@@ -19,6 +19,7 @@ from lhdmap.config import Settings, load_settings, settings_table, settings_toml
 from lhdmap.errors import ConfigError, UsageError
 from lhdmap.machine import Machine, load_machine
 from lhdmap.resources import resource
+from lhdmap.rockbreaker.machine import Rockbreaker, load_rockbreaker, rockbreaker_toml
 from lhdmap.simulation.scenario import load_scenario, scenario_toml
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -125,6 +126,12 @@ def test_the_machine_file_is_the_default_machine() -> None:
     assert load_machine(resource("pipelines/machines/lhd_11t.toml")) == Machine()
 
 
+def test_the_rockbreaker_file_is_the_default_machine() -> None:
+    text = resource("pipelines/machines/rockbreaker_table1.toml").read_text(encoding="utf-8")
+    assert text == rockbreaker_toml(Rockbreaker())
+    assert load_rockbreaker(resource("pipelines/machines/rockbreaker_table1.toml")) == Rockbreaker()
+
+
 def test_the_demo_scenario_says_all_that_can_be_said() -> None:
     file = resource("datasets/demo_drift.toml")
     whole = tomllib.loads(scenario_toml(load_scenario(file)))
@@ -206,6 +213,7 @@ def test_the_wheel_is_typed_licensed_and_small(wheel: Path) -> None:
     with zipfile.ZipFile(wheel) as archive:
         names = set(archive.namelist())
     assert {"lhdmap/py.typed", "lhdmap/report/style.css", "lhdmap/share/datasets/mit_csail.clf.bz2"} <= names
+    assert {f"lhdmap/share/evaluation/rockbreaker_table{k}.csv" for k in (2, 3)} <= names
     assert f"lhdmap-{lhdmap.__version__}.dist-info/licenses/LICENSE" in names
     assert wheel.stat().st_size < 5_000_000
 

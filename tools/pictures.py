@@ -1,4 +1,4 @@
-"""Make the pictures of README.md anew from a run of the program: report and recording of the sample drive.
+"""Make the pictures of README.md and docs anew from runs of the program: the sample drive, and a plan to a rock.
 
     python -m tools.pictures            # needs chromium and mesa-vulkan-drivers
 
@@ -38,7 +38,16 @@ def main() -> int:
         _save(work / "page.png", (0.075, 0.0, 0.93, 0.415), "report.png")
         _save(work / "page.png", (0.075, 0.53, 0.93, 0.835), "cloud.png")
         shutil.copy(work / "demo" / "evaluation.png", TARGET / "comparison.png")
+        _rockbreaker(work)
     return 0
+
+
+def _rockbreaker(work: Path) -> None:
+    _lhdmap("simulate", "grizzly", "--seed", "3", "-o", str(work / "grizzly.ply"))
+    words = ("--cloud", str(work / "grizzly.ply"), "--timing", "smooth", "-o", str(work / "plan"))
+    _lhdmap("rockbreaker", "plan", *words)
+    _lhdmap("view", str(work / "plan" / "recording.rrd"), "--screenshot", str(work / "plan.png"))
+    _save(work / "plan.png", (0.0, 0.03, 0.665, 0.6), "rockbreaker.png")
 
 
 def _lhdmap(*words: str) -> None:
