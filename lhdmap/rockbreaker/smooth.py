@@ -22,7 +22,11 @@ _WIDER = 4
 
 @dataclass(frozen=True, slots=True)
 class Sampled:
-    """A timing on an even grid of time from rest to rest: σ̇ (N,), linear between nodes, and σ (N,), its integral."""
+    """A timing from rest to rest over even cells of time: σ̇ as a quadratic B-spline, so that σ̈ is continuous within a cell too.
+
+    `rate` are its control points (N,), one a cell, zero before and after; `sigma` its integral at the edges of the cells (N + 1,).
+    |σ̈| and |σ⃛| are at most the first and second differences of the control points.
+    """
 
     step_s: float
     sigma: FloatArray
@@ -31,16 +35,19 @@ class Sampled:
     @property
     def duration_s(self) -> float:
         """Time from rest to rest."""
-        return self.step_s * (len(self.sigma) - 1)
+        return self.step_s * len(self.rate)
 
     def __call__(self, t_s: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return σ and σ̇ (N,) at times (N,) in [0, t_f]."""
-        at = np.clip(t_s / self.step_s, 0.0, len(self.sigma) - 1.0)
-        node = np.minimum(at.astype(np.int64), len(self.sigma) - 2)
-        share = at - node
-        change = self.rate[node + 1] - self.rate[node]
-        rate = self.rate[node] + share * change
-        return np.minimum(self.sigma[node] + self.step_s * share * (self.rate[node] + 0.5 * share * change), 1.0), rate
+        at = np.clip(t_s / self.step_s, 0.0, float(len(self.rate)))
+        cell = np.minimum(at.astype(np.int64), len(self.rate) - 1)
+        padded = np.pad(self.rate, 1)
+        before, here, after = padded[cell], padded[cell + 1], padded[cell + 2]
+        slope, bend = 0.5 * (after - before), after - 2.0 * here + before
+        w = at - cell - 0.5
+        rate = here + 0.125 * bend + w * (slope + 0.5 * w * bend)
+        passed = (here + 0.125 * bend) * (w + 0.5) + 0.5 * slope * (w**2 - 0.25) + bend * (w**3 + 0.125) / 6.0
+        return np.clip(self.sigma[cell] + self.step_s * passed, 0.0, 1.0), np.maximum(rate, 0.0)
 
     def slower(self, factor: float) -> Sampled:
         """Return the same in `factor` times the time."""
@@ -67,7 +74,7 @@ def _within_third(timing: Sampled, peak_third: float) -> Sampled:
 
 def _third(timing: Sampled) -> float:
     """Return the largest |σ⃛|."""
-    return float(np.abs(np.diff(timing.rate, 2)).max() / timing.step_s**2)
+    return float(np.abs(np.diff(np.pad(timing.rate, 1), 2)).max() / timing.step_s**2)
 
 
 @nb.njit(cache=True, nogil=True)
@@ -157,5 +164,6 @@ def _rounds(
 
 def _filtered(highest: FloatArray, peak_second: float, window_s: float) -> Sampled:
     _, rate, step_s = _rounds(highest, peak_second, window_s, _STEPS, _ROUNDS)
-    sigma = np.concatenate([[0.0], np.cumsum(0.5 * step_s * (rate[1:] + rate[:-1]))])
+    padded = np.pad(rate, 1)
+    sigma = np.concatenate([[0.0], np.cumsum(step_s * (padded[:-2] + 4.0 * rate + padded[2:]) / 6.0)])
     return Sampled(step_s, sigma / sigma[-1], rate / sigma[-1])
