@@ -23,6 +23,7 @@ TASKS = {
     "plan": "a trajectory between two tips, or from the cloud of a grizzly to above its largest oversize rock",
     "workspace": "where the tip can be, and which orientations it allows at a point",
 }
+MINUS = "A point that begins with a minus is given with an equals sign: --to=-0.5,2,-1."
 CLOUDS = (".ply", ".pcd", ".laz", ".las")
 EXIT_INFEASIBLE = 1
 
@@ -31,7 +32,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options of both tasks."""
     tasks = parser.add_subparsers(dest="task", metavar="TASK", title="tasks", required=True)
     for name, summary in TASKS.items():
-        sub = tasks.add_parser(name, help=summary, description=summary[0].upper() + summary[1:] + ".")
+        sub = tasks.add_parser(name, help=summary, description=summary[0].upper() + summary[1:] + ".", epilog=MINUS)
         sub.add_argument("--machine", type=Path, metavar="FILE.toml", help="the machine (default: the paper's Table 1)")
         sub.add_argument(
             "-o", "--output", type=Path, metavar="DIR", help=f"folder to make (default: rockbreaker_{name})"
@@ -173,7 +174,7 @@ def _request(arguments: argparse.Namespace, machine: Rockbreaker) -> Request:
     from lhdmap.rockbreaker.plan import Request
 
     start, phi_from = _start(arguments, machine)
-    end = np.array(numbers(arguments.end, 3, "--to")) if arguments.end else start
+    end = np.array(numbers(arguments.end, 3, "--to")) if arguments.end is not None else start
     phi_to = math.radians(_finite(arguments.phi_to, "--phi-to")) if arguments.phi_to is not None else math.nan
     return Request(start, end, phi_from, phi_to, arguments.path, arguments.timing)
 
@@ -184,9 +185,11 @@ def _start(arguments: argparse.Namespace, machine: Rockbreaker) -> tuple[FloatAr
 
     from lhdmap.rockbreaker.kinematics import pose_of_theta, theta_of_rho
 
-    if arguments.start and arguments.from_cylinders:
-        raise UsageError("--from and --from-cylinders say the same: leave out one")
-    if arguments.from_cylinders:
+    if arguments.from_cylinders is not None:
+        if arguments.start is not None or arguments.phi_from is not None:
+            raise UsageError(
+                "--from-cylinders states tip and orientation at the start: leave out --from and --phi-from"
+            )
         lengths = np.array([0.0, *numbers(arguments.from_cylinders, 4, "--from-cylinders")])
         pose = pose_of_theta(machine, theta_of_rho(machine, lengths))
         if np.isnan(pose).any():
@@ -194,7 +197,7 @@ def _start(arguments: argparse.Namespace, machine: Rockbreaker) -> tuple[FloatAr
                 f"--from-cylinders {arguments.from_cylinders}: the pins of the machine do not allow these lengths"
             )
         return pose[:3], float(pose[3])
-    start = np.array(numbers(arguments.start, 3, "--from")) if arguments.start else np.array(machine.base.park_m)
+    start = np.array(machine.base.park_m if arguments.start is None else numbers(arguments.start, 3, "--from"))
     return start, math.radians(
         _finite(arguments.phi_from, "--phi-from")
     ) if arguments.phi_from is not None else math.nan
@@ -292,7 +295,7 @@ def _run_workspace(arguments: argparse.Namespace, console: Console, machine: Roc
     from lhdmap.report.rockbreaker_page import write_workspace_report
     from lhdmap.rockbreaker.reach import workspace_json
 
-    at_m = np.array(numbers(arguments.at, 3, "--at")) if arguments.at else None
+    at_m = np.array(numbers(arguments.at, 3, "--at")) if arguments.at is not None else None
     values = workspace_json(machine, at_m)
     target = (arguments.output or Path("rockbreaker_workspace")).resolve()
     if not arguments.no_pictures:

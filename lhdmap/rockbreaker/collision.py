@@ -20,7 +20,7 @@ from lhdmap.rockbreaker.paths import Path
 _STEP_M = 0.04  # way of the tip between two positions that are checked
 _MOST_STEPS = 600
 _SPACING_M = 0.1  # of the points along a link
-_FAR_M = 1.0  # clearances beyond it are not told apart
+_FAR_M = 1.0  # distances beyond it are not told apart, nor beyond half of it more than a link's radius
 _CUBE_M = 0.1
 
 
@@ -79,10 +79,11 @@ class Obstacles:
 
         Distances to points are exact below `near_m`, above it up to the diagonal of a cube too large.
         """
-        distance_m = np.full(axis_m.shape[:2], _FAR_M)
+        far_m = max(_FAR_M, near_m + 0.5 * _FAR_M)
+        distance_m = np.full(axis_m.shape[:2], far_m)
         names = np.full(axis_m.shape[:2], "the cloud", dtype=object)
         if self.points_m is not None and len(self.points_m):
-            distance_m = np.minimum(self._trees[1].query(axis_m, distance_upper_bound=_FAR_M)[0], _FAR_M)
+            distance_m = np.minimum(self._trees[1].query(axis_m, distance_upper_bound=far_m)[0], far_m)
             near = distance_m < near_m + math.sqrt(3.0) * _CUBE_M
             distance_m[near] = self._trees[0].query(axis_m[near])[0]
         for box, name in zip(self.boxes_m if self.boxes_m is not None else (), self.names, strict=True):

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import tomllib
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -13,7 +15,7 @@ from lhdmap.geometry import se3
 from lhdmap.integration.cloud_io import read_cloud
 from lhdmap.messages import FloatArray
 from lhdmap.rockbreaker.collision import Obstacles
-from lhdmap.rockbreaker.machine import Rockbreaker
+from lhdmap.rockbreaker.machine import Rockbreaker, sub_table
 from lhdmap.settings import load_section, nearest, setting
 
 
@@ -29,22 +31,35 @@ def read_boxes(path: Path) -> Obstacles:
     """Return the boxes of a TOML file, a section `[box.NAME]` with `min_m` and `max_m` each.
 
     Raises:
-        InputError: the file cannot be read.
+        InputError: the file cannot be read, or holds no box.
         ConfigError: a key or value is wrong.
     """
     try:
         table = tomllib.loads(path.read_text(encoding="utf-8"))
     except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
         raise InputError(f"{path}: not a readable file of boxes ({error})") from error
-    for key in table:
-        if key != "box":
-            raise ConfigError(f"{path}: unknown section '{key}'{nearest(key, ['box'])}")
-    boxes = {name: load_section(ObstacleBox, f"box.{name}", values) for name, values in table.get("box", {}).items()}
-    for name, box in boxes.items():
-        if any(low >= high for low, high in zip(box.min_m, box.max_m, strict=True)):
-            raise ConfigError(f"{path}: box.{name}: each value of min_m must be below that of max_m")
+    try:
+        boxes = _boxes(table)
+    except ConfigError as error:
+        raise ConfigError(f"{path}: {error}") from error
+    if not boxes:
+        raise InputError(
+            f"{path}: the file holds no box: a section [box.NAME] with min_m and max_m for each was wanted"
+        )
     corners = np.array([[box.min_m, box.max_m] for box in boxes.values()], dtype=float).reshape(-1, 2, 3)
     return Obstacles(corners, tuple(boxes))
+
+
+def _boxes(table: Mapping[str, Any]) -> dict[str, ObstacleBox]:
+    for key in table:
+        if key != "box":
+            raise ConfigError(f"unknown section '{key}'{nearest(key, ['box'])}")
+    given = sub_table(table, "box")
+    boxes = {name: load_section(ObstacleBox, f"box.{name}", sub_table(given, name, "box.")) for name in given}
+    for name, box in boxes.items():
+        if any(low >= high for low, high in zip(box.min_m, box.max_m, strict=True)):
+            raise ConfigError(f"box.{name}: each value of min_m must be below that of max_m")
+    return boxes
 
 
 def cloud_in_base(path: Path, machine: Rockbreaker) -> FloatArray:

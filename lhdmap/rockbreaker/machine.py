@@ -26,6 +26,9 @@ ASSUMED = "assumed, typical of stationary breaker booms"
 JOINTS = ("swing", "inner_boom", "outer_boom", "breaker")
 SECTIONS = ("name", "base", "joint", "grizzly")
 _LPM = 1.0 / 60_000.0  # litres a minute in m³/s
+_SINGULAR = math.radians(
+    1.0
+)  # how near the outer boom may come to in line with the inner one: there the arm is singular
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,13 +43,28 @@ class Base:
         170.0, unit="L/min", source=TEXT, minimum=0.1, maximum=1e5, doc="Q_p,max: flow that the pump delivers."
     )
     position_m: tuple[float, float, float] = setting(
-        (0.0, 0.0, 0.0), unit="m", source=ASSUMED, doc="Where the base's frame is in the frame of a cloud."
+        (0.0, 0.0, 0.0),
+        unit="m",
+        source=ASSUMED,
+        minimum=-1e7,
+        maximum=1e7,
+        doc="Where the base's frame is in the frame of a cloud.",
     )
     yaw_deg: float = setting(
-        0.0, unit="deg", source=ASSUMED, doc="Heading of the base's x axis in the frame of a cloud."
+        0.0,
+        unit="deg",
+        source=ASSUMED,
+        minimum=-360.0,
+        maximum=360.0,
+        doc="Heading of the base's x axis in the frame of a cloud.",
     )
     park_m: tuple[float, float, float] = setting(
-        (3.0, 0.0, 0.5), unit="m", source=ASSUMED, doc="Tip where the machine waits: start of a plan without --from."
+        (3.0, 0.0, 0.5),
+        unit="m",
+        source=ASSUMED,
+        minimum=-200.0,
+        maximum=200.0,
+        doc="Tip where the machine waits: start of a plan without --from.",
     )
 
 
@@ -84,8 +102,12 @@ class Joint:
 class Grizzly:
     """The grizzly under the machine, in the base's frame."""
 
-    min_m: tuple[float, float] = setting((2.20, -2.15), unit="m", source=TABLE2, doc="Corner with the least x and y.")
-    max_m: tuple[float, float] = setting((6.27, 2.15), unit="m", source=TABLE2, doc="Corner with the largest x and y.")
+    min_m: tuple[float, float] = setting(
+        (2.20, -2.15), unit="m", source=TABLE2, minimum=-200.0, maximum=200.0, doc="Corner with the least x and y."
+    )
+    max_m: tuple[float, float] = setting(
+        (6.27, 2.15), unit="m", source=TABLE2, minimum=-200.0, maximum=200.0, doc="Corner with the largest x and y."
+    )
     opening_m: float = setting(
         0.4,
         unit="m",
@@ -133,17 +155,18 @@ class Rockbreaker:
     def theta_limits(self) -> FloatArray:
         """Limits of the joints that follow from the cylinders' (erratum 1), shape (2, 4): lowest and highest, rad.
 
-        An outer boom that could pass through the straight arm is kept on the side where most of its range lies: the arm
-        is singular there.
+        They are given in the turn around zero, whatever turn the offsets ε are in. The outer boom is kept a degree from in
+        line with the inner one, straight or folded back, where the arm is singular, on the side where most of its range lies.
         """
         from lhdmap.rockbreaker.kinematics import beta_of_rho, theta_of_beta
 
         ends = np.array([[joint.shortest_m, joint.longest_m] for joint in self.joints]).T
         theta = np.sort(theta_of_beta(self, beta_of_rho(self, ends)), axis=0)
+        theta -= 2.0 * np.pi * np.round(theta.mean(axis=0) / (2.0 * np.pi))
         half = min(theta[1, 0], -theta[0, 0])  # the second swing cylinder is the mirror image of the first (erratum 2)
         theta[:, 0] = -half, half
-        side = 0 if theta[0, 2] + theta[1, 2] > 0.0 else 1
-        theta[side, 2] = max(theta[0, 2], 0.0) if side == 0 else min(theta[1, 2], 0.0)
+        one_side = np.array([_SINGULAR, math.pi - _SINGULAR])
+        theta[:, 2] = np.clip(theta[:, 2], *(one_side if theta[:, 2].sum() > 0.0 else -one_side[::-1]))
         return theta
 
     @cached_property
@@ -196,26 +219,36 @@ def _machine(table: Mapping[str, Any], default_name: str) -> Rockbreaker:
     for key in table:
         if key not in SECTIONS:
             raise ConfigError(f"unknown section '{key}'{nearest(key, SECTIONS)}")
-    given = table.get("joint", {})
+    given = sub_table(table, "joint")
     for key in given:
         if key not in JOINTS:
             raise ConfigError(f"unknown joint '{key}'{nearest(key, JOINTS)}")
     joints = []
     for name, default in zip(JOINTS, _table1(), strict=True):
-        values = {one.name: getattr(default, one.name) for one in fields(Joint)} | given.get(name, {})
+        values = {one.name: getattr(default, one.name) for one in fields(Joint)} | dict(sub_table(given, name, "joint."))
         joints.append(load_section(Joint, f"joint.{name}", values))
         _check_joint(f"joint.{name}", joints[-1])
     machine = Rockbreaker(
         str(table.get("name", default_name)),
-        load_section(Base, "base", table.get("base", {})),
+        load_section(Base, "base", sub_table(table, "base")),
         tuple(joints),
-        load_section(Grizzly, "grizzly", table.get("grizzly", {})),
+        load_section(Grizzly, "grizzly", sub_table(table, "grizzly")),
     )
+    if any(low >= high for low, high in zip(machine.grizzly.min_m, machine.grizzly.max_m, strict=True)):
+        raise ConfigError("grizzly: each value of min_m must be below that of max_m")
     low, high = machine.theta_limits
     for name, *limits in zip(JOINTS, low, high, strict=True):
         if limits[0] >= limits[1]:
             raise ConfigError(f"joint.{name}: its cylinder leaves it no angle to move in")
     return machine
+
+
+def sub_table(table: Mapping[str, Any], key: str, parent: str = "") -> Mapping[str, Any]:
+    """Return the section `key` of a table, empty where it is not there; ConfigError where it is no section."""
+    values = table.get(key, {})
+    if not isinstance(values, Mapping):
+        raise ConfigError(f"{parent}{key} = {values!r}: a section [{parent}{key}] was wanted")
+    return values
 
 
 def _check_joint(name: str, joint: Joint) -> None:

@@ -53,8 +53,8 @@ def task_json(task: Task) -> dict[str, Any]:
     values |= {"from_m": steps[0]["from_m"], "phi_from_deg": steps[0]["phi_from_deg"]}
     if not task.feasible:
         return values
-    worst = max(steps, key=lambda step: float(step["max_flow_ratio"]))
-    before_s = sum(step["duration_s"] for step in steps[: steps.index(worst)])
+    at = max(range(len(steps)), key=lambda k: float(steps[k]["max_flow_ratio"]))
+    worst, before_s = steps[at], sum(step["duration_s"] for step in steps[:at])
     sums = {key: sum(step[key] for step in steps) for key in ("duration_s", "pump_volume_l", "bound_s", "planning_ms")}
     return (
         values

@@ -131,7 +131,11 @@ class Planner:
         low, high = self.machine.theta_limits[:, 0]
         if corridor.contains(intervals, phi) and low - 1e-9 <= theta[0] <= high + 1e-9:
             return None
-        return corridor.violated(self.machine, theta, sigma)
+        refusal = corridor.violated(self.machine, theta, sigma)
+        if refusal.joint == "theta1":
+            return refusal
+        possible = [f"{a:.2f} to {b:.2f}" for a, b in np.degrees(intervals[~np.isnan(intervals[:, 0])])]
+        return replace(refusal, limit=f"{refusal.limit} (phi there: {', '.join(possible) or 'no'} deg)")
 
 
 def _within_limits(path: Path, law: TimeLaw) -> TimeLaw:

@@ -11,17 +11,18 @@ from lhdmap.messages import FloatArray
 from lhdmap.rockbreaker.machine import Rockbreaker
 from lhdmap.rockbreaker.orientation import VERTICAL, nearest_vertical, phi_intervals, phi_range, planar_position
 
+_STEP_M, _MOST_STEPS = 0.05, 400
 
-def workspace_slice(
-    machine: Rockbreaker, step_m: float = 0.05
-) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+
+def workspace_slice(machine: Rockbreaker) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
     """Return x (X,), z (Z,) and φ_min, φ_max (X, Z) over the slice at θ1 = 0, NaN where the tip cannot be."""
     reach = float(machine.links_m.sum())
+    step_m = max(_STEP_M, reach / _MOST_STEPS)
     x = np.arange(0.0, reach + step_m, step_m)
     z = np.arange(machine.base.height_m - reach, machine.base.height_m + reach, step_m)
     low, high = phi_range(machine, np.stack(np.meshgrid(x, z, indexing="ij"), axis=-1))
     used = np.flatnonzero(~np.isnan(low).all(axis=0))
-    rows = slice(max(int(used[0]) - 2, 0), int(used[-1]) + 3)
+    rows = slice(max(int(used[0]) - 2, 0), int(used[-1]) + 3) if len(used) else slice(None)
     return x, z[rows], low[:, rows], high[:, rows]
 
 
@@ -37,11 +38,16 @@ def workspace_json(machine: Rockbreaker, at_m: FloatArray | None) -> dict[str, A
         "swing_rate_limit_dps": math.degrees(machine.swing_rate_limit),
         "area_m2": float(seen.sum()) * cell_m2,
         "vertical_area_m2": float(vertical.sum()) * cell_m2,
-        "x_m": [float(x[seen.any(axis=1)].min()), float(x[seen.any(axis=1)].max())],
-        "z_m": [float(z[seen.any(axis=0)].min()), float(z[seen.any(axis=0)].max())],
+        "x_m": _span(x[seen.any(axis=1)]),
+        "z_m": _span(z[seen.any(axis=0)]),
         "folder": None,
     }
     return values | _orientations(machine, at_m)
+
+
+def _span(values: FloatArray) -> list[float] | None:
+    """Return the least and the largest of some values; None: there are none, as the workspace is narrower than a cell."""
+    return [float(values.min()), float(values.max())] if len(values) else None
 
 
 def _orientations(machine: Rockbreaker, at_m: FloatArray | None) -> dict[str, Any]:

@@ -53,8 +53,8 @@ def _steps(planner: Planner, request: Request, rock: Rock, work_plane_m: float) 
         steps.append(planner.plan(replace(request, end_m=above_start, phi_to=np.nan, path="cslm")))
         if steps[-1].trajectory is None:
             return tuple(steps)
-    phi = steps[-1].phi_to if steps else request.phi_from
-    last = planner.plan(replace(request, start_m=above_start, end_m=above_rock, phi_from=phi))
+    begin, phi = (above_start, steps[-1].phi_to) if steps else (request.start_m, request.phi_from)
+    last = planner.plan(replace(request, start_m=begin, end_m=above_rock, phi_from=phi))
     return (*steps, last)
 
 

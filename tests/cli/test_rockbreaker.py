@@ -95,6 +95,7 @@ def test_from_a_cloud_to_the_rock_in_it(tmp_path: Path, capsys: pytest.CaptureFi
     assert len(values["steps"]) == 2
     assert values["duration_s"] == pytest.approx(sum(step["duration_s"] for step in values["steps"]))
     assert values["clearance_m"] > 0.0
+    assert told([*words, "--path", "cslm", "--timing", "limit", "--no-pictures"], capsys)["limit_reached_at_s"] > 0.0
     assert main(["rockbreaker", "plan", "--cloud", str(cloud), "--no-pictures", "-o", str(tmp_path / "plan")]) == 0
     assert "oversize" in capsys.readouterr().out
 
@@ -145,6 +146,10 @@ def test_eval_prints_the_paper_beside_the_result(capsys: pytest.CaptureFixture[s
         ("plan --from a,b,c --to 6,0,-1", 2, "--from"),
         ("plan --from 2,2,-1 --from-cylinders 1.4,2.4,2.5,2.0 --to 6,0,-1", 2, "--from-cylinders"),
         ("plan --from-cylinders 9,2.4,2.5,2.0 --to 6,0,-1", 2, "pins"),
+        ("plan --from-cylinders 1.4,2.4,2.5,2.0 --phi-from 250 --to 6,0,-1", 2, "--phi-from"),
+        ("plan --from= --to 6,0,-1", 2, "--from"),
+        ("plan --to=", 2, "--to"),
+        ("workspace --at=", 2, "--at"),
         ("plan --to 6,0,-1 --set rockbreaker.min_ramp=2", 2, "did you mean 'min_ramp_s'"),
         ("plan --to 6,0,-1 --machine none.toml", 3, "none.toml"),
         ("plan --cloud none.ply", 3, "none.ply"),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -13,6 +14,7 @@ from lhdmap.errors import ConfigError, InputError
 from lhdmap.rockbreaker import kinematics
 from lhdmap.rockbreaker.machine import Rockbreaker, load_rockbreaker, rockbreaker_toml
 from lhdmap.rockbreaker.orientation import candidates, nearest_vertical, phi_intervals, phi_range, planar_position
+from lhdmap.rockbreaker.reach import workspace_json
 
 from tests.rockbreaker.poses import FL, NL, random_poses
 
@@ -176,6 +178,11 @@ def test_a_machine_file_says_what_was_written(tmp_path: Path) -> None:
         ("[joint.breaker]\nshortest_m = 2.65", "joint.breaker"),
         ("[grizly]\n", "did you mean 'grizzly'"),
         ("[base]\npump_flow_lpm = -1.0", "pump_flow_lpm"),
+        ("[base]\nyaw_deg = inf", "yaw_deg"),
+        ("base = 3", r"a section \[base\]"),
+        ("joint = 3", r"a section \[joint\]"),
+        ("[joint]\nswing = 3", r"a section \[joint\.swing\]"),
+        ("[grizzly]\nmin_m = [7.0, -1.0]", "grizzly"),
     ],
 )
 def test_a_wrong_machine_file_is_refused(tmp_path: Path, text: str, told: str) -> None:
@@ -183,6 +190,40 @@ def test_a_wrong_machine_file_is_refused(tmp_path: Path, text: str, told: str) -
     path.write_text(text, encoding="utf-8")
     with pytest.raises(ConfigError, match=told):
         load_rockbreaker(path)
+
+
+def _with_offsets(offset_deg: dict[int, float]) -> Rockbreaker:
+    """Return Table 1 with other offsets ε of some joints."""
+    joints = [replace(one, offset_deg=offset_deg.get(k, one.offset_deg)) for k, one in enumerate(MACHINE.joints)]
+    return Rockbreaker(joints=tuple(joints))
+
+
+def test_offsets_in_another_turn_describe_the_same_machine() -> None:
+    turned = _with_offsets({0: 270.96, 1: 302.37, 2: 352.4, 3: -299.44})
+    assert turned.theta_limits == pytest.approx(MACHINE.theta_limits, abs=1e-9)
+    for pose in random_poses(MACHINE, 20, seed=8):
+        assert kinematics.theta_of_pose(turned, pose) == pytest.approx(
+            kinematics.theta_of_pose(MACHINE, pose), abs=1e-9
+        )
+        assert nearest_vertical(turned, pose[:3]) == pytest.approx(nearest_vertical(MACHINE, pose[:3]), abs=1e-9)
+
+
+@pytest.mark.parametrize(("offset_deg", "inside_deg"), [(40.0, (-96.845, -1.0)), (-60.0, (-179.0, -95.962))])
+def test_an_outer_boom_that_could_pass_in_line_is_kept_from_it(
+    offset_deg: float, inside_deg: tuple[float, float]
+) -> None:
+    machine = _with_offsets({2: offset_deg})
+    assert np.degrees(machine.theta_limits[:, 2]) == pytest.approx(inside_deg, abs=1e-3)
+    for pose in random_poses(machine, 100, seed=9):
+        assert kinematics.within(machine, kinematics.theta_of_pose(machine, pose)).all()
+
+
+def test_the_slice_of_a_machine_that_hardly_moves_is_empty() -> None:
+    stiff = Rockbreaker(
+        joints=(MACHINE.joints[0], *(replace(one, shortest_m=2.0, longest_m=2.001) for one in MACHINE.joints[1:]))
+    )
+    values = workspace_json(stiff, None)
+    assert (values["area_m2"], values["x_m"], values["z_m"]) == (0.0, None, None)
 
 
 def test_a_missing_machine_file_is_told(tmp_path: Path) -> None:

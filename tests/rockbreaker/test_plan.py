@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -225,6 +226,7 @@ def test_a_refusal_names_sigma_joint_and_limit(end: tuple[float, float, float], 
 def test_an_orientation_that_the_limits_do_not_allow_is_refused() -> None:
     plan = PLANNER.plan(Request(NL[:3], FL[:3], phi_to=math.radians(292.0)))
     assert plan.refusal is not None
+    assert "phi there: 292.72 to 331.54 deg" in plan.refusal.limit
     assert plan.refusal.joint == "theta3"  # cylinder 3 is at its shortest there
     assert plan.refusal.sigma == 1.0
 
@@ -247,6 +249,18 @@ def test_the_bound_is_the_net_stroke_over_the_flow_limit() -> None:
     volume = 1.03e-2 * stroke[stroke > 1e-9].sum() + 7.16e-3 * np.abs(stroke[stroke < -1e-9]).sum()
     assert trajectory.bound_s == pytest.approx(volume / (24.0 / 60_000.0), abs=1e-9)
     assert trajectory.bound_s == pytest.approx(6.16, abs=5e-3)
+
+
+def test_a_machine_whose_arm_could_be_straight_ends_in_time() -> None:
+    """At the straight arm no speed of the joints moves the tip; this plan began there and took for ever."""
+    joints = list(MACHINE.joints)
+    joints[2] = replace(joints[2], offset_deg=40.0)
+    machine = Rockbreaker(joints=tuple(joints))
+    for start, end in zip(*np.split(random_poses(machine, 12, seed=5), 2), strict=True):
+        plan = Planner(machine).plan(Request(start[:3], end[:3], timing="smooth"))
+        assert plan.refusal is not None or plan.trajectory is not None
+        if plan.trajectory is not None:
+            assert plan.trajectory.law.duration_s < 600.0
 
 
 def test_a_pump_that_is_too_small_sets_the_pace() -> None:

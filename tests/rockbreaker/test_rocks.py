@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
-from lhdmap.errors import ConfigError, InputError
+from lhdmap.errors import ConfigError, InputError, LhdmapError
 from lhdmap.rockbreaker.collision import Obstacles, axis_points
 from lhdmap.rockbreaker.environment import read_boxes
 from lhdmap.rockbreaker.machine import Rockbreaker
@@ -132,6 +133,26 @@ def test_clearance_is_the_distance_of_the_links_less_their_radius() -> None:
     assert plan.trajectory.clearance_m == pytest.approx(0.9 - 0.30, abs=0.01)
 
 
+def test_a_link_thicker_than_what_is_looked_at_is_not_said_to_touch() -> None:
+    joints = tuple(replace(one, radius_m=1.2) for one in MACHINE.joints)
+    wall = np.array([[[0.0, 30.0, -3.0], [9.0, 30.2, 6.0]]])
+    points = np.array([[3.0, 20.0, 0.0], [3.0, 21.0, 0.0]])
+    planner = Planner(Rockbreaker(joints=joints), RockbreakerSettings(), Obstacles(wall, ("wall",), points))
+    plan = planner.plan(Request(np.array([4.0, 0.0, 0.0]), np.array([4.0, 1.0, 0.0])))
+    assert plan.refusal is None
+
+
+def test_without_a_step_down_the_plan_starts_where_the_tip_is() -> None:
+    scene = simulate_grizzly(MACHINE, 3)
+    seen = find_rocks(scene.points_m, MACHINE.grizzly)
+    work_plane_m = max(rock.top_m[2] for rock in seen.rocks) + RockbreakerSettings().clearance_m
+    start = np.array([3.0, 0.0, work_plane_m + 0.008])
+    task = plan_to_rock(Planner(MACHINE), seen, Request(start, start), OPENING_M)
+    assert task is not None
+    assert len(task.steps) == 1
+    assert task.steps[0].request.start_m == pytest.approx(start, abs=1e-12)
+
+
 def test_capsules_end_at_the_joints_and_at_the_tip() -> None:
     trajectory = Planner().plan(Request(NL[:3], FR[:3])).trajectory
     assert trajectory is not None
@@ -158,3 +179,19 @@ def test_boxes_are_read_and_wrong_ones_refused(tmp_path: Path) -> None:
         read_boxes(path)
     with pytest.raises(InputError, match=r"none\.toml"):
         read_boxes(tmp_path / "none.toml")
+
+
+@pytest.mark.parametrize(
+    ("text", "told"),
+    [
+        ("", "no box"),
+        ("box = 3", r"a section \[box\]"),
+        ("[box]\nwall = 3", r"a section \[box\.wall\]"),
+        ("[box.wall]\nmin_m = [0.0, 1.0]", r"boxes\.toml: box\.wall"),
+    ],
+)
+def test_a_file_without_proper_boxes_is_refused_by_its_name(tmp_path: Path, text: str, told: str) -> None:
+    path = tmp_path / "boxes.toml"
+    path.write_text(text, encoding="utf-8")
+    with pytest.raises(LhdmapError, match=told):
+        read_boxes(path)
