@@ -119,13 +119,13 @@ def _run_plan(arguments: argparse.Namespace, console: Console, machine: Rockbrea
 
 def _plan(arguments: argparse.Namespace, machine: Rockbreaker, settings: RockbreakerSettings) -> Outcome:
     from lhdmap.rockbreaker.outcome import plan_json
-    from lhdmap.rockbreaker.plan import Planner
+    from lhdmap.rockbreaker.plan import Planner, start_joints
 
     if (arguments.end is None) == (arguments.cloud is None):
         raise UsageError("one of --to and --cloud is needed: where the tip is to go, or the cloud to find a rock in")
-    obstacles, cloud_m = _obstacles(arguments, machine)
-    planner = Planner(machine, settings, obstacles)
     request = _request(arguments, machine)
+    obstacles, cloud_m = _obstacles(arguments, machine, start_joints(machine, request))
+    planner = Planner(machine, settings, obstacles)
     planner.warm_up(request)
     if cloud_m is not None:
         return _plan_to_rock(planner, request, cloud_m)
@@ -148,17 +148,19 @@ def _plan_to_rock(planner: Planner, request: Request, cloud_m: FloatArray) -> Ou
     return Outcome(task_json(task), trajectories, scene, planner.obstacles)
 
 
-def _obstacles(arguments: argparse.Namespace, machine: Rockbreaker) -> tuple[Obstacles, FloatArray | None]:
-    """Return what must not be touched, and the cloud of the grizzly (N, 3), which is part of it."""
+def _obstacles(
+    arguments: argparse.Namespace, machine: Rockbreaker, theta: FloatArray
+) -> tuple[Obstacles, FloatArray | None]:
+    """Return what must not be touched, and the cloud of the grizzly (N, 3), which is part of it; `theta` (4,): the arm now."""
     import numpy as np
 
-    from lhdmap.rockbreaker.collision import Obstacles
+    from lhdmap.rockbreaker.collision import Obstacles, without_arm
     from lhdmap.rockbreaker.environment import cloud_in_base, read_boxes
 
     clouds = [path for path in arguments.obstacles if path.suffix.lower() in CLOUDS]
     boxes = [read_boxes(path) for path in arguments.obstacles if path not in clouds]
-    points = [cloud_in_base(path, machine) for path in clouds]
-    grizzly_m = cloud_in_base(arguments.cloud, machine) if arguments.cloud else None
+    points = [without_arm(machine, cloud_in_base(path, machine), theta) for path in clouds]
+    grizzly_m = without_arm(machine, cloud_in_base(arguments.cloud, machine), theta) if arguments.cloud else None
     points += [grizzly_m] if grizzly_m is not None else []
     corners = [one.boxes_m for one in boxes if one.boxes_m is not None]
     return Obstacles(

@@ -22,6 +22,7 @@ _MOST_STEPS = 600
 _SPACING_M = 0.1  # of the points along a link
 _FAR_M = 1.0  # distances beyond it are not told apart, nor beyond half of it more than a link's radius
 _CUBE_M = 0.1
+_SKIN_M = 0.05  # around the arm where it stands: what a cloud shows there is the arm itself
 
 
 @dataclass(frozen=True, slots=True)
@@ -101,6 +102,21 @@ def _steps(path: Path) -> tuple[FloatArray, float]:
     sigma = np.linspace(0.0, 1.0, min(max(math.ceil(length_m / _STEP_M), 24), _MOST_STEPS) + 1)
     axis_m, _ = axis_points(path.machine, path.theta(sigma))
     return sigma, 0.5 * float(np.linalg.norm(np.diff(axis_m, axis=0), axis=-1).max())
+
+
+def without_arm(machine: Rockbreaker, points_m: FloatArray, theta: FloatArray) -> FloatArray:
+    """Return the points of a cloud (N, 3) that are not of the machine's own arm as it stands at joints θ (4,); NaN: all."""
+    from scipy.spatial import cKDTree
+
+    if np.isnan(theta).any():
+        return points_m
+    axis_m, link = axis_points(machine, theta[None])
+    own = np.zeros(len(points_m), dtype=bool)
+    for joint in (1, 2, 3):
+        within_m = math.hypot(machine.joints[joint].radius_m + _SKIN_M, 0.5 * _SPACING_M)
+        distance_m, _ = cKDTree(axis_m[0, link == joint]).query(points_m, distance_upper_bound=within_m)
+        own |= np.isfinite(distance_m)
+    return points_m[~own]
 
 
 def joint_positions(machine: Rockbreaker, theta: FloatArray) -> FloatArray:

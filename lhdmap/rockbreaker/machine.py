@@ -225,7 +225,9 @@ def _machine(table: Mapping[str, Any], default_name: str) -> Rockbreaker:
             raise ConfigError(f"unknown joint '{key}'{nearest(key, JOINTS)}")
     joints = []
     for name, default in zip(JOINTS, _table1(), strict=True):
-        values = {one.name: getattr(default, one.name) for one in fields(Joint)} | dict(sub_table(given, name, "joint."))
+        values = {one.name: getattr(default, one.name) for one in fields(Joint)} | dict(
+            sub_table(given, name, "joint.")
+        )
         joints.append(load_section(Joint, f"joint.{name}", values))
         _check_joint(f"joint.{name}", joints[-1])
     machine = Rockbreaker(

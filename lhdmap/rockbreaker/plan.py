@@ -13,7 +13,7 @@ from lhdmap.rockbreaker import corridor, turning
 from lhdmap.rockbreaker.collision import Obstacles
 from lhdmap.rockbreaker.corridor import Refusal
 from lhdmap.rockbreaker.flow import FlowCurve, flow_curve, least_duration_s
-from lhdmap.rockbreaker.kinematics import rho_of_theta
+from lhdmap.rockbreaker.kinematics import rho_of_theta, theta_of_pose
 from lhdmap.rockbreaker.machine import Rockbreaker
 from lhdmap.rockbreaker.orientation import nearest_vertical, phi_intervals, planar_position, unwrapped
 from lhdmap.rockbreaker.paths import Kind, Path
@@ -136,6 +136,12 @@ class Planner:
             return refusal
         possible = [f"{a:.2f} to {b:.2f}" for a, b in np.degrees(intervals[~np.isnan(intervals[:, 0])])]
         return replace(refusal, limit=f"{refusal.limit} (phi there: {', '.join(possible) or 'no'} deg)")
+
+
+def start_joints(machine: Rockbreaker, request: Request) -> FloatArray:
+    """Return θ (4,) at the start of a request, NaN where the tip or its orientation is out of reach."""
+    phi = nearest_vertical(machine, request.start_m) if math.isnan(request.phi_from) else request.phi_from
+    return theta_of_pose(machine, np.append(request.start_m, phi))
 
 
 def _within_limits(path: Path, law: TimeLaw) -> TimeLaw:

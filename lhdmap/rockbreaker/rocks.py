@@ -22,6 +22,7 @@ _STEEPEST = math.tan(math.radians(15.0))
 _RISE_M = 0.12  # what stands higher over the bars is rock
 _NECK = 0.3  # how much narrower the neck between two rocks must be than the lesser of them
 _FEWEST_CELLS = 12
+_TALLEST_M = 3.0  # what stands higher over the bars is no rock but a wall or a machine
 _TRIALS = 400
 
 Labels = npt.NDArray[np.int32]
@@ -191,12 +192,14 @@ def _root(joined: list[int], one: int) -> int:
 def _rock(
     cells: npt.NDArray[np.bool_], heights: FloatArray, low: FloatArray, plane: tuple[float, float, float]
 ) -> Rock | None:
-    """Return the rock of some cells, or None where they are too few."""
+    """Return the rock of some cells, or None where they are too few, or too high to be a rock."""
     if np.count_nonzero(cells) < _FEWEST_CELLS:
         return None
     xy_m = low + (np.argwhere(cells) + 0.5) * _CELL_M
     length_m, width_m, middle_m = _outline(xy_m)
     height_m = float(np.percentile(heights[cells], 98))
+    if height_m > _TALLEST_M:
+        return None
     z_m = plane[0] + float(middle_m @ np.array(plane[1:])) + height_m
     return Rock(np.array([*middle_m, z_m]), length_m, width_m, height_m)
 

@@ -9,10 +9,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 from lhdmap.errors import ConfigError, InputError, LhdmapError
-from lhdmap.rockbreaker.collision import Obstacles, axis_points
+from lhdmap.rockbreaker.collision import Obstacles, axis_points, without_arm
 from lhdmap.rockbreaker.environment import read_boxes
 from lhdmap.rockbreaker.machine import Rockbreaker
-from lhdmap.rockbreaker.plan import Planner, Request
+from lhdmap.rockbreaker.plan import Planner, Request, start_joints
 from lhdmap.rockbreaker.rocks import find_rocks
 from lhdmap.rockbreaker.settings import RockbreakerSettings
 from lhdmap.rockbreaker.task import plan_to_rock
@@ -151,6 +151,25 @@ def test_without_a_step_down_the_plan_starts_where_the_tip_is() -> None:
     assert task is not None
     assert len(task.steps) == 1
     assert task.steps[0].request.start_m == pytest.approx(start, abs=1e-12)
+
+
+def test_the_arm_itself_and_a_leaning_wall_in_the_cloud_are_no_rocks_and_no_obstacles() -> None:
+    scene = simulate_grizzly(MACHINE, 3)
+    start = np.array([3.0, 0.0, 0.5])
+    theta = start_joints(MACHINE, Request(start, start))
+    rng = np.random.default_rng(0)
+    axis_m, _ = axis_points(MACHINE, theta[None])
+    skin = rng.normal(size=(200, len(axis_m[0]), 3))
+    arm = (axis_m[0] + 0.2 * skin / np.linalg.norm(skin, axis=-1, keepdims=True)).reshape(-1, 3)
+    wall = rng.uniform([2.0, 2.35, scene.bars_m], [6.5, 2.45, scene.bars_m + 5.0], (40_000, 3))
+    seen = find_rocks(without_arm(MACHINE, np.concatenate([scene.points_m, arm, wall]), theta), MACHINE.grizzly)
+    wanted = find_rocks(scene.points_m, MACHINE.grizzly)
+    assert seen.oversize(OPENING_M)[0].top_m == pytest.approx(wanted.oversize(OPENING_M)[0].top_m, abs=0.05)
+    assert len(seen.oversize(OPENING_M)) == len(wanted.oversize(OPENING_M))
+    kept = without_arm(MACHINE, np.concatenate([scene.points_m, arm]), theta)
+    assert len(kept) == len(scene.points_m)
+    planner = Planner(MACHINE, RockbreakerSettings(), Obstacles(points_m=kept))
+    assert planner.plan(Request(start, start + np.array([0.5, 0.5, 0.0]))).trajectory is not None
 
 
 def test_capsules_end_at_the_joints_and_at_the_tip() -> None:
