@@ -128,8 +128,10 @@ def _seen(meshes: list[Mesh], rng: np.random.Generator) -> FloatArray:
 
 
 def write_scene(path: Path, machine: Rockbreaker, scene: GrizzlyScene) -> Path:
-    """Write the cloud, and beside it the truth as JSON, whose path is returned."""
-    write_cloud(path, Cloud(scene.points_m.astype(np.float32)))
+    """Write the cloud in the frame that the machine says it stands in, and the truth as JSON, whose path is returned."""
+    T_cloud_base = machine.T_cloud_base
+    points_m = scene.points_m @ T_cloud_base[:3, :3].T + T_cloud_base[:3, 3]
+    write_cloud(path, Cloud(points_m.astype(np.float32)))
     truth = path.with_name(path.stem + ".grizzly.json")
     truth.write_text(json.dumps(scene_json(machine, scene), indent=1) + "\n", encoding="utf-8")
     return truth

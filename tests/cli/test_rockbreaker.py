@@ -100,6 +100,21 @@ def test_from_a_cloud_to_the_rock_in_it(tmp_path: Path, capsys: pytest.CaptureFi
     assert "oversize" in capsys.readouterr().out
 
 
+def test_a_machine_that_stands_elsewhere_in_the_cloud_finds_the_same_rock(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    machine = tmp_path / "elsewhere.toml"
+    machine.write_text("[base]\nposition_m = [120.0, -45.0, 7.5]\nyaw_deg = 130.0\n", encoding="utf-8")
+    plans = []
+    for number, words in enumerate(([], ["--machine", str(machine)])):
+        cloud = tmp_path / f"grizzly{number}.ply"
+        told(["simulate", "grizzly", "--seed", "2", *words, "-o", str(cloud)], capsys)
+        asked = ["rockbreaker", "plan", "--cloud", str(cloud), *words, "--no-pictures", "-o", str(tmp_path / "plan")]
+        plans.append(told(asked, capsys))
+    assert plans[1]["rock"]["top_m"] == pytest.approx(plans[0]["rock"]["top_m"], abs=0.05)
+    assert plans[1]["duration_s"] == pytest.approx(plans[0]["duration_s"], rel=0.02)
+
+
 def test_a_grizzly_without_large_rocks_ends_with_1_and_says_so(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
