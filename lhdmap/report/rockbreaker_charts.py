@@ -12,7 +12,7 @@ from lhdmap.report import charts
 from lhdmap.rockbreaker.collision import joint_positions
 from lhdmap.rockbreaker.corridor import Corridor, corridor
 from lhdmap.rockbreaker.machine import Rockbreaker
-from lhdmap.rockbreaker.orientation import VERTICAL
+from lhdmap.rockbreaker.orientation import holds_vertical
 from lhdmap.rockbreaker.plan import Trajectory
 from lhdmap.rockbreaker.reach import workspace_slice
 from lhdmap.rockbreaker.rocks import Scene
@@ -159,7 +159,7 @@ def orientation_chart(trajectory: Trajectory) -> Figure:
 def workspace_chart(machine: Rockbreaker, at_m: FloatArray | None = None) -> Figure:
     """Draw the slice of Fig. 3: where the tip can be at θ1 = 0, and where with a vertical breaker."""
     x, z, low, high = workspace_slice(machine)
-    vertical = (low <= VERTICAL) & (high >= VERTICAL)
+    vertical = holds_vertical(low, high)
     figure = charts.new_figure(5.6)
     axes = figure.add_subplot()
     for cells, colour, label in (

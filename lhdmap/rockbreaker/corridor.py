@@ -11,7 +11,7 @@ import numpy as np
 from lhdmap.messages import FloatArray
 from lhdmap.rockbreaker.kinematics import planar_theta
 from lhdmap.rockbreaker.machine import Rockbreaker
-from lhdmap.rockbreaker.orientation import VERTICAL, phi_intervals, unwrapped
+from lhdmap.rockbreaker.orientation import VERTICAL, phi_intervals
 from lhdmap.rockbreaker.paths import Path
 
 _TOUCH = 1e-6  # rad: an end of the path may stand on the edge of its interval
@@ -33,7 +33,7 @@ class Refusal:
 
 @dataclass(frozen=True, slots=True)
 class Corridor:
-    """Lowest and highest φ (N,) at σ (N,), unwrapped around the vertical breaker; connected from the path's start to its end."""
+    """Lowest and highest φ (N,) at σ (N,), in the turn of `orientation.unwrapped`; connected from the path's start to its end."""
 
     sigma: FloatArray
     low: FloatArray
@@ -112,6 +112,5 @@ def _excess(machine: Rockbreaker, theta: FloatArray) -> FloatArray:
 
 
 def contains(bounds: FloatArray, phi: float) -> bool:
-    """Return whether one of the intervals (K, 2) holds φ."""
-    value = float(unwrapped(np.asarray(phi)))
-    return bool(np.any((bounds[:, 0] <= value + _TOUCH) & (value - _TOUCH <= bounds[:, 1])))
+    """Return whether one of the intervals (K, 2) holds φ, in the same turn."""
+    return bool(np.any((bounds[:, 0] <= phi + _TOUCH) & (phi - _TOUCH <= bounds[:, 1])))

@@ -1,8 +1,8 @@
 """Which orientations φ of the breaker a position of the tip allows: the twelve candidates of Section 3.1.
 
 At an end of the range a joint stands at a limit, so the ends are among the solutions of the inverse problem with one of θ_2, θ_3,
-θ_4 at one of its two limits: six cases of a two-link arm with two solutions each. Angles φ here are in (90°, 450°], so that the
-range of a breaker that points down does not wrap.
+θ_4 at one of its two limits: six cases of a two-link arm with two solutions each. Angles φ here are in the turn around the middle
+of what the joints' limits allow (Table 1: (87.3°, 447.3°]), so that no range of feasible φ wraps.
 """
 
 from __future__ import annotations
@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 
 import numpy as np
+import numpy.typing as npt
 
 from lhdmap.messages import FloatArray
 from lhdmap.rockbreaker.kinematics import planar_theta
@@ -42,12 +43,20 @@ def candidates(machine: Rockbreaker, planar_m: FloatArray) -> tuple[FloatArray, 
     low, high = machine.theta_limits[:, 1:]
     feasible = np.all((theta >= low - _EDGE) & (theta <= high + _EDGE), axis=-1, keepdims=True)
     theta = np.where(feasible, theta, np.nan)
-    return unwrapped(theta.sum(axis=-1) - math.radians(machine.base.breaker_offset_deg)), theta
+    return unwrapped(machine, theta.sum(axis=-1) - math.radians(machine.base.breaker_offset_deg)), theta
 
 
-def unwrapped(phi: FloatArray) -> FloatArray:
-    """Return angles φ in the turn around the vertical breaker."""
-    return np.asarray(phi - 2.0 * np.pi * np.round((phi - VERTICAL) / (2.0 * np.pi)))
+def unwrapped(machine: Rockbreaker, phi: FloatArray) -> FloatArray:
+    """Return angles φ in the turn around the middle of those that the joints' limits allow."""
+    middle = float(machine.theta_limits[:, 1:].mean(axis=0).sum()) - math.radians(machine.base.breaker_offset_deg)
+    middle -= 2.0 * math.pi * round((middle - VERTICAL) / (2.0 * math.pi))
+    return np.asarray(phi - 2.0 * np.pi * np.round((phi - middle) / (2.0 * np.pi)))
+
+
+def holds_vertical(low: FloatArray, high: FloatArray) -> npt.NDArray[np.bool_]:
+    """Return whether the ranges from `low` to `high` (…) hold a vertical breaker, in whatever turn; NaN: not."""
+    turn = 2.0 * np.pi
+    return np.asarray(np.ceil((low - VERTICAL) / turn) <= np.floor((high - VERTICAL) / turn))
 
 
 def _two_link(
@@ -119,5 +128,6 @@ def nearest_vertical(machine: Rockbreaker, point_m: FloatArray) -> float:
     swing = math.atan2(point_m[1], point_m[0])
     if not len(intervals) or not machine.theta_limits[0, 0] <= swing <= machine.theta_limits[1, 0]:
         return math.nan
-    nearest = np.clip(VERTICAL, intervals[:, 0], intervals[:, 1])
-    return float(nearest[np.argmin(np.abs(nearest - VERTICAL))])
+    vertical = VERTICAL + 2.0 * np.pi * np.array([[0.0], [-1.0], [1.0]])
+    nearest = np.clip(vertical, intervals[:, 0], intervals[:, 1])
+    return float(nearest.flat[np.argmin(np.abs(nearest - vertical))])

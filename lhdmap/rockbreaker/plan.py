@@ -109,7 +109,9 @@ class Planner:
         return Trajectory(path, timing, law, curve, contact.clearance_m, bound_s)
 
     def _phi(self, tip_m: FloatArray, given: float) -> float:
-        return nearest_vertical(self.machine, tip_m) if math.isnan(given) else float(unwrapped(np.asarray(given)))
+        if math.isnan(given):
+            return nearest_vertical(self.machine, tip_m)
+        return float(unwrapped(self.machine, np.asarray(given)))
 
     def _path(self, request: Request, phi_from: float, phi_to: float) -> Path | Refusal:
         """Return the path with a feasible turning, or why an end or the way between them is not feasible."""

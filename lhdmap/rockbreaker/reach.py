@@ -9,7 +9,7 @@ import numpy as np
 
 from lhdmap.messages import FloatArray
 from lhdmap.rockbreaker.machine import Rockbreaker
-from lhdmap.rockbreaker.orientation import VERTICAL, nearest_vertical, phi_intervals, phi_range, planar_position
+from lhdmap.rockbreaker.orientation import holds_vertical, nearest_vertical, phi_intervals, phi_range, planar_position
 
 _STEP_M, _MOST_STEPS = 0.05, 400
 
@@ -31,7 +31,7 @@ def workspace_json(machine: Rockbreaker, at_m: FloatArray | None) -> dict[str, A
     x, z, low, high = workspace_slice(machine)
     cell_m2 = float((x[1] - x[0]) * (z[1] - z[0]))
     seen = ~np.isnan(low)
-    vertical = (low <= VERTICAL) & (high >= VERTICAL)
+    vertical = holds_vertical(low, high)
     values: dict[str, Any] = {
         "machine": machine.name,
         "theta_limits_deg": np.degrees(machine.theta_limits).T.tolist(),

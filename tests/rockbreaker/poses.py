@@ -28,5 +28,5 @@ def random_poses(machine: Rockbreaker, count: int, seed: int) -> FloatArray:
         ahead = np.abs(np.arctan2(found[:, 1], found[:, 0]) - theta[:, 0]) < 1e-9
         poses = np.concatenate([poses, found[ahead]])
     poses = poses[:count]
-    poses[:, 3] = unwrapped(poses[:, 3])
+    poses[:, 3] = unwrapped(machine, poses[:, 3])
     return poses

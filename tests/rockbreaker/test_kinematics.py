@@ -218,6 +218,22 @@ def test_an_outer_boom_that_could_pass_in_line_is_kept_from_it(
         assert kinematics.within(machine, kinematics.theta_of_pose(machine, pose)).all()
 
 
+def test_orientations_of_an_arm_that_points_up_do_not_wrap() -> None:
+    """With θ3 of 33 to 134 deg the range of φ goes through 90 deg; swept in steps, by both elbows' one solution."""
+    machine = _with_offsets({2: 170.0})
+    step = math.radians(0.1)
+    for pose in random_poses(machine, 40, seed=10):
+        phi = pose[3] + np.arange(-math.pi, math.pi, step)
+        swept = np.column_stack([np.tile(pose[:3], (len(phi), 1)), phi])
+        feasible = kinematics.within(machine, kinematics.theta_of_pose(machine, swept))
+        found = phi_intervals(machine, planar_position(pose[:3]))
+        length = float(np.nansum(found[:, 1] - found[:, 0]))
+        assert length == pytest.approx(feasible.sum() * step, abs=3 * step)
+        off = np.abs(np.angle(np.exp(1j * (phi[feasible] - math.radians(270.0)))))
+        away = abs(math.remainder(nearest_vertical(machine, pose[:3]) - math.radians(270.0), 2.0 * math.pi))
+        assert away == pytest.approx(off.min(), abs=2 * step)
+
+
 def test_the_slice_of_a_machine_that_hardly_moves_is_empty() -> None:
     stiff = Rockbreaker(
         joints=(MACHINE.joints[0], *(replace(one, shortest_m=2.0, longest_m=2.001) for one in MACHINE.joints[1:]))
