@@ -22,6 +22,7 @@ from lhdmap.rockbreaker.timing import TIMINGS, TimeLaw, Timing
 from lhdmap.rockbreaker.validation import validated
 
 GRID = np.linspace(0.0, 1.0, 2001)  # σ at which limits are evaluated for timing
+FINE_GRID = np.linspace(0.0, 1.0, 8001)  # the same where the breaker's turning has blends, which may be narrow
 _PEAKS = 40  # of the load over time, around which it is looked at more closely
 
 
@@ -102,7 +103,7 @@ class Planner:
         contact = self.obstacles.first_contact(path)
         if contact.refusal is not None:
             return contact.refusal
-        curve = flow_curve(path, GRID)
+        curve = flow_curve(path, GRID if len(path.turning.sigma) == 2 else FINE_GRID)
         law = _within_limits(path, TIMINGS[timing](curve, self.settings.min_ramp_s))
         rho = rho_of_theta(self.machine, path.theta(np.array([0.0, 1.0])))
         bound_s = least_duration_s(self.machine, rho[0], rho[1])

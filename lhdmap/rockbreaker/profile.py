@@ -14,7 +14,8 @@ import numpy as np
 from lhdmap.messages import FloatArray
 
 KAPPA = (0.4, 0.6)
-_RAMP_SAMPLES = 128
+_RAMP_SAMPLES = (128, 1024)  # of a ramp in the search: more where a narrow dip of the curve slipped through
+_DENSE_SAMPLES = 8192
 _HALVINGS = 36
 
 
@@ -71,14 +72,27 @@ def coefficients(kappa: float) -> tuple[float, float, float]:
 def best_ramp(highest: FloatArray, t_r_min_s: float) -> Ramps:
     """Return the fastest profile with t_r = `t_r_min_s` below the curve σ̇ ≤ F(σ) on an even grid (N,)."""
     curve, least = _folded(highest)
-    return Ramps(t_r_min_s, *_best_kappa(curve, least, t_r_min_s))
+    for samples in _RAMP_SAMPLES:
+        found = Ramps(t_r_min_s, *_best_kappa(curve, least, samples, t_r_min_s))
+        if _holds(curve, least, found):
+            break
+    return found
 
 
 def best_profile(highest: FloatArray, t_r_min_s: float) -> Ramps:
     """Return the fastest of the whole three-parameter family (erratum 12), found by a search over all t_r."""
     curve, least = _folded(highest)
-    longest = max(_best_duration(curve, least, t_r_min_s) * 0.5, t_r_min_s * 1.01)
-    return Ramps(*_best_of_family(curve, least, t_r_min_s, longest))
+    for samples in _RAMP_SAMPLES:
+        longest = max(_best_duration(curve, least, samples, t_r_min_s) * 0.5, t_r_min_s * 1.01)
+        found = Ramps(*_best_of_family(curve, least, samples, t_r_min_s, longest))
+        if _holds(curve, least, found):
+            break
+    return found
+
+
+def _holds(curve: FloatArray, least: FloatArray, found: Ramps) -> bool:
+    """Return whether a profile stays below the curve between the samples of its search too, but for 1e-4."""
+    return bool(_below(curve, least, _DENSE_SAMPLES, found.t_r_s, found.kappa, found.cruise * (1.0 - 1e-4)))
 
 
 def _folded(highest: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -89,7 +103,7 @@ def _folded(highest: FloatArray) -> tuple[FloatArray, FloatArray]:
 
 
 @nb.njit(cache=True, nogil=True)
-def _below(curve: FloatArray, least: FloatArray, t_r: float, kappa: float, cruise: float) -> bool:
+def _below(curve: FloatArray, least: FloatArray, samples: int, t_r: float, kappa: float, cruise: float) -> bool:
     """Return whether the profile stays below the folded curve; its last node is σ = 0.5."""
     last = len(curve) - 1
     scale = 2.0 * last
@@ -97,8 +111,8 @@ def _below(curve: FloatArray, least: FloatArray, t_r: float, kappa: float, cruis
     if d_r > 0.5 or cruise > least[min(int(d_r * scale), last)]:
         return False
     c3, c4, c5 = coefficients(kappa)
-    for k in range(1, _RAMP_SAMPLES):
-        s = k / _RAMP_SAMPLES
+    for k in range(1, samples):
+        s = k / samples
         rate = cruise * s * s * (3.0 * c3 + s * (4.0 * c4 + 5.0 * s * c5))
         at = cruise * t_r * s * s * s * (c3 + s * (c4 + s * c5)) * scale
         node = min(int(at), last - 1)
@@ -109,12 +123,12 @@ def _below(curve: FloatArray, least: FloatArray, t_r: float, kappa: float, cruis
 
 
 @nb.njit(cache=True, nogil=True)
-def _highest_cruise(curve: FloatArray, least: FloatArray, t_r: float, kappa: float) -> float:
+def _highest_cruise(curve: FloatArray, least: FloatArray, samples: int, t_r: float, kappa: float) -> float:
     """Return the highest cruising rate; what is feasible is an interval, as σ̇ at each σ rises with σ̇_c."""
     low, high = 0.0, least[-1]
     for _ in range(_HALVINGS):
         middle = 0.5 * (low + high)
-        if _below(curve, least, t_r, kappa, middle):
+        if _below(curve, least, samples, t_r, kappa, middle):
             low = middle
         else:
             high = middle
@@ -122,35 +136,35 @@ def _highest_cruise(curve: FloatArray, least: FloatArray, t_r: float, kappa: flo
 
 
 @nb.njit(cache=True, nogil=True)
-def _duration(curve: FloatArray, least: FloatArray, t_r: float, kappa: float) -> float:
-    cruise = _highest_cruise(curve, least, t_r, kappa)
+def _duration(curve: FloatArray, least: FloatArray, samples: int, t_r: float, kappa: float) -> float:
+    cruise = _highest_cruise(curve, least, samples, t_r, kappa)
     return 1.0 / max(cruise, 1e-12) + 2.0 * t_r * (1.0 - kappa)
 
 
 @nb.njit(cache=True, nogil=True)
-def _best_kappa(curve: FloatArray, least: FloatArray, t_r: float) -> tuple[float, float]:
+def _best_kappa(curve: FloatArray, least: FloatArray, samples: int, t_r: float) -> tuple[float, float]:
     """Return κ and σ̇_c of the shortest profile at a given ramp duration: a grid, made finer around its best."""
     best, width = 0.5, 0.1
     for _ in range(5):
         centre, found = best, np.inf
         for k in range(-5, 6):
             kappa = min(max(centre + width * k / 5.0, 0.4), 0.6)
-            duration = _duration(curve, least, t_r, kappa)
+            duration = _duration(curve, least, samples, t_r, kappa)
             if duration < found - 1e-12:
                 best, found = kappa, duration
         width *= 0.2
-    return best, _highest_cruise(curve, least, t_r, best)
+    return best, _highest_cruise(curve, least, samples, t_r, best)
 
 
 @nb.njit(cache=True, nogil=True)
-def _best_duration(curve: FloatArray, least: FloatArray, t_r: float) -> float:
-    kappa, cruise = _best_kappa(curve, least, t_r)
+def _best_duration(curve: FloatArray, least: FloatArray, samples: int, t_r: float) -> float:
+    kappa, cruise = _best_kappa(curve, least, samples, t_r)
     return 1.0 / max(cruise, 1e-12) + 2.0 * t_r * (1.0 - kappa)
 
 
 @nb.njit(cache=True, nogil=True)
 def _best_of_family(
-    curve: FloatArray, least: FloatArray, shortest: float, longest: float
+    curve: FloatArray, least: FloatArray, samples: int, shortest: float, longest: float
 ) -> tuple[float, float, float]:
     """Return t_r, κ and σ̇_c of the shortest profile: t_r over an even grid, then made finer around the best of it."""
     best, width, found = shortest, 0.5 * (longest - shortest), np.inf
@@ -158,10 +172,10 @@ def _best_of_family(
     for _ in range(4):
         for k in range(-12, 13):
             t_r = min(max(centre + width * k / 12.0, shortest), longest)
-            duration = _best_duration(curve, least, t_r)
+            duration = _best_duration(curve, least, samples, t_r)
             if duration < found - 1e-12:
                 best, found = t_r, duration
         centre = best
         width *= 0.1
-    kappa, cruise = _best_kappa(curve, least, best)
+    kappa, cruise = _best_kappa(curve, least, samples, best)
     return best, kappa, cruise

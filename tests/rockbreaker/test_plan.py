@@ -11,6 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from lhdmap.evaluation.rockbreaker import regenerate
 from lhdmap.rockbreaker import kinematics
+from lhdmap.rockbreaker.flow import flow_curve
 from lhdmap.rockbreaker.machine import Rockbreaker
 from lhdmap.rockbreaker.paths import KINDS, Kind
 from lhdmap.rockbreaker.plan import Plan, Planner, Request, Trajectory
@@ -182,6 +183,30 @@ def test_the_search_over_the_papers_family_finds_its_optimum() -> None:
                     best = duration
     assert trajectory.law.duration_s <= best + 1e-6
     assert trajectory.law.duration_s >= best - 0.1
+
+
+def test_narrow_blends_of_a_winding_orientation_slip_through_no_search() -> None:
+    """Blends less than a hundredth of the path wide: dips of the flow curve between the samples of a long ramp."""
+    start, end = np.array([3.612728, -4.940399, -0.680619]), np.array([5.860890, 3.260390, 3.083049])
+    phi_from, phi_to = -0.827951, -0.321668
+    durations = {}
+    for timing in ("paper", "paper-best", "limit"):
+        plan = PLANNER.plan(Request(start, end, phi_from, phi_to, "cslm", timing))  # type: ignore[arg-type]
+        assert plan.trajectory is not None
+        durations[timing] = plan.trajectory.law.duration_s
+        assert loads(plan.trajectory).max() <= 1.0 + 1e-4
+    assert durations["limit"] < durations["paper-best"] <= durations["paper"] * (1.0 + 1e-6)
+    exact = np.linspace(0.0, 1.0, 200_001)
+    allowed = flow_curve(plan.trajectory.path, exact).highest
+    assert durations["limit"] == pytest.approx(float(np.trapezoid(1.0 / allowed, exact)), rel=0.06)
+
+
+def test_the_bound_of_a_path_with_many_blends_keeps_to_the_limits() -> None:
+    start, end = np.array([1.258445, 1.978889, -1.732765]), np.array([1.742687, 0.780404, -1.437322])
+    trajectory = PLANNER.plan(Request(start, end, path="cslm", timing="limit")).trajectory
+    assert trajectory is not None
+    assert len(trajectory.path.turning.sigma) > 3
+    assert loads(trajectory, 60_000).max() <= 1.001  # no motion, so a hair is allowed; it was 1.2 %
 
 
 def test_quarter_points_are_shifted_where_the_straight_orientation_leaves_the_limits() -> None:
