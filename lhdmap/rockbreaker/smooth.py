@@ -64,12 +64,13 @@ def smooth_timing(highest: FloatArray, peak_second: float, peak_third: float) ->
             break  # σ̈ does not go from one peak to the other within a window
         window_s *= min(1.01 * excess, 2.0)
         timing = _filtered(highest, peak_second, window_s)
-    return _within_third(timing, peak_third)
+    return _within_peaks(timing, peak_second, peak_third)
 
 
-def _within_third(timing: Sampled, peak_third: float) -> Sampled:
-    """Return the timing slowed down as far as |σ⃛| needs it (which falls with the third power of time)."""
-    return timing.slower(max(_third(timing) / peak_third, 1.0) ** (1.0 / 3.0))
+def _within_peaks(timing: Sampled, peak_second: float, peak_third: float) -> Sampled:
+    """Return the timing slowed down as far as |σ̈| and |σ⃛| need it, which fall with the second and third power of time."""
+    second = float(np.abs(np.diff(np.pad(timing.rate, 1))).max() / timing.step_s)
+    return timing.slower(max((second / peak_second) ** 0.5, (_third(timing) / peak_third) ** (1.0 / 3.0), 1.0))
 
 
 def _third(timing: Sampled) -> float:

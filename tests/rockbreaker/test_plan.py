@@ -153,6 +153,20 @@ def test_smooth_has_a_continuous_acceleration_within_the_peaks_of_the_papers_pro
         assert np.abs(acceleration[[0, -1]]).max() <= third * step  # σ̈ starts and ends at zero
 
 
+def test_smooth_never_accelerates_faster_than_the_papers_profile() -> None:
+    """Over random pairs, of which some are short or lead along narrow dips of the flow curve."""
+    poses = random_poses(MACHINE, 60, seed=11)
+    for start, end in zip(poses[::2], poses[1::2], strict=True):
+        trajectory = planned(start, end, "cslm", "smooth").trajectory
+        if trajectory is None:
+            continue
+        second, third = best_ramp(trajectory.curve.highest, 1.0).peaks
+        t = np.linspace(0.0, trajectory.law.duration_s, 20_001)
+        acceleration = np.diff(trajectory.law(t)[1]) / t[1]
+        assert np.abs(acceleration).max() <= second * (1.0 + 1e-6)
+        assert np.abs(np.diff(acceleration)).max() / t[1] <= third * 1.001
+
+
 def test_the_papers_ramp_meets_its_boundary_conditions() -> None:
     ramps = Ramps(1.2, 0.55, 0.05)
     t = np.linspace(0.0, ramps.duration_s, 400_001)
@@ -191,13 +205,14 @@ def test_narrow_blends_of_a_winding_orientation_slip_through_no_search() -> None
     phi_from, phi_to = -0.827951, -0.321668
     durations = {}
     for timing in ("paper", "paper-best", "limit"):
-        plan = PLANNER.plan(Request(start, end, phi_from, phi_to, "cslm", timing))  # type: ignore[arg-type]
+        plan = PLANNER.plan(Request(start, end, phi_from, phi_to, "cslm", timing))
         assert plan.trajectory is not None
         durations[timing] = plan.trajectory.law.duration_s
         assert loads(plan.trajectory).max() <= 1.0 + 1e-4
+        path = plan.trajectory.path
     assert durations["limit"] < durations["paper-best"] <= durations["paper"] * (1.0 + 1e-6)
     exact = np.linspace(0.0, 1.0, 200_001)
-    allowed = flow_curve(plan.trajectory.path, exact).highest
+    allowed = flow_curve(path, exact).highest
     assert durations["limit"] == pytest.approx(float(np.trapezoid(1.0 / allowed, exact)), rel=0.06)
 
 
