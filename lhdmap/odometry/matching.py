@@ -11,7 +11,10 @@ import numpy as np
 from lhdmap.messages import FloatArray
 from lhdmap.odometry.surface_map import LINE, fit_line
 
-_LINES_HOLD = 0.3  # finest cells that a pose may move before lines are fitted anew: measured, no loss, half the time
+# Finest cells that a pose may move before lines are fitted anew. Where the walls hold: measured, no loss, half the time. Where they
+# hardly do, one step corrects only a part of an error along them, and what pulls towards standing still adds up.
+_LINES_HOLD, _WEAK_LINES_HOLD = 0.3, 0.03
+_WEAK_M = 0.003  # deviation of a match in its worse direction from which walls hardly hold
 
 
 class MatchModel(NamedTuple):
@@ -204,6 +207,13 @@ def solve3(A: FloatArray, b: FloatArray) -> FloatArray:
     return x
 
 
+@nb.njit(cache=True, nogil=True, inline="always")
+def _hardly_held(H):  # type: ignore[no-untyped-def]
+    """Return whether the information H (3, 3) leaves one direction of the plane uncertain."""
+    half, difference = 0.5 * (H[0, 0] + H[1, 1]), 0.5 * (H[0, 0] - H[1, 1])
+    return half - math.sqrt(difference * difference + H[0, 1] * H[0, 1]) < 1.0 / _WEAK_M**2
+
+
 @nb.njit(cache=True, nogil=True)
 def match(map_, hits, prior, start, model):  # type: ignore[no-untyped-def]
     """Return the `Match` of `hits` with the map: maximum a posteriori from `start` (3,) under the `Prior`.
@@ -226,7 +236,7 @@ def match(map_, hits, prior, start, model):  # type: ignore[no-untyped-def]
             moved += size
             if size < 2e-5:
                 break
-        if moved < _LINES_HOLD * fine_m:
+        if moved < (_WEAK_LINES_HOLD if _hardly_held(H) else _LINES_HOLD) * fine_m:
             break
     total, weights = normal_equations(pose, hits, lines, fine_m, model, H, b)
     n = max(hits.front, 1)

@@ -134,11 +134,11 @@ class AnchorSettings:
         source="measured in smooth walls (docs/odometry.md)",
     )
     coarse_noise: float = setting(
-        0.05,
+        0.0,
         unit="m/m",
         doc="Extra noise of a line from a coarser level, per metre of cell.",
         minimum=0.0,
-        source="measured",
+        source="measured: none is best, rough walls do not mind, smooth ones need the far hits",
     )
     hit_limit: float = setting(
         50.0, unit="hits", doc="Hits after which a cell's mean forgets.", minimum=1.0, source="lhdmap"
@@ -161,7 +161,7 @@ class AnchorSettings:
     lean_patch_m: float = setting(
         2.0, unit="m", doc="Length of wall that leans alike.", minimum=0.2, maximum=20.0, source="measured, as lean"
     )
-    rounds: int = setting(4, doc="Times that lines are fitted anew in one match at most.", minimum=1, maximum=20)
+    rounds: int = setting(8, doc="Times that lines are fitted anew in one match at most.", minimum=1, maximum=20)
     young_m: float = setting(
         0.6,
         unit="m",
