@@ -11,8 +11,8 @@ import numpy as np
 from lhdmap.messages import FloatArray
 from lhdmap.odometry.surface_map import LINE, fit_line
 
-# Finest cells that a pose may move before lines are fitted anew. Where the walls hold: measured, no loss, half the time. Where they
-# hardly do, one step corrects only a part of an error along them, and what pulls towards standing still adds up.
+# Finest cells that a pose may move before lines are fitted anew. Where the walls hold: measured, no loss, half the time. Where
+# they hardly do, one step corrects only a part of an error along them, and what pulls towards standing still adds up.
 _LINES_HOLD, _WEAK_LINES_HOLD = 0.3, 0.03
 _WEAK_M = 0.003  # deviation of a match in its worse direction from which walls hardly hold
 
