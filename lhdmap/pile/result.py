@@ -87,7 +87,7 @@ class PileReport:
     def to_json(self) -> dict[str, Any]:
         """Return the content of `pile.json`: the last estimate, and when and how far away it was decided."""
         best = self.last.estimate if self.last is not None else PileEstimate()
-        table = estimate_json(best)
+        table = estimate_json(_of_a_pile(best))
         table["warnings"] = [*self.warnings, *best.warnings]
         table["method"] = self.method
         table["identified"] = self.decision is not None
@@ -95,6 +95,13 @@ class PileReport:
         table["distance_at_decision_m"] = _number(self.decision.distance_m) if self.decision else None
         table["decision"] = estimate_json(self.decision.estimate) if self.decision else None
         return table
+
+
+def _of_a_pile(estimate: PileEstimate) -> PileEstimate:
+    """Return the estimate, or only status, probabilities and warnings where what was measured does not close the drift."""
+    if estimate.status != "none":
+        return estimate
+    return PileEstimate(probabilities=estimate.probabilities, warnings=estimate.warnings)
 
 
 def estimate_json(estimate: PileEstimate) -> dict[str, Any]:

@@ -12,7 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from lhdmap.messages import FloatArray
 from lhdmap.pile.face import Registration
-from lhdmap.pile.result import PileReport, Snapshot, estimate_json
+from lhdmap.pile.result import PileEstimate, PileReport, Snapshot, estimate_json
 from lhdmap.pile.settings import PileSettings
 from lhdmap.pile.stage import PileStage
 
@@ -193,3 +193,15 @@ def test_json_of_nothing_is_null() -> None:
         assert table[key] is None
     assert table["probabilities"]["none"] == 1.0
     assert estimate_json(_found(CastDrift(45.0)).estimate)["width_m"] == pytest.approx(4.0, abs=0.05)
+
+
+def test_what_does_not_close_the_drift_is_not_measured_as_a_pile() -> None:
+    """A surface that was looked at and is none has a width and a slope, but no pile has them."""
+    seen = PileEstimate("none", {"none": 0.9, "wall": 0.1}, width_m=3.0, inclination_deg=-60.0, warnings=("said",))
+    table = PileReport(None, Snapshot(1, 12.0, seen)).to_json()
+    assert table["width_m"] is None
+    assert table["inclination_deg"] is None
+    assert table["center_m"] is None
+    assert table["boulders"] == []
+    assert table["probabilities"]["wall"] == 0.1
+    assert table["warnings"] == ["said"]
