@@ -52,7 +52,7 @@ class AnchoredMatcher:
             settings.range_noise_m,
             anchor.cutoff_sigmas,
             anchor.min_cells,
-            anchor.coarse_noise,
+            0.0,
             anchor.rounds,
             anchor.lean,
             anchor.lean_patch_m,
@@ -74,7 +74,9 @@ class AnchoredMatcher:
 
         What is `seen` behind helps a tilted scanner.
         """
-        self._layered |= len(points) > 0 and bool(np.ptp(points[:, 2]) > _FLAT_M)
+        if not self._layered and len(points) and np.ptp(points[:, 2]) > _FLAT_M:
+            self._layered = True  # coarse cells of a tilted scanner mix heights
+            self._model = self._model._replace(coarse_noise=self._anchor.coarse_noise)
         if len(points) < _FEWEST_HITS:
             return Matched(np.zeros((3, 3)), math.nan, 0.0, lost=True)
         if self._inserted is None:

@@ -236,7 +236,8 @@ def match(map_, hits, prior, start, model):  # type: ignore[no-untyped-def]
             moved += size
             if size < 2e-5:
                 break
-        if moved < (_WEAK_LINES_HOLD if _hardly_held(H) else _LINES_HOLD) * fine_m:
+        hold = _WEAK_LINES_HOLD if not hits.layered and _hardly_held(H) else _LINES_HOLD
+        if moved < hold * fine_m:
             break
     total, weights = normal_equations(pose, hits, lines, fine_m, model, H, b)
     n = max(hits.front, 1)

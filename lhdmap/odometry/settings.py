@@ -134,11 +134,11 @@ class AnchorSettings:
         source="measured in smooth walls (docs/odometry.md)",
     )
     coarse_noise: float = setting(
-        0.0,
+        0.05,
         unit="m/m",
-        doc="Extra noise of a line from a coarser level, per metre of cell.",
+        doc="Extra noise of a line from a coarser level, per metre of cell; of a tilted scanner, whose coarse cells mix heights.",
         minimum=0.0,
-        source="measured: none is best, rough walls do not mind, smooth ones need the far hits",
+        source="measured; a level scanner has none: smooth walls need its far hits",
     )
     hit_limit: float = setting(
         50.0, unit="hits", doc="Hits after which a cell's mean forgets.", minimum=1.0, source="lhdmap"
