@@ -137,8 +137,11 @@ def _run_grizzly(arguments: argparse.Namespace, console: Console) -> int:
     machine = load_rockbreaker(Path(arguments.machine) if arguments.machine else None)
     seed = arguments.seed or 0
     path = arguments.output or Path(f"grizzly-{seed}.ply")
+    if seed < 0:
+        raise UsageError(f"--seed {seed}: 0 or more was wanted")
     if path.exists():
         raise UsageError(f"{path} exists already: another name is wanted (-o)")
+    path.parent.mkdir(parents=True, exist_ok=True)
     scene = simulate_grizzly(machine, seed)
     truth = write_scene(path, machine, scene)
     told = scene_json(machine, scene)

@@ -176,3 +176,15 @@ def test_eval_prints_the_paper_beside_the_result(capsys: pytest.CaptureFixture[s
 def test_refusals(words: str, exit_code: int, expected: str, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["rockbreaker", *words.split()]) == exit_code
     assert expected in capsys.readouterr().err
+
+
+def test_a_simulated_grizzly_goes_into_a_new_folder_and_over_nothing(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    cloud = tmp_path / "new" / "grizzly.ply"
+    assert main(["simulate", "grizzly", "--seed", "4", "-o", str(cloud)]) == 0
+    assert cloud.stat().st_size > 100_000
+    assert main(["simulate", "grizzly", "--seed", "4", "-o", str(cloud)]) == 2
+    assert "exists already" in capsys.readouterr().err
+    assert main(["simulate", "grizzly", "--seed", "-1", "-o", str(tmp_path / "other.ply")]) == 2
+    assert "--seed -1" in capsys.readouterr().err
