@@ -7,7 +7,6 @@ Frames as in the contract: `base_link` is the middle of the FRONT axle on the fl
 from __future__ import annotations
 
 import math
-import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -15,10 +14,10 @@ from typing import Any
 
 import numpy as np
 
-from lhdmap.errors import ConfigError, InputError
+from lhdmap.errors import ConfigError
 from lhdmap.geometry import se3
 from lhdmap.messages import FloatArray
-from lhdmap.settings import load_section, nearest, section_toml, setting
+from lhdmap.settings import load_section, nearest, read_toml, section_toml, setting
 
 PAPER = "topological_navigation, section 3.1"
 ASSUMED = "assumed, typical of 10 to 11-t loaders"
@@ -142,10 +141,7 @@ def load_machine(path: Path | None = None) -> Machine:
     """
     if path is None:
         return Machine()
-    try:
-        table = tomllib.loads(path.read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
-        raise InputError(f"{path}: not a readable machine file ({error})") from error
+    table = read_toml(path, "machine file")
     try:
         return _machine(table, default_name=path.stem)
     except ConfigError as error:

@@ -13,12 +13,14 @@ from __future__ import annotations
 
 import dataclasses
 import difflib
+import tomllib
 import types
 import typing
 from collections.abc import Mapping
+from pathlib import Path
 from typing import Any, TypeVar
 
-from lhdmap.errors import ConfigError
+from lhdmap.errors import ConfigError, InputError
 
 T = TypeVar("T")
 
@@ -51,6 +53,18 @@ def load_section(kind: type[T], name: str, values: Mapping[str, Any]) -> T:
             raise ConfigError(f"unknown setting '{name}.{key}'{nearest(key, fields)}")
     checked = {key: _checked(f"{name}.{key}", value, hints[key], fields[key]) for key, value in values.items()}
     return kind(**checked)
+
+
+def read_toml(path: Path, kind: str) -> dict[str, Any]:
+    """Return the table of a TOML file; `kind` says in an error what was expected, such as `machine file`.
+
+    Raises:
+        InputError: the file cannot be read or is not TOML.
+    """
+    try:
+        return tomllib.loads(path.read_text(encoding="utf-8"))
+    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+        raise InputError(f"{path}: not a readable {kind} ({error})") from error
 
 
 def nearest(key: str, known: typing.Iterable[str]) -> str:

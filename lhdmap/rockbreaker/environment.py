@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,7 +15,7 @@ from lhdmap.integration.cloud_io import read_cloud
 from lhdmap.messages import FloatArray
 from lhdmap.rockbreaker.collision import Obstacles
 from lhdmap.rockbreaker.machine import Rockbreaker, sub_table
-from lhdmap.settings import load_section, nearest, setting
+from lhdmap.settings import load_section, nearest, read_toml, setting
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,10 +33,7 @@ def read_boxes(path: Path) -> Obstacles:
         InputError: the file cannot be read, or holds no box.
         ConfigError: a key or value is wrong.
     """
-    try:
-        table = tomllib.loads(path.read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
-        raise InputError(f"{path}: not a readable file of boxes ({error})") from error
+    table = read_toml(path, "file of boxes")
     try:
         boxes = _boxes(table)
     except ConfigError as error:

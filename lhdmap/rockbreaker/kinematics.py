@@ -85,11 +85,11 @@ def planar_theta(machine: Rockbreaker, planar: FloatArray) -> FloatArray:
     t3 = machine.elbow * np.arccos(np.where(np.abs(cosine) <= 1.0, cosine, np.nan))
     t2 = np.arctan2(up, along) - np.arctan2(a3 * np.sin(t3), a2 + a3 * np.cos(t3))
     middle = machine.theta_limits.mean(axis=0)
-    t2 = _turned(t2, middle[1])
-    return np.stack([t2, t3, _turned(whole - t2 - t3, middle[3])], axis=-1)
+    t2 = turned(t2, middle[1])
+    return np.stack([t2, t3, turned(whole - t2 - t3, middle[3])], axis=-1)
 
 
-def _turned(angle: FloatArray, middle: float) -> FloatArray:
+def turned(angle: FloatArray, middle: float | FloatArray) -> FloatArray:
     """Return the angles in the turn around `middle`."""
     return np.asarray(angle - 2.0 * np.pi * np.round((angle - middle) / (2.0 * np.pi)))
 

@@ -6,7 +6,6 @@ Joints 1 to 4 are swing, inner boom, outer boom and breaker; cylinders 0 and 1 b
 from __future__ import annotations
 
 import math
-import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
 from functools import cached_property
@@ -15,9 +14,9 @@ from typing import Any
 
 import numpy as np
 
-from lhdmap.errors import ConfigError, InputError
+from lhdmap.errors import ConfigError
 from lhdmap.messages import FloatArray
-from lhdmap.settings import load_section, nearest, section_toml, setting
+from lhdmap.settings import load_section, nearest, read_toml, section_toml, setting
 
 PAPER = "rockbreaker_trajectories, Table 1"
 TEXT = "rockbreaker_trajectories, section 4"
@@ -26,9 +25,7 @@ ASSUMED = "assumed, typical of stationary breaker booms"
 JOINTS = ("swing", "inner_boom", "outer_boom", "breaker")
 SECTIONS = ("name", "base", "joint", "grizzly")
 _LPM = 1.0 / 60_000.0  # litres a minute in m³/s
-_SINGULAR = math.radians(
-    1.0
-)  # how near the outer boom may come to in line with the inner one: there the arm is singular
+_SINGULAR = math.radians(1.0)  # how near to in line the two booms may come: there the arm is singular
 
 
 @dataclass(frozen=True, slots=True)
@@ -205,10 +202,7 @@ def load_rockbreaker(path: Path | None = None) -> Rockbreaker:
     """
     if path is None:
         return Rockbreaker()
-    try:
-        table = tomllib.loads(path.read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
-        raise InputError(f"{path}: not a readable machine file ({error})") from error
+    table = read_toml(path, "machine file")
     try:
         return _machine(table, path.stem)
     except ConfigError as error:

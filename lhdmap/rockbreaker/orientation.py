@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from lhdmap.messages import FloatArray
-from lhdmap.rockbreaker.kinematics import planar_theta
+from lhdmap.rockbreaker.kinematics import planar_theta, turned
 from lhdmap.rockbreaker.machine import Rockbreaker
 
 VERTICAL = math.radians(270.0)
@@ -36,10 +36,7 @@ def candidates(machine: Rockbreaker, planar_m: FloatArray) -> tuple[FloatArray, 
     for limits in machine.theta_limits:
         for solve in (_boom_at, _arm_at, _breaker_at):
             solutions += [solve(machine, along, up, limits, sign) for sign in (-1.0, 1.0)]
-    theta = np.stack(solutions, axis=-2)
-    theta[..., 2] -= 2.0 * np.pi * np.round((theta[..., 2] - machine.theta_limits[:, 3].mean()) / (2.0 * np.pi))
-    theta[..., 0] -= 2.0 * np.pi * np.round((theta[..., 0] - machine.theta_limits[:, 1].mean()) / (2.0 * np.pi))
-    theta[..., 1] -= 2.0 * np.pi * np.round((theta[..., 1] - machine.theta_limits[:, 2].mean()) / (2.0 * np.pi))
+    theta = turned(np.stack(solutions, axis=-2), machine.theta_limits[:, 1:].mean(axis=0))
     low, high = machine.theta_limits[:, 1:]
     feasible = np.all((theta >= low - _EDGE) & (theta <= high + _EDGE), axis=-1, keepdims=True)
     theta = np.where(feasible, theta, np.nan)
@@ -49,8 +46,7 @@ def candidates(machine: Rockbreaker, planar_m: FloatArray) -> tuple[FloatArray, 
 def unwrapped(machine: Rockbreaker, phi: FloatArray) -> FloatArray:
     """Return angles φ in the turn around the middle of those that the joints' limits allow."""
     middle = float(machine.theta_limits[:, 1:].mean(axis=0).sum()) - math.radians(machine.base.breaker_offset_deg)
-    middle -= 2.0 * math.pi * round((middle - VERTICAL) / (2.0 * math.pi))
-    return np.asarray(phi - 2.0 * np.pi * np.round((phi - middle) / (2.0 * np.pi)))
+    return turned(phi, float(turned(np.asarray(middle), VERTICAL)))
 
 
 def holds_vertical(low: FloatArray, high: FloatArray) -> npt.NDArray[np.bool_]:

@@ -47,7 +47,7 @@ def _timed(trajectory: Trajectory) -> dict[str, Any]:
 
 
 def task_json(task: Task) -> dict[str, Any]:
-    """Return a task: durations, volumes and bounds of both steps together, and which rock was chosen and why."""
+    """Return a task: durations and volumes of both steps together, the bound of the whole, which rock was chosen and why."""
     steps = [plan_json(plan) for plan in task.steps]
     values = steps[-1] | {"rock": _rock_json(task), "work_plane_m": task.work_plane_m, "steps": steps}
     values |= {"from_m": steps[0]["from_m"], "phi_from_deg": steps[0]["phi_from_deg"]}
@@ -55,11 +55,12 @@ def task_json(task: Task) -> dict[str, Any]:
         return values
     at = max(range(len(steps)), key=lambda k: float(steps[k]["max_flow_ratio"]))
     worst, before_s = steps[at], sum(step["duration_s"] for step in steps[:at])
-    sums = {key: sum(step[key] for step in steps) for key in ("duration_s", "pump_volume_l", "bound_s", "planning_ms")}
+    sums = {key: sum(step[key] for step in steps) for key in ("duration_s", "pump_volume_l", "planning_ms")}
     return (
         values
         | sums
         | {
+            "bound_s": task.bound_s,
             "limiting": worst["limiting"],
             "limit_reached_at_s": before_s + worst["limit_reached_at_s"],
             "max_flow_ratio": worst["max_flow_ratio"],

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 
 import numpy as np
 
+from lhdmap.rockbreaker.flow import least_duration_s
+from lhdmap.rockbreaker.kinematics import rho_of_theta
 from lhdmap.rockbreaker.plan import Plan, Planner, Request
 from lhdmap.rockbreaker.rocks import Rock, Scene
 
@@ -25,6 +28,16 @@ class Task:
     def feasible(self) -> bool:
         """Whether both steps can be made."""
         return all(step.trajectory is not None for step in self.steps)
+
+    @property
+    def bound_s(self) -> float:
+        """The any-path bound from the first pose to the last, seconds: less than the steps' together. NaN: a step is refused."""
+        first, last = self.steps[0].trajectory, self.steps[-1].trajectory
+        if first is None or last is None:
+            return math.nan
+        begin, end = first.path.theta(np.array([0.0])), last.path.theta(np.array([1.0]))
+        machine = first.path.machine
+        return least_duration_s(machine, rho_of_theta(machine, begin)[0], rho_of_theta(machine, end)[0])
 
 
 def plan_to_rock(planner: Planner, scene: Scene, request: Request, opening_m: float) -> Task | None:

@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Callable, Iterator
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
-from lhdmap.errors import ConfigError, InputError
-from lhdmap.settings import load_section, nearest, setting
+from lhdmap.errors import ConfigError
+from lhdmap.settings import load_section, nearest, read_toml, setting
 from lhdmap.simulation.pile_files import row_of, write_table
 from lhdmap.simulation.pile_scenes import scene
 from lhdmap.simulation.pile_sections import VARIANTS
@@ -54,10 +53,7 @@ def load_suite(path: Path) -> list[SuiteScene]:
         InputError: the file cannot be read or is not TOML.
         ConfigError: a key or a value in it is wrong, or a scene is in it twice.
     """
-    try:
-        table: dict[str, Any] = tomllib.loads(path.read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
-        raise InputError(f"{path}: not a readable suite file ({error})") from error
+    table = read_toml(path, "suite file")
     for key in table:
         if key != "scenes":
             raise ConfigError(f"{path}: unknown key '{key}'{nearest(key, ['scenes'])}")

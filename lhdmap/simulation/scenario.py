@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-from lhdmap.errors import ConfigError, InputError
-from lhdmap.settings import load_section, nearest, section_toml
+from lhdmap.errors import ConfigError
+from lhdmap.settings import load_section, nearest, read_toml, section_toml
 from lhdmap.simulation.pile_sections import MountingSettings, PileSettings
 from lhdmap.simulation.sections import (
     DriftSettings,
@@ -82,10 +81,7 @@ def load_scenario(path: Path) -> DriftScenario:
         InputError: the file cannot be read or is not TOML.
         ConfigError: a key or a value in it is wrong.
     """
-    try:
-        table = tomllib.loads(path.read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
-        raise InputError(f"{path}: not a readable scenario file ({error})") from error
+    table = read_toml(path, "scenario file")
     try:
         return scenario_from(table)
     except ConfigError as error:

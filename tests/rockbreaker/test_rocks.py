@@ -11,8 +11,9 @@ import pytest
 from lhdmap.errors import ConfigError, InputError, LhdmapError
 from lhdmap.rockbreaker.collision import Obstacles, axis_points, without_arm
 from lhdmap.rockbreaker.environment import read_boxes
+from lhdmap.rockbreaker.kinematics import rho_of_theta
 from lhdmap.rockbreaker.machine import Rockbreaker
-from lhdmap.rockbreaker.plan import Planner, Request, start_joints
+from lhdmap.rockbreaker.plan import Planner, Request, Trajectory, start_joints
 from lhdmap.rockbreaker.rocks import find_rocks
 from lhdmap.rockbreaker.settings import RockbreakerSettings
 from lhdmap.rockbreaker.task import plan_to_rock
@@ -64,6 +65,18 @@ def test_the_largest_rock_is_chosen_and_the_tip_ends_above_it() -> None:
     assert np.ptp(across[:, 2]) == pytest.approx(0.0, abs=1e-9)
     assert across[-1] == pytest.approx(np.array([*task.rock.top_m[:2], task.work_plane_m]), abs=1e-9)
     assert np.linalg.norm(up[-1] - across[0]) < 1e-9
+    assert task.bound_s == pytest.approx(_net_stroke_s(vertical, level), abs=1e-9)
+    assert task.bound_s < vertical.bound_s + level.bound_s
+
+
+def _net_stroke_s(first: Trajectory, last: Trajectory) -> float:
+    """Return the bound from Table 1 as printed: net strokes times fed areas over the flow limits, valves and pump."""
+    begin, end = first.path.theta(np.array([0.0]))[0], last.path.theta(np.array([1.0]))[0]
+    stroke = rho_of_theta(MACHINE, end) - rho_of_theta(MACHINE, begin)
+    blind, rod = np.array([1.03, 1.03, 2.01, 2.01, 2.01]) * 1e-2, np.array([0.716, 0.716, 1.33, 1.33, 1.33]) * 1e-2
+    volumes = np.where(stroke > 0.0, blind, rod) * np.abs(stroke)
+    valves = [volumes[0] + volumes[1], *volumes[2:], volumes.sum()]
+    return float(max(60_000.0 * v / limit for v, limit in zip(valves, (24.0, 60.0, 60.0, 38.0, 170.0), strict=True)))
 
 
 def test_a_grizzly_without_large_rocks_asks_for_nothing() -> None:
