@@ -13,7 +13,7 @@ import numpy as np
 
 from lhdmap.messages import FloatArray
 
-KAPPA = (0.4, 0.6)
+KAPPA = (0.4, 0.6)  # C3 with erratum 6
 _RAMP_SAMPLES = (128, 1024)  # of a ramp in the search: more where a narrow dip of the curve slipped through
 _DENSE_SAMPLES = 8192
 _HALVINGS = 36
@@ -144,11 +144,11 @@ def _duration(curve: FloatArray, least: FloatArray, samples: int, t_r: float, ka
 @nb.njit(cache=True, nogil=True)
 def _best_kappa(curve: FloatArray, least: FloatArray, samples: int, t_r: float) -> tuple[float, float]:
     """Return κ and σ̇_c of the shortest profile at a given ramp duration: a grid, made finer around its best."""
-    best, width = 0.5, 0.1
+    best, width = 0.5 * (KAPPA[0] + KAPPA[1]), 0.5 * (KAPPA[1] - KAPPA[0])
     for _ in range(5):
         centre, found = best, np.inf
         for k in range(-5, 6):
-            kappa = min(max(centre + width * k / 5.0, 0.4), 0.6)
+            kappa = min(max(centre + width * k / 5.0, KAPPA[0]), KAPPA[1])
             duration = _duration(curve, least, samples, t_r, kappa)
             if duration < found - 1e-12:
                 best, found = kappa, duration

@@ -227,3 +227,13 @@ def test_a_file_without_proper_boxes_is_refused_by_its_name(tmp_path: Path, text
     path.write_text(text, encoding="utf-8")
     with pytest.raises(LhdmapError, match=told):
         read_boxes(path)
+
+
+def test_the_order_of_the_points_does_not_matter() -> None:
+    scene = simulate_grizzly(MACHINE, 44)
+    shuffled = np.random.default_rng(0).permutation(scene.points_m)
+    one, other = (find_rocks(points, MACHINE.grizzly).oversize(OPENING_M) for points in (scene.points_m, shuffled))
+    assert len(one) == len(other) > 0
+    for a, b in zip(one, other, strict=True):
+        assert np.linalg.norm(a.top_m - b.top_m) < 0.05
+        assert a.size_m == pytest.approx(b.size_m, abs=0.06)
