@@ -90,14 +90,14 @@ class OdometrySettings:
         doc="Hits lower than this above the floor are not walls (scanner mounted above it).",
         source="lhdmap",
     )
-    height_lever_m: float = setting(
-        0.85,
-        unit="m",
+    height_lever: float = setting(
+        0.5,
+        unit="of the wheelbase",
         minimum=0.0,
-        maximum=10.0,
-        source="half of half the wheelbase: docs/odometry.md",
-        doc="How far base_link is ahead of the point whose path slopes as the inclinometer says: half the wheelbase on stiff "
-        "bodies, 0 where the front body follows the floor under its own axle.",
+        maximum=1.0,
+        source="geometry: docs/integration.md",
+        doc="How far base_link is ahead of the point whose path slopes as the inclinometer says: half the wheelbase where the "
+        "joint lets both bodies pitch only together, 0 where the front body follows the floor under its own axle.",
     )
 
 

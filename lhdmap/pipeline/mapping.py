@@ -74,7 +74,7 @@ class MappingPipeline:
         self.sweeps = SweepIntegration(settings, machine, self.mounts, on_sweep)
         self.clouds = CloudOdometry(settings.cloud_odometry) if primary == "points" else None
         self._primary = primary
-        self.track = Track(settings.odometry.height_lever_m)
+        self.track = Track(settings.odometry.height_lever * (machine or _DEFAULT_MACHINE).dimensions.wheelbase_m)
         self.records = ScanRecords()
         self.smoother = Smoother(settings.smoothing)
         self.pile = pile_stage(settings) if primary == "front" else None

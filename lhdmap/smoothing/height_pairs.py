@@ -1,0 +1,165 @@
+"""Kernels of the realignment: walls of one scan as lines, hits of other scans at the same height, the equations of both poses."""
+
+from __future__ import annotations
+
+import math
+
+import numba as nb
+import numpy as np
+
+CELL_M = 0.2  # of the grid that hits are looked up in; a pair is never farther apart
+HEIGHT_M = 0.05  # hits farther apart in height see another curve of a rough wall
+_NEIGHBOURS, _NEIGHBOURHOOD_M = 3, 0.25
+_APART_SIGMA_M, _HEIGHT_SIGMA_M = 0.1, 0.02
+_FARTHEST = 4.0  # of the squared distance in those two units
+_LEAN = 0.5  # rock a centimetre higher stands so many centimetres in or out
+_CUTOFF_SIGMAS, _LEAST_SIGMA_M = 6.0, 0.02
+LINE = 7
+
+
+@nb.njit(cache=True, nogil=True)
+def wall_lines(points):  # type: ignore[no-untyped-def]
+    """Return the wall at each hit of one scan, points (N, 3) in the order of the beams.
+
+    Rows (N, LINE): centre x, y, normal x, y, scatter across it (m²), height (m), 1 where there is a wall (else 0).
+    """
+    out = np.zeros((points.shape[0], LINE))
+    for i in range(points.shape[0]):
+        n = mx = my = xx = xy = yy = 0.0
+        for k in range(max(i - _NEIGHBOURS, 0), min(i + _NEIGHBOURS + 1, points.shape[0])):
+            dx, dy = points[k, 0] - points[i, 0], points[k, 1] - points[i, 1]
+            if dx * dx + dy * dy < _NEIGHBOURHOOD_M * _NEIGHBOURHOOD_M:
+                n, mx, my = n + 1.0, mx + dx, my + dy
+                xx, xy, yy = xx + dx * dx, xy + dx * dy, yy + dy * dy
+        if n < 3.0:
+            continue
+        mx, my = mx / n, my / n
+        xx, xy, yy = xx / n - mx * mx, xy / n - mx * my, yy / n - my * my
+        half, difference = 0.5 * (xx + yy), 0.5 * (xx - yy)
+        root = math.sqrt(difference * difference + xy * xy)
+        small, large = max(half - root, 0.0), half + root
+        if large < 4e-4 or small > 0.3 * large:
+            continue
+        along = 0.5 * math.atan2(2.0 * xy, xx - yy)
+        out[i, 0], out[i, 1] = points[i, 0] + mx, points[i, 1] + my
+        out[i, 2], out[i, 3], out[i, 4] = -math.sin(along), math.cos(along), small
+        out[i, 5], out[i, 6] = points[i, 2], 1.0
+    return out
+
+
+@nb.njit(cache=True, nogil=True)
+def placed(points, owners, poses):  # type: ignore[no-untyped-def]
+    """Return points (N, 3) of several scans in the common frame; `owners` (N,): row of `poses` (K, 3)."""
+    out = np.empty((points.shape[0], 3))
+    for i in range(points.shape[0]):
+        pose = poses[owners[i]]
+        c, s = math.cos(pose[2]), math.sin(pose[2])
+        out[i, 0] = pose[0] + c * points[i, 0] - s * points[i, 1]
+        out[i, 1] = pose[1] + s * points[i, 0] + c * points[i, 1]
+        out[i, 2] = points[i, 2]
+    return out
+
+
+@nb.njit(cache=True, nogil=True)
+def _sorted_into_cells(world, low, shape):  # type: ignore[no-untyped-def]
+    """Return the hits by cell, and where each cell's begin, shape (cells + 1,)."""
+    starts = np.zeros(shape[0] * shape[1] + 1, np.int64)
+    cells = np.empty(world.shape[0], np.int64)
+    for i in range(world.shape[0]):
+        ix, iy = int((world[i, 0] - low[0]) / CELL_M), int((world[i, 1] - low[1]) / CELL_M)
+        cells[i] = ix * shape[1] + iy
+        starts[cells[i] + 1] += 1
+    for k in range(starts.size - 1):
+        starts[k + 1] += starts[k]
+    order, at = np.empty(world.shape[0], np.int64), starts.copy()
+    for i in range(world.shape[0]):
+        order[at[cells[i]]] = i
+        at[cells[i]] += 1
+    return order, starts
+
+
+@nb.njit(cache=True, nogil=True)
+def same_height(walls, wall_owner, lines, hits, hit_owner, travelled, apart_m):  # type: ignore[no-untyped-def]
+    """Return for each hit (M,) the wall hit that it saw again, -1 where there is none.
+
+    `walls` (N, 3) with `lines` (N, LINE) and `hits` (M, 3) in the common frame, the scans they belong to, and how far the
+    machine had travelled at each scan (K,): scans nearer to each other than `apart_m` are not compared.
+    """
+    found = np.full(hits.shape[0], -1, np.int64)
+    if not walls.shape[0] or not hits.shape[0]:
+        return found
+    low = (walls[:, 0].min(), walls[:, 1].min())
+    shape = (int((walls[:, 0].max() - low[0]) / CELL_M) + 1, int((walls[:, 1].max() - low[1]) / CELL_M) + 1)
+    order, starts = _sorted_into_cells(walls, low, shape)
+    per_m, per_height = 1.0 / _APART_SIGMA_M**2, 1.0 / _HEIGHT_SIGMA_M**2
+    for i in range(hits.shape[0]):
+        x, y, z, mine = hits[i, 0], hits[i, 1], hits[i, 2], travelled[hit_owner[i]]
+        cx, cy = int(math.floor((x - low[0]) / CELL_M)), int(math.floor((y - low[1]) / CELL_M))
+        nearest = _FARTHEST
+        for ix in range(max(cx - 1, 0), min(cx + 2, shape[0])):
+            first, last = ix * shape[1] + max(cy - 1, 0), ix * shape[1] + min(cy + 2, shape[1])
+            if first >= last:
+                continue
+            for k in order[starts[first] : starts[last]]:
+                dz = walls[k, 2] - z
+                if abs(dz) > HEIGHT_M or lines[k, 6] == 0.0 or abs(travelled[wall_owner[k]] - mine) < apart_m:
+                    continue
+                away = ((walls[k, 0] - x) ** 2 + (walls[k, 1] - y) ** 2) * per_m + dz * dz * per_height
+                if away < nearest:
+                    nearest, found[i] = away, k
+    return found
+
+
+@nb.njit(cache=True, nogil=True)
+def add_pairs(lines, wall_owner, hits, hit_owner, pairs, poses, noise_m, H, g):  # type: ignore[no-untyped-def]
+    """Add the pairs' equations to H (3K, 3K) and g (3K,): the hit lies on the wall's line; both poses are unknown.
+
+    `lines` and `hits` (M, 3) in the frames of their scans, `poses` (K, 3); Tukey's weights. Returns how many pairs count.
+    """
+    J, counted = np.empty(6), 0
+    for i in range(pairs.size):
+        k = pairs[i]
+        if k < 0:
+            continue
+        a, b = wall_owner[k], hit_owner[i]
+        ca, sa, cb, sb = math.cos(poses[a, 2]), math.sin(poses[a, 2]), math.cos(poses[b, 2]), math.sin(poses[b, 2])
+        nx, ny = ca * lines[k, 2] - sa * lines[k, 3], sa * lines[k, 2] + ca * lines[k, 3]
+        wx, wy = ca * lines[k, 0] - sa * lines[k, 1], sa * lines[k, 0] + ca * lines[k, 1]
+        hx, hy = cb * hits[i, 0] - sb * hits[i, 1], sb * hits[i, 0] + cb * hits[i, 1]
+        d = nx * (poses[b, 0] + hx - poses[a, 0] - wx) + ny * (poses[b, 1] + hy - poses[a, 1] - wy)
+        dz = hits[i, 2] - lines[k, 5]
+        variance = noise_m * noise_m + lines[k, 4] + (_LEAN * dz) ** 2
+        u2 = d * d / (_CUTOFF_SIGMAS**2 * max(variance, _LEAST_SIGMA_M**2))
+        if u2 >= 1.0:
+            continue
+        counted += 1
+        w = (1.0 - u2) ** 2 / variance
+        J[0], J[1], J[2] = -nx, -ny, nx * wy - ny * wx
+        J[3], J[4], J[5] = nx, ny, ny * hx - nx * hy
+        for p in range(6):
+            row = 3 * a + p if p < 3 else 3 * b + p - 3
+            g[row] -= w * J[p] * d
+            for q in range(6):
+                column = 3 * a + q if q < 3 else 3 * b + q - 3
+                H[row, column] += w * J[p] * J[q]
+    return counted
+
+
+@nb.njit(cache=True, nogil=True)
+def add_steps(poses, measured, sigmas, H, g):  # type: ignore[no-untyped-def]
+    """Add the odometry's steps between neighbouring scans, (K - 1, 3), with their standard deviations, to H and g."""
+    for i in range(measured.shape[0]):
+        a, b = poses[i], poses[i + 1]
+        c, s = math.cos(a[2]), math.sin(a[2])
+        dx, dy = b[0] - a[0], b[1] - a[1]
+        off = np.array([c * dx + s * dy, c * dy - s * dx, b[2] - a[2]]) - measured[i]
+        off[2] = (off[2] + math.pi) % (2.0 * math.pi) - math.pi
+        A = np.array([[-c, -s, c * dy - s * dx], [s, -c, -c * dx - s * dy], [0.0, 0.0, -1.0]])
+        B = np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])
+        for axis in range(3):
+            w = 1.0 / (sigmas[i, axis] * sigmas[i, axis])
+            J = np.concatenate((A[axis], B[axis]))
+            for p in range(6):
+                g[3 * i + p] -= w * J[p] * off[axis]
+                for q in range(6):
+                    H[3 * i + p, 3 * i + q] += w * J[p] * J[q]
