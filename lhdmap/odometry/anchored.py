@@ -11,7 +11,7 @@ from lhdmap.messages import FloatArray
 from lhdmap.odometry.flow_reference import FlowReference, compare, scanner_pyramid
 from lhdmap.odometry.matching import Hits, Match, MatchModel, Prior, match
 from lhdmap.odometry.motion import Motion
-from lhdmap.odometry.rear_view import NOTHING_BEHIND, Behind, JointOffset
+from lhdmap.odometry.rear_view import NO_POINTS, NOTHING_BEHIND, Behind, JointOffset
 from lhdmap.odometry.search import search
 from lhdmap.odometry.settings import AnchorSettings, OdometrySettings, RangeFlowSettings, SearchSettings
 from lhdmap.odometry.steps import BY_DEFINITION, Matched, marginal_information
@@ -68,6 +68,7 @@ class AnchoredMatcher:
         self._jumped = False
         self._joint = JointOffset()
         self._turn = 0
+        self.behind = NO_POINTS  # the rear hits of the last scan, shape (N, 3), level base frame
 
     def step(self, points: FloatArray, T_base_scanner: FloatArray, seen: Behind = NOTHING_BEHIND) -> Matched:
         """Match points (N, 3), level base frame with absolute heights, at the predicted pose; correct the motion, grow the map.
@@ -105,11 +106,12 @@ class AnchoredMatcher:
 
     def _hits(self, points: FloatArray, seen: Behind) -> Hits:
         """Return what is matched: a level scanner sees the same curve of the walls again by itself."""
+        self.behind = NO_POINTS
         if not self._layered or not len(seen.points):
             return Hits(points, len(points), self._layered)
         self._turn = 1 - self._turn  # every other hit of the front scanner: as exact with the rear one's, and faster
-        front = points[self._turn :: 2]
-        return Hits(np.concatenate([front, self._joint.turned(seen)]), len(front), True)
+        front, self.behind = points[self._turn :: 2], self._joint.turned(seen)
+        return Hits(np.concatenate([front, self.behind]), len(front), True)
 
     def _match(self, hits: Hits, heading: tuple[float, float]) -> Match:
         """Match from the prediction (and a heading with its information); where that does not fit, search widely."""

@@ -13,7 +13,7 @@ from lhdmap.odometry.anchored import AnchoredMatcher
 from lhdmap.odometry.clock import ScanClock
 from lhdmap.odometry.flow_matcher import FlowMatcher
 from lhdmap.odometry.motion import FORWARD, TURNING, Motion
-from lhdmap.odometry.rear_view import NOTHING_BEHIND, Behind, RearView, behind
+from lhdmap.odometry.rear_view import NO_POINTS, NOTHING_BEHIND, Behind, RearView, behind
 from lhdmap.odometry.scan_points import NO_BOXES, half_sweep_ns, planar_points
 from lhdmap.odometry.settings import AnchorSettings, OdometrySettings, RangeFlowSettings, SearchSettings
 from lhdmap.odometry.steps import Matched, OdometryStep, WheelStep, body_information, marginal_information
@@ -103,6 +103,11 @@ class PlanarOdometry:
         step = -(-scan.ranges_m.size // self._settings.max_beams)
         self._turn += 1
         return self._turn % max(step, 1), max(step, 1)
+
+    @property
+    def points_behind(self) -> FloatArray:
+        """Hits of the rear scanner that the last processed scan was matched with, shape (N, 3), as `points`."""
+        return self._matcher.behind if isinstance(self._matcher, AnchoredMatcher) else NO_POINTS
 
     @property
     def clock(self) -> ScanClock:

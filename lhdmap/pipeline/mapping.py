@@ -34,6 +34,7 @@ from lhdmap.odometry.scan_points import NO_BOXES, half_sweep_ns
 from lhdmap.odometry.start import ScanInput, starting_velocity
 from lhdmap.odometry.steps import OdometryStep, WheelStep
 from lhdmap.pipeline.mounts import Mounts, level_sensor
+from lhdmap.pipeline.path import FinalPath
 from lhdmap.pipeline.pile import pile_stage, scan_hits
 from lhdmap.pipeline.rear import RearScans
 from lhdmap.pipeline.records import ScanRecords
@@ -42,10 +43,12 @@ from lhdmap.pipeline.track import Track
 from lhdmap.proprioception.attitude import AttitudeFilter
 from lhdmap.proprioception.slip import SlipEstimator
 from lhdmap.proprioception.wheels import WheelOdometry
+from lhdmap.smoothing.realign import AlignedScan
 from lhdmap.smoothing.smoother import Smoother
 
 _DEFAULT_MACHINE = Machine()
 _WARM_SCANS, _FEWEST_WARM_SCANS, _WARM_NS = 25, 6, 1_500_000_000
+_TILTED = 0.01  # rise of the scan plane ahead (m/m)
 _QUEUE_SCANS = 2000  # a sensor that stops must not hold back scans without bound
 
 
@@ -75,6 +78,7 @@ class MappingPipeline:
         self.clouds = CloudOdometry(settings.cloud_odometry) if primary == "points" else None
         self._primary = primary
         self.track = Track(settings.odometry.height_lever * (machine or _DEFAULT_MACHINE).dimensions.wheelbase_m)
+        self.path = FinalPath(self.track)
         self.records = ScanRecords()
         self.smoother = Smoother(settings.smoothing)
         self.pile = pile_stage(settings) if primary == "front" else None
@@ -116,7 +120,8 @@ class MappingPipeline:
         self.attitude.finish()
         while self._waiting:
             self._process(*self._waiting.popleft())
-        self.sweeps.finish(self.track, self.wheels)
+        self.path.finish()
+        self.sweeps.finish(self.path.final, self.wheels)
 
     @property
     def warnings(self) -> list[str]:
@@ -163,6 +168,12 @@ class MappingPipeline:
             before_ns = time_ns + half_sweep_ns(scan)
         return self._odometry(starting_velocity(self._odometry, inputs))
 
+    def _sees_again(self, scan: LaserScan, stamp_ns: int) -> bool:
+        """Return whether front scans are to be realigned: tilted ones, with a rear scanner that sees their walls again."""
+        tilted = abs(self.mounts.of(scan.frame_id, "front").T_parent_child[2, 0]) > _TILTED
+        wanted = self._cloud and self.settings.smoothing.realign and self.settings.odometry.method == "anchored"
+        return wanted and tilted and self.has_inclinometer and self.rear.near(stamp_ns, 0.0, 0.0) is not None
+
     def _odometry(self, velocity: FloatArray | None) -> PlanarOdometry:
         s = self.settings
         return PlanarOdometry(s.odometry, s.anchor, s.search, s.range_flow, velocity)
@@ -182,6 +193,8 @@ class MappingPipeline:
             return
         if self.odometry is None:
             self.odometry = self._begin((scan, stamp_ns))
+            if self._sees_again(scan, stamp_ns):
+                self.path.realign(self.settings.smoothing)
         time_ns = max(stamp_ns + half_sweep_ns(scan), self._time_ns + 1)
         given = self._input(scan, self._time_ns, time_ns)
         step = self.odometry.update(*given)
@@ -190,10 +203,12 @@ class MappingPipeline:
         self._hold("front", stamp_ns, scan)
         if step.processed:
             self.track.append(time_ns, step.T_odom_base, *self._attitude_at(time_ns))
-            self.smoother.keys.update(time_ns, step.T_odom_base, self.odometry.points, weak=step.degenerate)
+            front, rear = self.odometry.points, self.odometry.points_behind
+            self.smoother.keys.update(time_ns, step.T_odom_base, front, weak=step.degenerate)
+            self.path.update(AlignedScan(time_ns, step.T_odom_base, front, rear, weak=step.lost))
             self._record(scan.stamp_ns, time_ns, step)
             self._look_for_pile(scan, given.T_level_sensor, step)
-            self.sweeps.advance(self.track, self.wheels)
+            self.sweeps.advance(self.path.final, self.wheels)
 
     def _look_for_pile(self, scan: LaserScan, T_level_sensor: FloatArray, step: OdometryStep) -> None:
         if self.pile is not None and self.has_inclinometer:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from bisect import bisect_left
+from bisect import bisect_left, bisect_right
 from typing import NamedTuple
 
 import numba as nb
@@ -67,6 +67,17 @@ class Track:
             z -= self._lever_m * (math.tan(pitch_rad) - math.tan(pitch0))
         self._times.append(time_ns)
         self._poses.append((x, y, z, roll_rad, pitch_rad, heading))
+
+    def extend(self, rows: Rows) -> None:
+        """Add rows that are complete, height included; their times must rise."""
+        self._times.extend(rows.times_ns.tolist())
+        self._poses.extend(tuple(row) for row in rows.poses.tolist())
+
+    def rows_after(self, first: int, until_ns: int) -> Rows:
+        """Return the poses from row `first` on that are not later than a time."""
+        last = bisect_right(self._times, until_ns)
+        times = np.array(self._times[first:last], dtype=np.int64)
+        return Rows(times, np.array(self._poses[first:last], dtype=float).reshape(-1, 6))
 
     def append_space(self, time_ns: int, T_odom_base: FloatArray) -> None:
         """Add a pose in space (4, 4), as a 3D odometry gives it."""

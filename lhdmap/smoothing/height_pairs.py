@@ -114,13 +114,12 @@ def same_height(walls, wall_owner, lines, hits, hit_owner, travelled, apart_m): 
 def add_pairs(lines, wall_owner, hits, hit_owner, pairs, poses, noise_m, H, g):  # type: ignore[no-untyped-def]
     """Add the pairs' equations to H (3K, 3K) and g (3K,): the hit lies on the wall's line; both poses are unknown.
 
-    `lines` and `hits` (M, 3) in the frames of their scans, `poses` (K, 3); Tukey's weights. Returns how many pairs count.
+    `lines` (N, LINE) and `hits` (M, 3) in the frames of their scans, `pairs` (M,): the line of each hit, `poses` (K, 3). Tukey's
+    weights; returns how many pairs count.
     """
     J, counted = np.empty(6), 0
     for i in range(pairs.size):
         k = pairs[i]
-        if k < 0:
-            continue
         a, b = wall_owner[k], hit_owner[i]
         ca, sa, cb, sb = math.cos(poses[a, 2]), math.sin(poses[a, 2]), math.cos(poses[b, 2]), math.sin(poses[b, 2])
         nx, ny = ca * lines[k, 2] - sa * lines[k, 3], sa * lines[k, 2] + ca * lines[k, 3]

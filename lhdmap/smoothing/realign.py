@@ -11,22 +11,26 @@ from __future__ import annotations
 
 import math
 from collections import deque
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
+from scipy.linalg import solve
 
 from lhdmap.geometry import se2
 from lhdmap.messages import FloatArray
 from lhdmap.smoothing.height_pairs import add_pairs, add_steps, placed, same_height, wall_lines
 from lhdmap.smoothing.settings import SmoothingSettings
 
+Indices = npt.NDArray[np.int64]
 _ROUNDS = 3
 _SOLVE_SHARE = 0.3  # of the lag between two solutions
+_REST_SHARE = 0.2  # of the lag in time between nodes at rest
 _ANCHOR_M = 18.0  # of final poses that the others are tied to: as far as the rear scanner looks back
 _APART_M = 3.0  # scans nearer to each other share the error that is to be found
 _NOISE_M = 0.015
-_MOST_HITS = 200  # of a scan
+_MOST_HITS = 400  # of a scan
 _FIXED = 1e12
 # Random walk of the odometry of tilted scanners (m, m, deg per root metre), measured on simulated drives; where a direction
 # was weak or the scan lost, so many times as much.
@@ -45,6 +49,12 @@ class AlignedScan(NamedTuple):
 
 
 class _Node(NamedTuple):
+    """A scan that is aligned; `lines` of its front hits and `hits` in its own frame, `serial` counts all nodes.
+
+    `pairs` (P, 3): row of `hits`, serial of the node that saw the same wall at the same height, row of that node's `lines`.
+    """
+
+    serial: int
     time_ns: int
     travelled_m: float
     pose: FloatArray
@@ -52,22 +62,22 @@ class _Node(NamedTuple):
     front: FloatArray
     lines: FloatArray
     hits: FloatArray
+    pairs: list[Indices]
 
 
 class Realigner:
-    """`update` with each processed scan; `times_ns` and `poses_odom`, `poses_map` hold the nodes that are final."""
+    """`update` with each processed scan; `moves` holds time and `T_map_odom` (3,) of the nodes that are final."""
 
     def __init__(self, settings: SmoothingSettings) -> None:
         self._settings = settings
         self._nodes: deque[_Node] = deque()  # final ones that others are tied to, then those that are still moved
         self._poses: deque[FloatArray] = deque()
         self._final = 0
+        self._paired = -1
         self._weak = False
         self._travelled_m = self._solved_m = 0.0
         self._last: FloatArray | None = None
-        self.times_ns: list[int] = []
-        self.poses_odom: list[FloatArray] = []
-        self.poses_map: list[FloatArray] = []
+        self.moves: list[tuple[int, FloatArray]] = []
 
     def update(self, scan: AlignedScan) -> None:
         """Take a processed scan, in time order."""
@@ -75,7 +85,7 @@ class Realigner:
             self._travelled_m += float(np.hypot(*(scan.pose[:2] - self._last[:2])))
         self._last = scan.pose
         self._weak |= scan.weak
-        if not self._nodes or self._travelled_m - self._nodes[-1].travelled_m >= self._settings.node_m:
+        if self._due(scan.time_ns):
             self._append(scan)
         if self._travelled_m - self._solved_m >= _SOLVE_SHARE * self._settings.lag_m:
             self._solve()
@@ -87,6 +97,14 @@ class Realigner:
             self._solve()
         while self._final < len(self._nodes):
             self._make_final()
+
+    def _due(self, time_ns: int) -> bool:
+        """Return whether a node is due: by travel, and at rest now and then, so that the path does not stop."""
+        if not self._nodes:
+            return True
+        last, settings = self._nodes[-1], self._settings
+        far = self._travelled_m - last.travelled_m >= settings.node_m
+        return far or time_ns - last.time_ns >= _REST_SHARE * settings.lag_s * 1e9
 
     def _append(self, scan: AlignedScan) -> None:
         """Add a node, placed by the odometry's step from the one before."""
@@ -100,9 +118,9 @@ class Realigner:
         sigmas = _WALK * math.sqrt(length_m) * (_WEAK if self._weak else 1.0)
         front, rear = _thinned(scan.front), _thinned(scan.rear)
         hits = np.concatenate([rear, front[::2]])
-        self._nodes.append(
-            _Node(scan.time_ns, travelled_m, scan.pose.copy(), sigmas, front, wall_lines(front), hits)
-        )
+        serial = self._nodes[-1].serial + 1 if self._nodes else 0
+        node = (serial, scan.time_ns, travelled_m, scan.pose.copy(), sigmas, front, wall_lines(front), hits, [])
+        self._nodes.append(_Node(*node))
         self._poses.append(pose)
         self._weak = False
 
@@ -120,9 +138,8 @@ class Realigner:
 
     def _make_final(self) -> None:
         node = self._nodes[self._final]
-        self.times_ns.append(node.time_ns)
-        self.poses_odom.append(node.pose)
-        self.poses_map.append(self._poses[self._final].copy())
+        T_map_odom = se2.compose(self._poses[self._final], se2.inverse(node.pose))
+        self.moves.append((node.time_ns, T_map_odom))
         self._final += 1
         while self._final > 1 and node.travelled_m - self._nodes[0].travelled_m > _ANCHOR_M:
             self._nodes.popleft()
@@ -130,40 +147,67 @@ class Realigner:
             self._final -= 1
 
     def _solve(self) -> None:
-        """Gauss-Newton over the poses that are not final; the pairs are found once, where the odometry's steps put the scans."""
+        """Gauss-Newton over the poses that are not final."""
         self._solved_m = self._travelled_m
+        self._pair()
         nodes, poses = list(self._nodes), np.array(self._poses)
-        walls, wall_owner = _stacked([node.front for node in nodes])
-        lines = np.concatenate([node.lines for node in nodes])
         first = max(self._final, 1)  # the first pose of all stays
-        hits, hit_owner = _stacked([node.hits for node in nodes[first:]])
-        hit_owner += first
-        travelled = np.array([node.travelled_m for node in nodes])
-        steps = np.array([se2.between(a.pose, b.pose) for a, b in zip(nodes[:-1], nodes[1:], strict=True)]).reshape(-1, 3)
-        sigmas = np.array([node.step_sigmas for node in nodes[1:]]).reshape(-1, 3)
-        pairs = None
+        if first >= len(nodes):
+            return
+        lines, owners = _stacked([node.lines for node in nodes])
+        equations = _equations_of(nodes, first, np.searchsorted(owners, np.arange(len(nodes))))
+        steps = np.array([se2.between(a.pose, b.pose) for a, b in pairwise(nodes)])
+        sigmas = np.array([node.step_sigmas for node in nodes[1:]])
         for _ in range(_ROUNDS):
-            if pairs is None:
-                pairs = same_height(
-                    placed(walls, wall_owner, poses),
-                    wall_owner,
-                    lines,
-                    placed(hits, hit_owner, poses),
-                    hit_owner,
-                    travelled,
-                    _APART_M,
-                )
             H, g = np.zeros((3 * len(nodes), 3 * len(nodes))), np.zeros(3 * len(nodes))
-            add_pairs(lines, wall_owner, hits, hit_owner, pairs, poses, _NOISE_M, H, g)
+            add_pairs(lines, owners, *equations, poses, _NOISE_M, H, g)
             add_steps(poses, steps, sigmas, H, g)
-            free = slice(3 * first, None)
-            if first < len(nodes):
-                poses[first:] += np.linalg.solve(H[free, free], g[free]).reshape(-1, 3)
+            poses[first:] += solve(H[3 * first :, 3 * first :], g[3 * first :], assume_a="pos").reshape(-1, 3)
         self._poses = deque(poses)
+
+    def _pair(self) -> None:
+        """Find what the new nodes saw again, where the odometry's steps put them: they are centimetres off by then."""
+        nodes, poses = self._nodes, np.array(self._poses)
+        new = [row for row, node in enumerate(nodes) if node.serial > self._paired]
+        if not new:
+            return
+        self._paired = nodes[-1].serial
+        walls, wall_owner = _stacked([node.front for node in nodes])
+        hits, owner = _stacked([nodes[row].hits for row in new])
+        owner += new[0]
+        found = same_height(
+            placed(walls, wall_owner, poses),
+            wall_owner,
+            np.concatenate([node.lines for node in nodes]),
+            placed(hits, owner, poses),
+            owner,
+            np.array([node.travelled_m for node in nodes]),
+            _APART_M,
+        )
+        wall_starts, starts = np.searchsorted(wall_owner, np.arange(len(nodes))), np.searchsorted(owner, new)
+        for row, start, end in zip(new, starts, [*starts[1:], len(hits)], strict=True):
+            mine = start + np.flatnonzero(found[start:end] >= 0)
+            partner = wall_owner[found[mine]]
+            nodes[row].pairs.append(
+                np.column_stack([mine - start, nodes[0].serial + partner, found[mine] - wall_starts[partner]])
+            )
+
+
+def _equations_of(nodes: list[_Node], first: int, wall_starts: Indices) -> tuple[FloatArray, Indices, Indices]:
+    """Return hits (M, 3), the row of their node (M,) and the row of the line that each lies on (M,), of the nodes from `first` on."""
+    hits, owners, lines = [np.zeros((0, 3))], [np.zeros(0, np.int64)], [np.zeros(0, np.int64)]
+    for row, node in enumerate(nodes[first:], first):
+        for pairs in node.pairs:
+            partner = pairs[:, 1] - nodes[0].serial
+            kept = partner >= 0
+            hits.append(node.hits[pairs[kept, 0]])
+            owners.append(np.full(int(kept.sum()), row))
+            lines.append(wall_starts[partner[kept]] + pairs[kept, 2])
+    return np.concatenate(hits), np.concatenate(owners), np.concatenate(lines)
 
 
 def _thinned(points: FloatArray) -> FloatArray:
-    return np.ascontiguousarray(points[:: -(-len(points) // _MOST_HITS) or 1])
+    return np.ascontiguousarray(points[:: int(-(-len(points) // _MOST_HITS) or 1)])
 
 
 def _stacked(parts: list[FloatArray]) -> tuple[FloatArray, npt.NDArray[np.int64]]:
