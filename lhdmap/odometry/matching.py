@@ -66,7 +66,7 @@ class Match(NamedTuple):
 def lines_at(map_, pose, hits, min_cells, lines):  # type: ignore[no-untyped-def]
     """Fit the wall's line at each hit, lines (N, LINE); return how many of the front scanner's have one."""
     c, s = math.cos(pose[2]), math.sin(pose[2])
-    points, sums = hits.points, np.empty(11)
+    points, sums = hits.points, np.empty(8)
     found = 0
     for i in range(points.shape[0]):
         at = (

@@ -25,7 +25,6 @@ LAYER_M = 0.12
 _HEIGHT_SIGMA_M = 0.06
 _HEIGHT_PER_CELL = 1.5  # ... and at least so many cells: measured, a third less heading drift of a tilted scanner
 _FINE_M = 0.05
-_HEIGHT_FLOOR_M2 = 0.02**2  # spread in height below which no slope is fitted to it
 
 
 class Level(NamedTuple):
@@ -128,7 +127,7 @@ def _neighbours(level: Level, z: float, layered: bool) -> tuple[int, int]:
 def _gather(level: Level, x: float, y: float, z: float, layered: bool, sums: FloatArray) -> bool:
     """Add up the cells around (x, y, z) with Gaussian weights; False where there are none.
 
-    `sums`, shape (11,), receives: weights, squared weights, x, y, z, xx, xy, yy, xz, yz, zz about the point.
+    `sums`, shape (8,), receives: weights, squared weights, x, y, z, xx, xy, yy about the point.
     """
     shift, cell = int(round(math.log2(level.size))), level.cell_m
     cx, cy = int(math.floor(x / cell)), int(math.floor(y / cell))
@@ -138,7 +137,7 @@ def _gather(level: Level, x: float, y: float, z: float, layered: bool, sums: Flo
     wanted = 0
     for iz in range(z_low, z_high + 1):
         wanted |= 1 << (iz & (LAYERS - 1))
-    s0 = s1 = sx = sy = sz = sxx = sxy = syy = sxz = syz = szz = 0.0
+    s0 = s1 = sx = sy = sz = sxx = sxy = syy = 0.0
     for ix in range(cx - KERNEL_CELLS, cx + KERNEL_CELLS + 1):
         for iy in range(cy - KERNEL_CELLS, cy + KERNEL_CELLS + 1):
             tile, place = _column(ix, iy, level.size)
@@ -157,12 +156,11 @@ def _gather(level: Level, x: float, y: float, z: float, layered: bool, sums: Flo
                 dz = iz * LAYER_M + hit[3] - z
                 n = hit[0]
                 w = math.exp(scale * d2 + z_scale * dz * dz) * n / (n + 1.0)
-                wx, wy, wz = w * dx, w * dy, w * dz
-                s0, s1, sx, sy, sz = s0 + w, s1 + w * w, sx + wx, sy + wy, sz + wz
+                wx, wy = w * dx, w * dy
+                s0, s1, sx, sy, sz = s0 + w, s1 + w * w, sx + wx, sy + wy, sz + w * dz
                 sxx, sxy, syy = sxx + wx * dx, sxy + wx * dy, syy + wy * dy
-                sxz, syz, szz = sxz + wx * dz, syz + wy * dz, szz + wz * dz
     sums[0], sums[1], sums[2], sums[3], sums[4] = s0, s1, sx, sy, sz
-    sums[5], sums[6], sums[7], sums[8], sums[9], sums[10] = sxx, sxy, syy, sxz, syz, szz
+    sums[5], sums[6], sums[7] = sxx, sxy, syy
     return s0 > 1e-9
 
 
@@ -172,9 +170,9 @@ def fit_line(
 ) -> bool:
     """Fit the wall near `at` (x, y, height) by a line with Gaussian weights; return whether the cells there support one.
 
-    `layered`: look at the layers above and below, too (a planar scan has one). `sums` (11,) is room to work in. `line`,
-    shape (LINE,), receives: centre x, y at that height, normal x, y, scatter across the line (variance, m²), effective number
-    of cells, [6] left to the caller, and by how much the cells lie lower than the point, as far as no lean accounts for it (m).
+    `layered`: look at the layers above and below, too (a planar scan has one). `sums` (8,) is room to work in. `line`,
+    shape (LINE,), receives: centre x, y, normal x, y, scatter across the line (variance, m²), effective number
+    of cells, [6] left to the caller, and by how much the cells lie lower than the point (m).
     """
     if not _gather(level, at[0], at[1], at[2], layered, sums):
         return False
@@ -186,14 +184,7 @@ def fit_line(
         return False
     mx, my, mz = sums[2] / s0, sums[3] / s0, sums[4] / s0
     cxx, cxy, cyy = sums[5] / s0 - mx * mx, sums[6] / s0 - mx * my, sums[7] / s0 - my * my
-    line[7] = 0.0
-    if layered:  # the wall leans: take it at the point's own height
-        cxz, cyz = sums[8] / s0 - mx * mz, sums[9] / s0 - my * mz
-        czz = sums[10] / s0 - mz * mz + _HEIGHT_FLOOR_M2
-        lean_x, lean_y = cxz / czz, cyz / czz
-        mx, my = mx - lean_x * mz, my - lean_y * mz
-        cxx, cxy, cyy = cxx - lean_x * cxz, cxy - lean_x * cyz, cyy - lean_y * cyz
-        line[7] = -mz * _HEIGHT_FLOOR_M2 / czz
+    line[7] = -mz
     half_trace, half_difference = 0.5 * (cxx + cyy), 0.5 * (cxx - cyy)
     root = math.sqrt(half_difference * half_difference + cxy * cxy)
     small, large = max(half_trace - root, 0.0), half_trace + root

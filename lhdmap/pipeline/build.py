@@ -131,21 +131,15 @@ class _Outcome:
         self.request, self.source, self.pipeline = request, source, pipeline
         records = pipeline.records
         stamps, times = np.array(records.stamps_ns, dtype=np.int64), np.array(records.times_ns, dtype=np.int64)
-        rows = pipeline.track.rows()
-        self.odometry = self.final = trajectory_of(resample(rows, times), stamps)
-        self.cloud: Cloud
-        correction = None if given is not None else pipeline.smoother.correction()
-        if given is not None:
-            rows = given
-            self.final = trajectory_of(resample(rows, times), stamps)
-            self.cloud = integrate_again(request, pipeline, rows)
-        elif correction is None:
-            self.cloud = pipeline.sweeps.cloud()
-        else:
+        self.odometry = trajectory_of(resample(pipeline.track.rows(), times), stamps)
+        rows = pipeline.path.final.rows() if given is None else given
+        correction = None if given is not None else pipeline.smoother.correction(pipeline.path.correction())
+        if correction is not None:
             rows = Rows(rows.times_ns, corrected(rows.poses, rows.times_ns, correction))
-            self.final = trajectory_of(resample(rows, times), stamps)
-            self.cloud = integrate_again(request, pipeline, rows)
-        self.pile = self._pile(rows, moved=given is not None or correction is not None)
+        self.final = trajectory_of(resample(rows, times), stamps)
+        moved = given is not None or correction is not None
+        self.cloud: Cloud = integrate_again(request, pipeline, rows) if moved else pipeline.sweeps.cloud()
+        self.pile = self._pile(rows, moved=moved)
         self.duration_s = float(times[-1] - times[0]) * 1e-9 if len(times) else 0.0
         self.warnings = [*source.warnings, *source.damage, *pipeline.warnings, *_remarks(pipeline)]
         steps = np.diff(rows.poses[:, :3], axis=0)
@@ -167,7 +161,7 @@ class _Outcome:
         if stage is None or not self.pipeline.has_inclinometer:
             return None
         if not moved:
-            return stage.report()
+            return self.pipeline.path.moved(stage.report())
         machine = self.pipeline.machine
         return identify_along(rows, request.logs, request.settings, machine, request.topics)
 

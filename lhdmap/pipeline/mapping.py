@@ -194,7 +194,9 @@ class MappingPipeline:
         if self.odometry is None:
             self.odometry = self._begin((scan, stamp_ns))
             if self._sees_again(scan, stamp_ns):
-                self.path.realign(self.settings.smoothing)
+                self.path.realign(
+                    self.settings.smoothing, -(self.machine or _DEFAULT_MACHINE).dimensions.joint_to_front_axle_m
+                )
         time_ns = max(stamp_ns + half_sweep_ns(scan), self._time_ns + 1)
         given = self._input(scan, self._time_ns, time_ns)
         step = self.odometry.update(*given)

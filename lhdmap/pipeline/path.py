@@ -4,6 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from lhdmap.messages import FloatArray
+from lhdmap.pile.moved import moved_report
+from lhdmap.pile.result import PileReport
 from lhdmap.pipeline.track import Rows, Track
 from lhdmap.smoothing.realign import AlignedScan, Realigner
 from lhdmap.smoothing.settings import SmoothingSettings
@@ -18,26 +21,22 @@ class FinalPath:
         self._realigner: Realigner | None = None
         self._used = self._moves = 0
 
-    def realign(self, settings: SmoothingSettings) -> None:
+    def realign(self, settings: SmoothingSettings, joint_x_m: float) -> None:
         """Realign the scans from now on, the first one: poses become final with a lag."""
-        self._realigner, self.final = Realigner(settings), Track()
-
-    @property
-    def realigned(self) -> bool:
-        """Whether the final path is another than the odometry's."""
-        return self._realigner is not None
+        self._realigner, self.final = Realigner(settings, joint_x_m), Track()
 
     def update(self, scan: AlignedScan) -> None:
         """Take a processed scan whose pose is in the track."""
         if self._realigner is not None:
             self._realigner.update(scan)
-            self._advance(finished=False)
+            if len(self._realigner.moves) > self._moves:
+                self._advance(self._realigner.moves, self._realigner.moves[-1][0])
 
     def finish(self) -> None:
         """Make the whole path final."""
         if self._realigner is not None:
             self._realigner.finish()
-            self._advance(finished=True)
+            self._advance(self._realigner.moves, self.track.last_ns or 0)
 
     def correction(self) -> Correction | None:
         """Return how the final path moves the odometry's, None where it does not."""
@@ -45,20 +44,23 @@ class FinalPath:
             return None
         return _correction(self._realigner.moves)
 
-    def _advance(self, *, finished: bool) -> None:
-        """Take over the odometry's poses up to the newest final node, moved as the nodes around them are."""
-        assert self._realigner is not None
-        moves = self._realigner.moves
-        if len(moves) == self._moves and not finished:
-            return
-        until_ns = self.track.last_ns if finished else moves[-1][0]
-        rows = self.track.rows_after(self._used, until_ns or 0)
+    def moved(self, report: PileReport) -> PileReport:
+        """Return a pile that was measured on the odometry's path as it lies on the final one."""
+        correction = self.correction()
+        if correction is None or report.last is None:
+            return report
+        at = int(np.searchsorted(correction.times_ns, report.last.stamp_ns))
+        return moved_report(report, correction.T_map_odom[min(at, len(correction.T_map_odom) - 1)])
+
+    def _advance(self, moves: list[tuple[int, FloatArray]], until_ns: int) -> None:
+        """Take over the odometry's poses up to a time, moved as the final nodes around them are."""
+        rows = self.track.rows_after(self._used, until_ns)
         if moves and len(rows.times_ns):
             recent = _correction(moves[max(self._moves - 1, 0) :])
             self.final.extend(Rows(rows.times_ns, corrected(rows.poses, rows.times_ns, recent)))
         self._used, self._moves = self._used + len(rows.times_ns), len(moves)
 
 
-def _correction(moves: list[tuple[int, np.ndarray]]) -> Correction:
+def _correction(moves: list[tuple[int, FloatArray]]) -> Correction:
     times, T_map_odom = zip(*moves, strict=True)
     return Correction(np.array(times, dtype=np.int64), np.array(T_map_odom), 0)

@@ -3,9 +3,15 @@
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numba as nb
 import numpy as np
+import numpy.typing as npt
+
+from lhdmap.messages import FloatArray
+
+Indices = npt.NDArray[np.int64]
 
 CELL_M = 0.2  # of the grid that hits are looked up in; a pair is never farther apart
 HEIGHT_M = 0.05  # hits farther apart in height see another curve of a rough wall
@@ -110,23 +116,44 @@ def same_height(walls, wall_owner, lines, hits, hit_owner, travelled, apart_m): 
     return found
 
 
-@nb.njit(cache=True, nogil=True)
-def add_pairs(lines, wall_owner, hits, hit_owner, pairs, poses, noise_m, H, g):  # type: ignore[no-untyped-def]
-    """Add the pairs' equations to H (3K, 3K) and g (3K,): the hit lies on the wall's line; both poses are unknown.
+class Joint(NamedTuple):
+    """The joint that rear hits swing about: its x in `base_link` (m), and by how much its encoder is off (rad)."""
 
-    `lines` (N, LINE) and `hits` (M, 3) in the frames of their scans, `pairs` (M,): the line of each hit, `poses` (K, 3). Tukey's
-    weights; returns how many pairs count.
+    x_m: float
+    offset_rad: float
+
+
+class Pairs(NamedTuple):
+    """Hits (M, 3) of scans `owner` (M,), each on the wall `line` (M,); `swings` (M,): seen from behind the joint."""
+
+    hits: FloatArray
+    owner: Indices
+    line: Indices
+    swings: npt.NDArray[np.bool_]
+
+
+@nb.njit(cache=True, nogil=True)
+def add_pairs(lines, wall_owner, pairs, poses, joint, noise_m, H, g):  # type: ignore[no-untyped-def]
+    """Add the pairs' equations to H and g of 3K + 1 unknowns: the hit lies on the wall's line.
+
+    Unknown are the poses (K, 3) of both scans and, last, the joint's offset. `lines` (N, LINE) and hits in the frames of their
+    scans; Tukey's weights. Returns how many pairs count.
     """
-    J, counted = np.empty(6), 0
-    for i in range(pairs.size):
-        k = pairs[i]
-        a, b = wall_owner[k], hit_owner[i]
+    J, rows, counted = np.empty(7), np.empty(7, np.int64), 0
+    rows[6] = H.shape[0] - 1
+    for i in range(pairs.owner.size):
+        k = pairs.line[i]
+        a, b = wall_owner[k], pairs.owner[i]
         ca, sa, cb, sb = math.cos(poses[a, 2]), math.sin(poses[a, 2]), math.cos(poses[b, 2]), math.sin(poses[b, 2])
         nx, ny = ca * lines[k, 2] - sa * lines[k, 3], sa * lines[k, 2] + ca * lines[k, 3]
         wx, wy = ca * lines[k, 0] - sa * lines[k, 1], sa * lines[k, 0] + ca * lines[k, 1]
-        hx, hy = cb * hits[i, 0] - sb * hits[i, 1], sb * hits[i, 0] + cb * hits[i, 1]
+        x, y, turned_x, turned_y = pairs.hits[i, 0], pairs.hits[i, 1], 0.0, 0.0
+        if pairs.swings[i]:
+            turned_x, turned_y = -y, x - joint.x_m
+            x, y = x + joint.offset_rad * turned_x, y + joint.offset_rad * turned_y
+        hx, hy = cb * x - sb * y, sb * x + cb * y
         d = nx * (poses[b, 0] + hx - poses[a, 0] - wx) + ny * (poses[b, 1] + hy - poses[a, 1] - wy)
-        dz = hits[i, 2] - lines[k, 5]
+        dz = pairs.hits[i, 2] - lines[k, 5]
         variance = noise_m * noise_m + lines[k, 4] + (_LEAN * dz) ** 2
         u2 = d * d / (_CUTOFF_SIGMAS**2 * max(variance, _LEAST_SIGMA_M**2))
         if u2 >= 1.0:
@@ -135,12 +162,13 @@ def add_pairs(lines, wall_owner, hits, hit_owner, pairs, poses, noise_m, H, g): 
         w = (1.0 - u2) ** 2 / variance
         J[0], J[1], J[2] = -nx, -ny, nx * wy - ny * wx
         J[3], J[4], J[5] = nx, ny, ny * hx - nx * hy
-        for p in range(6):
-            row = 3 * a + p if p < 3 else 3 * b + p - 3
-            g[row] -= w * J[p] * d
-            for q in range(6):
-                column = 3 * a + q if q < 3 else 3 * b + q - 3
-                H[row, column] += w * J[p] * J[q]
+        J[6] = nx * (cb * turned_x - sb * turned_y) + ny * (sb * turned_x + cb * turned_y)
+        for p in range(3):
+            rows[p], rows[p + 3] = 3 * a + p, 3 * b + p
+        for p in range(7):
+            g[rows[p]] -= w * J[p] * d
+            for q in range(7):
+                H[rows[p], rows[q]] += w * J[p] * J[q]
     return counted
 
 

@@ -20,10 +20,9 @@ from scipy.linalg import solve
 
 from lhdmap.geometry import se2
 from lhdmap.messages import FloatArray
-from lhdmap.smoothing.height_pairs import add_pairs, add_steps, placed, same_height, wall_lines
+from lhdmap.smoothing.height_pairs import Indices, Joint, Pairs, add_pairs, add_steps, placed, same_height, wall_lines
 from lhdmap.smoothing.settings import SmoothingSettings
 
-Indices = npt.NDArray[np.int64]
 _ROUNDS = 3
 _SOLVE_SHARE = 0.3  # of the lag between two solutions
 _REST_SHARE = 0.2  # of the lag in time between nodes at rest
@@ -36,6 +35,7 @@ _FIXED = 1e12
 # was weak or the scan lost, so many times as much.
 _WALK, _WEAK = np.array([0.02, 0.01, math.radians(0.03)]), 5.0
 _SHORTEST_M = 0.003
+_JOINT_STD_RAD = math.radians(0.3)
 
 
 class AlignedScan(NamedTuple):
@@ -49,7 +49,7 @@ class AlignedScan(NamedTuple):
 
 
 class _Node(NamedTuple):
-    """A scan that is aligned; `lines` of its front hits and `hits` in its own frame, `serial` counts all nodes.
+    """A scan that is aligned, `serial` counts all: `lines` of its front hits, and `hits`, the rear ones first, in its own frame.
 
     `pairs` (P, 3): row of `hits`, serial of the node that saw the same wall at the same height, row of that node's `lines`.
     """
@@ -62,14 +62,19 @@ class _Node(NamedTuple):
     front: FloatArray
     lines: FloatArray
     hits: FloatArray
+    behind: int
     pairs: list[Indices]
 
 
 class Realigner:
-    """`update` with each processed scan; `moves` holds time and `T_map_odom` (3,) of the nodes that are final."""
+    """`update` with each processed scan; `moves` holds time and `T_map_odom` (3,) of the nodes that are final.
 
-    def __init__(self, settings: SmoothingSettings) -> None:
+    `joint_x_m`: of the joint that rear hits swing about, in `base_link`; what its encoder is off is one of the unknowns.
+    """
+
+    def __init__(self, settings: SmoothingSettings, joint_x_m: float = 0.0) -> None:
         self._settings = settings
+        self._joint = Joint(joint_x_m, 0.0)
         self._nodes: deque[_Node] = deque()  # final ones that others are tied to, then those that are still moved
         self._poses: deque[FloatArray] = deque()
         self._final = 0
@@ -119,8 +124,10 @@ class Realigner:
         front, rear = _thinned(scan.front), _thinned(scan.rear)
         hits = np.concatenate([rear, front[::2]])
         serial = self._nodes[-1].serial + 1 if self._nodes else 0
-        node = (serial, scan.time_ns, travelled_m, scan.pose.copy(), sigmas, front, wall_lines(front), hits, [])
-        self._nodes.append(_Node(*node))
+        lines, pose_odom = wall_lines(front), scan.pose.copy()
+        self._nodes.append(
+            _Node(serial, scan.time_ns, travelled_m, pose_odom, sigmas, front, lines, hits, len(rear), [])
+        )
         self._poses.append(pose)
         self._weak = False
 
@@ -155,14 +162,20 @@ class Realigner:
         if first >= len(nodes):
             return
         lines, owners = _stacked([node.lines for node in nodes])
-        equations = _equations_of(nodes, first, np.searchsorted(owners, np.arange(len(nodes))))
+        pairs = _pairs_of(nodes, first, np.searchsorted(owners, np.arange(len(nodes))))
         steps = np.array([se2.between(a.pose, b.pose) for a, b in pairwise(nodes)])
         sigmas = np.array([node.step_sigmas for node in nodes[1:]])
+        joint, size = self._joint, 3 * len(nodes) + 1
         for _ in range(_ROUNDS):
-            H, g = np.zeros((3 * len(nodes), 3 * len(nodes))), np.zeros(3 * len(nodes))
-            add_pairs(lines, owners, *equations, poses, _NOISE_M, H, g)
+            H, g = np.zeros((size, size)), np.zeros(size)
+            add_pairs(lines, owners, pairs, poses, joint, _NOISE_M, H, g)
             add_steps(poses, steps, sigmas, H, g)
-            poses[first:] += solve(H[3 * first :, 3 * first :], g[3 * first :], assume_a="pos").reshape(-1, 3)
+            H[-1, -1] += 1.0 / _JOINT_STD_RAD**2
+            g[-1] -= joint.offset_rad / _JOINT_STD_RAD**2
+            change = solve(H[3 * first :, 3 * first :], g[3 * first :], assume_a="pos")
+            poses[first:] += change[:-1].reshape(-1, 3)
+            joint = joint._replace(offset_rad=joint.offset_rad + float(change[-1]))
+        self._joint = joint
         self._poses = deque(poses)
 
     def _pair(self) -> None:
@@ -193,9 +206,14 @@ class Realigner:
             )
 
 
-def _equations_of(nodes: list[_Node], first: int, wall_starts: Indices) -> tuple[FloatArray, Indices, Indices]:
-    """Return hits (M, 3), the row of their node (M,) and the row of the line that each lies on (M,), of the nodes from `first` on."""
-    hits, owners, lines = [np.zeros((0, 3))], [np.zeros(0, np.int64)], [np.zeros(0, np.int64)]
+def _pairs_of(nodes: list[_Node], first: int, wall_starts: Indices) -> Pairs:
+    """Return the pairs of the nodes from `first` on whose partner is still there."""
+    hits, owners, lines, swings = (
+        [np.zeros((0, 3))],
+        [np.zeros(0, np.int64)],
+        [np.zeros(0, np.int64)],
+        [np.zeros(0, bool)],
+    )
     for row, node in enumerate(nodes[first:], first):
         for pairs in node.pairs:
             partner = pairs[:, 1] - nodes[0].serial
@@ -203,7 +221,8 @@ def _equations_of(nodes: list[_Node], first: int, wall_starts: Indices) -> tuple
             hits.append(node.hits[pairs[kept, 0]])
             owners.append(np.full(int(kept.sum()), row))
             lines.append(wall_starts[partner[kept]] + pairs[kept, 2])
-    return np.concatenate(hits), np.concatenate(owners), np.concatenate(lines)
+            swings.append(pairs[kept, 0] < node.behind)
+    return Pairs(*(np.concatenate(parts) for parts in (hits, owners, lines, swings)))
 
 
 def _thinned(points: FloatArray) -> FloatArray:

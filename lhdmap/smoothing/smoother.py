@@ -11,7 +11,7 @@ from lhdmap.geometry import se2
 from lhdmap.messages import FloatArray
 from lhdmap.smoothing.closures import find_closures
 from lhdmap.smoothing.graph import smoothed
-from lhdmap.smoothing.keys import KeyScans
+from lhdmap.smoothing.keys import KeyScan, KeyScans
 from lhdmap.smoothing.settings import SmoothingSettings
 
 
@@ -30,9 +30,12 @@ class Smoother:
         self._settings = settings
         self.keys = KeyScans(settings)
 
-    def correction(self) -> Correction | None:
-        """Return how the odometry is to be moved, or None where no place was seen twice."""
-        keys = self.keys.keys
+    def correction(self, realigned: Correction | None = None) -> Correction | None:
+        """Return how the path is to be moved, or None where no place was seen twice.
+
+        The path is the odometry's, or what the realignment has made of it.
+        """
+        keys = self.keys.keys if realigned is None else _moved_keys(self.keys.keys, realigned)
         closures = find_closures(keys, self._settings) if self._settings.closures else []
         if not closures:
             return None
@@ -58,6 +61,14 @@ def corrected(poses: FloatArray, times_ns: npt.NDArray[np.int64], correction: Co
     out = poses.copy()
     out[:, [0, 1, 5]] = mixed
     return out
+
+
+def _moved_keys(keys: list[KeyScan], correction: Correction) -> list[KeyScan]:
+    poses = np.zeros((len(keys), 6))
+    poses[:, [0, 1, 5]] = np.array([key.pose for key in keys]).reshape(-1, 3)
+    times_ns = np.array([key.time_ns for key in keys], dtype=np.int64)
+    moved = corrected(poses, times_ns, correction)[:, [0, 1, 5]]
+    return [key._replace(pose=pose) for key, pose in zip(keys, moved, strict=True)]
 
 
 def _moved(T: FloatArray, planar: FloatArray) -> FloatArray:
