@@ -55,6 +55,11 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 def entry_point() -> None:
     """Console script: `main` with the process's exit code."""
+    for threads in (
+        "OMP_NUM_THREADS",
+        "OPENBLAS_NUM_THREADS",
+    ):  # libraries' thread pools wait for each other: one thread each
+        os.environ.setdefault(threads, "1")
     gc.set_threshold(100_000, 20, 20)  # the libraries' hundreds of thousands of lasting objects are walked less often
     exit_code = main()
     if exit_code == EXIT_INTERRUPTED:

@@ -14,7 +14,7 @@ from lhdmap.messages import FloatArray
 Indices = npt.NDArray[np.int64]
 
 CELL_M = 0.2  # of the grid that hits are looked up in; a pair is never farther apart
-HEIGHT_M = 0.05  # hits farther apart in height see another curve of a rough wall
+HEIGHT_M = 0.04  # twice the deviation below: hits farther apart in height see another curve of a rough wall
 _NEIGHBOURS, _NEIGHBOURHOOD_M = 3, 0.25
 _APART_SIGMA_M, _HEIGHT_SIGMA_M = 0.1, 0.02
 _FARTHEST = 4.0  # of the squared distance in those two units
@@ -68,7 +68,7 @@ def placed(points, owners, poses):  # type: ignore[no-untyped-def]
 
 @nb.njit(cache=True, nogil=True)
 def _sorted_into_cells(world, low, shape):  # type: ignore[no-untyped-def]
-    """Return the hits by cell, and where each cell's begin, shape (cells + 1,)."""
+    """Return the hits by cell, in a cell by height, and where each cell's begin, shape (cells + 1,)."""
     starts = np.zeros(shape[0] * shape[1] + 1, np.int64)
     cells = np.empty(world.shape[0], np.int64)
     for i in range(world.shape[0]):
@@ -77,11 +77,27 @@ def _sorted_into_cells(world, low, shape):  # type: ignore[no-untyped-def]
         starts[cells[i] + 1] += 1
     for k in range(starts.size - 1):
         starts[k + 1] += starts[k]
-    order, at = np.empty(world.shape[0], np.int64), starts.copy()
+    order, filled = np.empty(world.shape[0], np.int64), starts.copy()
     for i in range(world.shape[0]):
-        order[at[cells[i]]] = i
-        at[cells[i]] += 1
+        at = filled[cells[i]]
+        while at > starts[cells[i]] and world[order[at - 1], 2] > world[i, 2]:
+            order[at] = order[at - 1]
+            at -= 1
+        order[at] = i
+        filled[cells[i]] += 1
     return order, starts
+
+
+@nb.njit(cache=True, nogil=True, inline="always")
+def _first_above(world, order, first, last, z):  # type: ignore[no-untyped-def]
+    """Return the first place between two of `order`, sorted by height, that is not below z."""
+    while first < last:
+        middle = (first + last) // 2
+        if world[order[middle], 2] < z:
+            first = middle + 1
+        else:
+            last = middle
+    return first
 
 
 @nb.njit(cache=True, nogil=True)
@@ -103,16 +119,16 @@ def same_height(walls, wall_owner, lines, hits, hit_owner, travelled, apart_m): 
         cx, cy = int(math.floor((x - low[0]) / CELL_M)), int(math.floor((y - low[1]) / CELL_M))
         nearest = _FARTHEST
         for ix in range(max(cx - 1, 0), min(cx + 2, shape[0])):
-            first, last = ix * shape[1] + max(cy - 1, 0), ix * shape[1] + min(cy + 2, shape[1])
-            if first >= last:
-                continue
-            for k in order[starts[first] : starts[last]]:
-                dz = walls[k, 2] - z
-                if abs(dz) > HEIGHT_M or lines[k, 6] == 0.0 or abs(travelled[wall_owner[k]] - mine) < apart_m:
-                    continue
-                away = ((walls[k, 0] - x) ** 2 + (walls[k, 1] - y) ** 2) * per_m + dz * dz * per_height
-                if away < nearest:
-                    nearest, found[i] = away, k
+            for iy in range(max(cy - 1, 0), min(cy + 2, shape[1])):
+                end = starts[ix * shape[1] + iy + 1]
+                at = _first_above(walls, order, starts[ix * shape[1] + iy], end, z - HEIGHT_M)
+                while at < end and walls[order[at], 2] <= z + HEIGHT_M:
+                    k = order[at]
+                    at += 1
+                    dz = walls[k, 2] - z
+                    away = ((walls[k, 0] - x) ** 2 + (walls[k, 1] - y) ** 2) * per_m + dz * dz * per_height
+                    if away < nearest and lines[k, 6] > 0.0 and abs(travelled[wall_owner[k]] - mine) >= apart_m:
+                        nearest, found[i] = away, k
     return found
 
 
