@@ -14,10 +14,11 @@ from lhdmap.messages import FloatArray
 Indices = npt.NDArray[np.int64]
 
 CELL_M = 0.2  # of the grid that hits are looked up in; a pair is never farther apart
-HEIGHT_M = 0.04  # twice the deviation below: hits farther apart in height see another curve of a rough wall
 _NEIGHBOURS, _NEIGHBOURHOOD_M = 3, 0.25
 _APART_SIGMA_M, _HEIGHT_SIGMA_M = 0.1, 0.02
-_FARTHEST = 4.0  # of the squared distance in those two units
+_FARTHEST = (
+    4.0  # of the squared distance in those two units: hits farther apart in height see another curve of a rough wall
+)
 _LEAN = 0.5  # rock a centimetre higher stands so many centimetres in or out
 _CUTOFF_SIGMAS, _LEAST_SIGMA_M = 6.0, 0.02
 LINE = 7
@@ -67,37 +68,23 @@ def placed(points, owners, poses):  # type: ignore[no-untyped-def]
 
 
 @nb.njit(cache=True, nogil=True)
-def _sorted_into_cells(world, low, shape):  # type: ignore[no-untyped-def]
-    """Return the hits by cell, in a cell by height, and where each cell's begin, shape (cells + 1,)."""
-    starts = np.zeros(shape[0] * shape[1] + 1, np.int64)
-    cells = np.empty(world.shape[0], np.int64)
-    for i in range(world.shape[0]):
-        ix, iy = int((world[i, 0] - low[0]) / CELL_M), int((world[i, 1] - low[1]) / CELL_M)
-        cells[i] = ix * shape[1] + iy
-        starts[cells[i] + 1] += 1
+def _sorted_into_cells(walls, wall_owner, lines, travelled, low, shape):  # type: ignore[no-untyped-def]
+    """Return the wall hits that have a line, by cell: rows x, y, z, travelled, hit; and where each cell's begin."""
+    starts, cells = np.zeros(shape[0] * shape[1] + 1, np.int64), np.empty(walls.shape[0], np.int64)
+    for i in range(walls.shape[0]):
+        if lines[i, 6] > 0.0:
+            ix, iy = int((walls[i, 0] - low[0]) / CELL_M), int((walls[i, 1] - low[1]) / CELL_M)
+            cells[i] = ix * shape[1] + iy
+            starts[cells[i] + 1] += 1
     for k in range(starts.size - 1):
         starts[k + 1] += starts[k]
-    order, filled = np.empty(world.shape[0], np.int64), starts.copy()
-    for i in range(world.shape[0]):
-        at = filled[cells[i]]
-        while at > starts[cells[i]] and world[order[at - 1], 2] > world[i, 2]:
-            order[at] = order[at - 1]
-            at -= 1
-        order[at] = i
-        filled[cells[i]] += 1
-    return order, starts
-
-
-@nb.njit(cache=True, nogil=True, inline="always")
-def _first_above(world, order, first, last, z):  # type: ignore[no-untyped-def]
-    """Return the first place between two of `order`, sorted by height, that is not below z."""
-    while first < last:
-        middle = (first + last) // 2
-        if world[order[middle], 2] < z:
-            first = middle + 1
-        else:
-            last = middle
-    return first
+    rows, filled = np.empty((starts[-1], 5)), starts.copy()
+    for i in range(walls.shape[0]):
+        if lines[i, 6] > 0.0:
+            row = rows[filled[cells[i]]]
+            row[0], row[1], row[2], row[3], row[4] = walls[i, 0], walls[i, 1], walls[i, 2], travelled[wall_owner[i]], i
+            filled[cells[i]] += 1
+    return rows, starts
 
 
 @nb.njit(cache=True, nogil=True)
@@ -112,23 +99,22 @@ def same_height(walls, wall_owner, lines, hits, hit_owner, travelled, apart_m): 
         return found
     low = (walls[:, 0].min(), walls[:, 1].min())
     shape = (int((walls[:, 0].max() - low[0]) / CELL_M) + 1, int((walls[:, 1].max() - low[1]) / CELL_M) + 1)
-    order, starts = _sorted_into_cells(walls, low, shape)
+    rows, starts = _sorted_into_cells(walls, wall_owner, lines, travelled, low, shape)
     per_m, per_height = 1.0 / _APART_SIGMA_M**2, 1.0 / _HEIGHT_SIGMA_M**2
     for i in range(hits.shape[0]):
         x, y, z, mine = hits[i, 0], hits[i, 1], hits[i, 2], travelled[hit_owner[i]]
         cx, cy = int(math.floor((x - low[0]) / CELL_M)), int(math.floor((y - low[1]) / CELL_M))
         nearest = _FARTHEST
         for ix in range(max(cx - 1, 0), min(cx + 2, shape[0])):
-            for iy in range(max(cy - 1, 0), min(cy + 2, shape[1])):
-                end = starts[ix * shape[1] + iy + 1]
-                at = _first_above(walls, order, starts[ix * shape[1] + iy], end, z - HEIGHT_M)
-                while at < end and walls[order[at], 2] <= z + HEIGHT_M:
-                    k = order[at]
-                    at += 1
-                    dz = walls[k, 2] - z
-                    away = ((walls[k, 0] - x) ** 2 + (walls[k, 1] - y) ** 2) * per_m + dz * dz * per_height
-                    if away < nearest and lines[k, 6] > 0.0 and abs(travelled[wall_owner[k]] - mine) >= apart_m:
-                        nearest, found[i] = away, k
+            first, last = ix * shape[1] + max(cy - 1, 0), ix * shape[1] + min(cy + 2, shape[1])
+            for k in range(starts[first], starts[last] if first < last else 0):
+                dz = rows[k, 2] - z
+                away = dz * dz * per_height
+                if away >= nearest or abs(rows[k, 3] - mine) < apart_m:
+                    continue
+                away += ((rows[k, 0] - x) ** 2 + (rows[k, 1] - y) ** 2) * per_m
+                if away < nearest:
+                    nearest, found[i] = away, int(rows[k, 4])
     return found
 
 
