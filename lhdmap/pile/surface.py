@@ -17,7 +17,7 @@ import numpy.typing as npt
 from lhdmap.messages import FloatArray
 from lhdmap.pile.corridor import Corridor, trace
 from lhdmap.pile.end_frame import Frame2, end_of, floor_before, turned_near
-from lhdmap.pile.face import Face, Registration, find, fit
+from lhdmap.pile.face import STEEPEST, Face, Registration, find, fit
 from lhdmap.pile.limits import Limits, limits_of
 from lhdmap.pile.order import quantile
 from lhdmap.pile.tilt import Tilt
@@ -134,6 +134,8 @@ def _refined(
         if hits < _FEWEST_HITS:
             return None
         face = fit(points[used], model, registration)
+        if face.c < STEEPEST:
+            return None
         model = np.array([face.a, face.b, face.c])
         limits = limits_of(points, face, floor, half_m)
         left, right = limits.left_m, limits.right_m
