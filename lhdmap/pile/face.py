@@ -49,6 +49,11 @@ class Face(NamedTuple):
         return self.a + self.b * y + self.c * z
 
     @property
+    def rough_m(self) -> float:
+        """Spread of the residuals along the normal."""
+        return self.spread_m / math.sqrt(1.0 + self.c * self.c)
+
+    @property
     def inclination_deg(self) -> float:
         """Inclination with the sign of Table 6: -90 is a wall."""
         return -math.degrees(math.atan2(1.0, self.c))

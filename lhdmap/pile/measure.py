@@ -7,12 +7,14 @@ import math
 import numpy as np
 
 from lhdmap.messages import FloatArray
+from lhdmap.pile.face import Face
 from lhdmap.pile.judge import Evidence, probabilities
-from lhdmap.pile.relief import Relief, boulders, relief
+from lhdmap.pile.relief import Relief, boulders, grain_m, relief
 from lhdmap.pile.result import AttackPoint, PileEstimate
 from lhdmap.pile.surface import HIGH_M, LOW_M, Scene
 
-_UNSEEN_DEG = 5.0  # the slope of the heights that were not seen
+_UNSEEN, _SEEN_LEAST_M = 1.4, 0.3  # slope of the heights that were not seen, in roughnesses over the height that was
+UNSURE_DEG = 8.0  # an inclination that is less sure than this is not said: it may be that of any status
 _DEFINITION_DEG = 0.4  # rubble within the height that the inclination is defined over
 _WIDTH_DEFINITION_M = 0.07
 _BEYOND_M = 1.5
@@ -26,19 +28,17 @@ def measure(scene: Scene) -> PileEstimate:
     seen = relief(scene)
     width, width_std = limits.width_m(face.b)
     on = scene.points[scene.on_face]
-    unseen = max(1.0 - float(np.ptp(on[:, 2])) / (HIGH_M - LOW_M), 0.0)
-    std_deg = math.hypot(face.inclination_std_deg, _DEFINITION_DEG + _UNSEEN_DEG * unseen)
+    std_deg = math.hypot(face.inclination_std_deg, _DEFINITION_DEG, _unseen_deg(face, float(np.ptp(on[:, 2]))))
     covered, beyond = _closure(scene)
-    spread = face.spread_m / math.sqrt(1.0 + face.c**2)
     share = probabilities(
         Evidence(
             face.inclination_deg,
             std_deg,
-            spread,
+            grain_m(seen, scene.floor_m + LOW_M, scene.floor_m + HIGH_M),
             covered,
             beyond,
             limits.gap_m,
-            limits.rough_m,
+            face.inclination_std_deg,
         )
     )
     off = (face.x_at(on[:, 1], on[:, 2]) - on[:, 0]) / math.sqrt(1.0 + face.b**2 + face.c**2)
@@ -47,7 +47,7 @@ def measure(scene: Scene) -> PileEstimate:
     middle = np.array([0.0, 0.5 * (limits.left_m + limits.right_m), float(np.median(on[:, 2]))])
     middle[0] = float(face.x_at(middle[1:2], middle[2:3])[0])
     return PileEstimate(
-        status=max(share, key=lambda name: share[name]),
+        status=max(share, key=lambda name: share[name]) if std_deg < UNSURE_DEG else "none",
         probabilities=share,
         center_m=scene.frame.map(middle),
         left_limit_m=scene.frame.map(toe[0]),
@@ -64,6 +64,13 @@ def measure(scene: Scene) -> PileEstimate:
         face_m=scene.frame.map(on[:, :3]),
         residuals_m=off,
     )
+
+
+def _unseen_deg(face: Face, height_m: float) -> float:
+    """Return how much the slope of the whole height may differ from that of the height that was seen, from the roughness."""
+    missing = max(1.0 - height_m / (HIGH_M - LOW_M), 0.0)
+    # an error of rough_m along the normal over height_m, at the two ends of a line as steep as the face
+    return math.degrees(_UNSEEN * missing * face.rough_m / (max(height_m, _SEEN_LEAST_M) * math.sqrt(1.0 + face.c**2)))
 
 
 def _toe(scene: Scene, y: FloatArray) -> FloatArray:

@@ -20,6 +20,7 @@ _SMALLEST_M = 0.8  # smaller rocks go into the bucket
 _LARGEST = 0.5  # what stands out over more than this share of the drift's width is the face's own shape
 _ALONG_M = 0.15  # deviation of the depths in a cell of which the drift's own surface has more, a rock's front less
 _MIXED_M = 0.5  # the same of a cell that is left out: it holds a rock's edge and, farther back, the face
+_FEWEST_STEPS = 20
 _BY_WALL_M = 0.4  # what reaches less far from the wall is less than half the smallest boulder: the wall's own roughness
 
 
@@ -55,6 +56,14 @@ def relief(scene: Scene) -> Relief:
     y: FloatArray = limits.right_m + (np.arange(columns, dtype=np.float64) + 0.5) * CELL_M
     z: FloatArray = scene.floor_m + (np.arange(rows, dtype=np.float64) + 0.5) * CELL_M
     return Relief(mean, depth_std, y, z)
+
+
+def grain_m(seen: Relief, low_m: float, high_m: float) -> float:
+    """Return how much cells beside each other differ between two heights: rubble has edges, blasted rock has waves; 0: unknown."""
+    rows = seen.proud_m[(seen.z_m > low_m) & (seen.z_m < high_m)]
+    steps = np.abs(np.diff(rows, axis=1))
+    steps = steps[np.isfinite(steps)]
+    return 1.4826 * float(np.median(steps)) / math.sqrt(2.0) if steps.size >= _FEWEST_STEPS else 0.0
 
 
 def _moments(flat: npt.NDArray[np.int64], values: FloatArray, shape: tuple[int, int]) -> tuple[FloatArray, FloatArray]:

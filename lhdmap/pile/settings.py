@@ -38,7 +38,7 @@ class PileSettings:
         doc="Nearer to the toe than this the last estimate stands: the bucket hides the face.",
     )
     scale_std: float = setting(
-        0.0015,
+        0.003,
         unit="m/m",
         minimum=0.0,
         doc="Scale error of the odometry, standard deviation.",

@@ -23,10 +23,11 @@ _MOST_HISTORY = 400
 _SURE_STD_DEG = 2.5
 _ELSEWHERE_M = 5.0
 _GRADE_M = 10.0
-_IDLE = 6.0  # times the travel between estimates while nothing closes the drift
+_IDLE = 2.0  # times the travel between estimates while nothing closes the drift
 _AROUND_M, _MOST_AROUND = 10.0, 12_000
 _TOE_STD_M = 0.5  # the deadline acts at the last estimate before it, of which the distance is not known better
 _FORGET_M = 2.0  # travel without a face after which the last one was none
+_NOTHING = 0.5  # probability of none above which nothing closes the drift
 _BLURRED_DEG = 15.0  # an inclination that is less sure is none
 
 
@@ -125,7 +126,7 @@ class PileStage:
         if len(self._history) > _MOST_HISTORY:
             del self._history[1::2]
         estimate = snapshot.estimate
-        self._idle = not estimate.found or estimate.status == "none"
+        self._idle = not estimate.found or estimate.probabilities["none"] > _NOTHING
         if not estimate.found:
             self._forget()
             return snapshot

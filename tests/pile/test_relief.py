@@ -50,7 +50,7 @@ def _seen(points: FloatArray) -> FloatArray:
 def _scene(slope: float, *parts: FloatArray) -> Scene:
     points = _seen(np.concatenate([_plane(slope), *parts]))
     face = Face(0.0, 0.0, slope, 0.0, 1e-6 * np.eye(4), 0.05, 50)
-    limits = Limits(HALF_M, -HALF_M, 0.05, 0.05, 0.0, 0.0, 0.1, 0.1)
+    limits = Limits(HALF_M, -HALF_M, 0.05, 0.05, 0.0, 0.0, 0.1)
     on = (points[:, 2] > 0.2) & (points[:, 2] < 1.6)
     return Scene(Frame2(np.zeros(3), 0.0), points, face, on, 0.0, True, limits)
 

@@ -84,11 +84,11 @@ evidence = st.builds(
     Evidence,
     inclination_deg=st.floats(-175.0, 0.0),
     std_deg=st.floats(0.0, 90.0),
-    spread_m=st.floats(0.0, 2.0),
+    grain_m=st.floats(0.0, 2.0),
     covered=st.floats(0.0, 1.0),
     beyond=st.floats(0.0, 1.0),
     gap_m=st.floats(0.0, 99.0),
-    walls_m=st.floats(0.0, 1.0),
+    fit_std_deg=st.floats(0.0, 90.0),
 )
 
 
@@ -102,7 +102,7 @@ def test_probabilities_are_a_distribution(seen: Evidence) -> None:
 
 
 @pytest.mark.parametrize(
-    ("inclination_deg", "spread_m", "status"),
+    ("inclination_deg", "grain_m", "status"),
     [
         (-15.0, 0.05, "too_shallow"),
         (-45.0, 0.1, "loadable"),
@@ -113,14 +113,14 @@ def test_probabilities_are_a_distribution(seen: Evidence) -> None:
         (-3.0, 0.02, "none"),
     ],
 )
-def test_each_status_owns_its_range(inclination_deg: float, spread_m: float, status: str) -> None:
-    found = probabilities(Evidence(inclination_deg, 0.5, spread_m, 1.0, 0.0, 0.0, 0.03))
+def test_each_status_owns_its_range(inclination_deg: float, grain_m: float, status: str) -> None:
+    found = probabilities(Evidence(inclination_deg, 0.5, grain_m, 1.0, 0.0, 0.0))
     assert max(found, key=lambda name: found[name]) == status
     assert found[status] > 0.95
 
 
 def test_half_a_face_closes_nothing() -> None:
-    found = probabilities(Evidence(-45.0, 0.5, 0.1, 0.35, 0.0, 0.0, 0.03))
+    found = probabilities(Evidence(-45.0, 0.5, 0.1, 0.35, 0.0, 0.0))
     assert found["none"] == pytest.approx(1.0)
 
 
