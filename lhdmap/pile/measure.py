@@ -9,13 +9,14 @@ import numpy as np
 from lhdmap.messages import FloatArray
 from lhdmap.pile.face import Face
 from lhdmap.pile.judge import Evidence, probabilities
-from lhdmap.pile.relief import Relief, boulders, grain_m, relief
+from lhdmap.pile.relief import Relief, boulders, grain_m, hits_on, patches, relief
 from lhdmap.pile.result import AttackPoint, PileEstimate
 from lhdmap.pile.surface import HIGH_M, LOW_M, Scene
 
 _UNSEEN, _SEEN_LEAST_M = 1.4, 0.3  # slope of the heights that were not seen, in roughnesses over the height that was
 UNSURE_DEG = 8.0  # an inclination that is less sure than this is not said: it may be that of any status
 _DEFINITION_DEG = 0.4  # rubble within the height that the inclination is defined over
+_SUSPECT_M = 0.2  # a boulder draws the face to itself: it stands out by less than it will
 _WIDTH_DEFINITION_M = 0.07
 _BEYOND_M = 1.5
 WORTH = 0.5  # probability of a pile below which nobody should drive into it
@@ -24,8 +25,8 @@ _MACHINE_HALF_M = 1.3
 
 def measure(scene: Scene) -> PileEstimate:
     """Return the estimate of a scene, in the map."""
+    scene, seen = _beside_rocks(scene)
     face, limits = scene.face, scene.limits
-    seen = relief(scene)
     width, width_std = limits.width_m(face.b)
     on = scene.points[scene.on_face]
     std_deg = math.hypot(face.inclination_std_deg, _DEFINITION_DEG, _unseen_deg(face, float(np.ptp(on[:, 2]))))
@@ -64,6 +65,16 @@ def measure(scene: Scene) -> PileEstimate:
         face_m=scene.frame.map(on[:, :3]),
         residuals_m=off,
     )
+
+
+def _beside_rocks(scene: Scene) -> tuple[Scene, Relief]:
+    """Return the scene with the face of the rubble alone: boulders stand out of it and are no part of its slope."""
+    seen = relief(scene)
+    rocks = patches(scene, seen, _SUSPECT_M)
+    if not rocks:
+        return scene, seen
+    scene = scene.without(hits_on(scene, seen, rocks))
+    return scene, relief(scene)
 
 
 def _unseen_deg(face: Face, height_m: float) -> float:

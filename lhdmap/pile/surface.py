@@ -42,6 +42,15 @@ class Scene(NamedTuple):
     floor_m: float
     floor_seen: bool
     limits: Limits
+    registration: Registration = Registration(0.0, 0.0)
+
+    def without(self, rocks: Mask) -> Scene:
+        """Return the scene with the face fitted anew, without the hits (N,) on rocks that stand out of it."""
+        left = self.on_face & ~rocks
+        if left.sum() < _FEWEST_HITS:
+            return self
+        face = fit(self.points[left], np.array([self.face.a, self.face.b, self.face.c]), self.registration)
+        return self._replace(face=face) if face.c > STEEPEST and face.blocks >= _FEWEST_BLOCKS else self
 
     def face_in(self, base: Frame2) -> FloatArray:
         """Return a, b, c of the face in another frame."""
@@ -139,7 +148,7 @@ def _refined(
         model = np.array([face.a, face.b, face.c])
         limits = limits_of(points, face, floor, half_m)
         left, right = limits.left_m, limits.right_m
-        scene = Scene(frame, points, face, used, floor, seen, limits)
+        scene = Scene(frame, points, face, used, floor, seen, limits, registration)
     return scene if scene is not None and scene.face.blocks >= _FEWEST_BLOCKS else None
 
 
