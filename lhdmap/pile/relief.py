@@ -21,7 +21,7 @@ _SMALLEST_M = 0.8  # smaller rocks go into the bucket
 _LARGEST = 0.5  # what stands out over more than this share of the drift's width is the face's own shape
 _ALONG_M = 0.15  # deviation of the depths in a cell of which the drift's own surface has more, a rock's front less
 _MIXED_M = 0.5  # the same of a cell that is left out: it holds a rock's edge and, farther back, the face
-_LONGER = 1.12  # the largest extent of a rock in the diameter of the disc of its area
+_CUT = 1.15  # the ball's radius in that of what stands out by half as much as a boulder must
 _FEWEST_STEPS = 20
 _BY_WALL_M = 0.4  # what reaches less far from the wall is less than half the smallest boulder: the wall's own roughness
 
@@ -139,26 +139,18 @@ def _is_rock(scene: Scene, seen: Relief, patch: Patch) -> bool:
     return _SMALLEST_M <= extent <= _LARGEST * (limits.left_m - limits.right_m)
 
 
-def _on_slope(scene: Scene, seen: Relief, cells: Mask) -> FloatArray:
-    """Return where cells lie on the face: rows y, distance up the slope (m), at right angles below what was seen."""
-    rows, columns = np.nonzero(cells)
-    y, z, slant = seen.y_m[columns], seen.z_m[rows], math.hypot(1.0, scene.face.c)
-    up = z * slant - seen.proud_m[rows, columns] * scene.face.c
-    return np.column_stack([y, up])
-
-
-def _extent_m(scene: Scene, patch: Patch) -> float:
-    """Return the largest extent of a patch along the face, from its area: single cells at its edge say little."""
-    return _LONGER * math.sqrt(4.0 / math.pi * patch.foot.sum() * CELL_M**2 * math.hypot(1.0, scene.face.c))
-
-
 def _boulder(scene: Scene, seen: Relief, patch: Patch) -> Boulder:
-    """Return the ball whose part above the face fills the patch: its middle lies half its size behind its top."""
-    face, extent = scene.face, _extent_m(scene, patch)
-    at = _on_slope(scene, seen, patch.foot)
-    y, up = at.mean(axis=0)
-    out = float(np.percentile(seen.proud_m[patch.cells], 95.0)) - 0.5 * extent / _LONGER
+    """Return the ball that fills a patch, about half of it in the face.
+
+    Looked at from the front, one sees a half disc above its middle, and below it what the face, rising from under it, leaves of
+    the other half: an ellipse as much lower as the face leans. Area and mean height of the two give its radius and middle.
+    """
+    face = scene.face
     slant = math.hypot(1.0, face.c)
-    z = up / slant + out * face.c / slant
-    x = float(face.x_at(np.array([y]), np.array([up / slant]))[0]) - out / slant
-    return Boulder(scene.frame.map(np.array([x, y, z])), extent)
+    radius = _CUT * math.sqrt(2.0 * patch.foot.sum() * CELL_M**2 / (math.pi * (1.0 + 1.0 / slant)))
+    rows, columns = np.nonzero(patch.foot)
+    y = float(seen.y_m[columns].mean())
+    z = float(seen.z_m[rows].mean()) - 4.0 / (3.0 * math.pi) * radius * (1.0 - 1.0 / slant)
+    out = float(np.percentile(seen.proud_m[patch.cells], 95.0)) - radius
+    x = float(face.x_at(np.array([y]), np.array([z]))[0]) - out * slant
+    return Boulder(scene.frame.map(np.array([x, y, z])), 2.0 * radius)

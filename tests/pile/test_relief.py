@@ -7,8 +7,9 @@ import pytest
 from lhdmap.messages import FloatArray
 from lhdmap.pile.end_frame import Frame2
 from lhdmap.pile.face import Face
+from lhdmap.pile.judge import _ROCK_M, _RUBBLE_M
 from lhdmap.pile.limits import Limits
-from lhdmap.pile.relief import boulders, relief
+from lhdmap.pile.relief import boulders, grain_m, relief
 from lhdmap.pile.surface import Scene
 
 HALF_M = 2.0
@@ -90,3 +91,27 @@ def test_bulge_over_most_of_the_width_is_no_boulder() -> None:
     points[np.abs(points[:, 1]) < 1.3, 0] -= 0.6
     scene = scene._replace(points=points)
     assert boulders(scene, relief(scene)) == ()
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_grain_tells_waves_from_stones(seed: int) -> None:
+    """Both surfaces are rough by 8 cm: blasted rock in waves of more than half a metre, rubble stone by stone."""
+    rng = np.random.default_rng(seed)
+    hits = _plane(0.1)
+    wave = 0.115 * np.sin(2.0 * np.pi * (hits[:, 1] / 1.3 + rng.random())) * np.cos(2.0 * np.pi * hits[:, 2] / 2.5)
+    stones = rng.normal(0.0, 0.08, (40, 40))[(hits[:, 1] / 0.12).astype(int) + 20, (hits[:, 2] / 0.12).astype(int)]
+    rock, rubble = (
+        grain_m(relief(_scene(0.1, hits + np.outer(bump, [1.0, 0.0, 0.0, 0.0]))), 0.2, 1.6) for bump in (wave, stones)
+    )
+    assert rock < _ROCK_M
+    assert rubble > _RUBBLE_M
+
+
+@pytest.mark.parametrize("slope", [0.7, 1.0, 1.4])
+@pytest.mark.parametrize("size_m", [1.0, 1.4])
+def test_ball_half_in_the_face_is_where_it_is(slope: float, size_m: float) -> None:
+    at = (0.2, 0.9)
+    scene = _scene(slope, _seen(np.concatenate([_plane(slope), _ball(slope, size_m, at)])))
+    (found,) = boulders(scene, relief(scene))
+    assert found.center_m == pytest.approx([slope * at[1], *at], abs=0.2)
+    assert found.size_m == pytest.approx(size_m, rel=0.2)
