@@ -42,7 +42,7 @@ class PileSettings:
         unit="m/m",
         minimum=0.0,
         doc="Scale error of the odometry, standard deviation.",
-        source="evaluation/odometry.md",
+        source="drives over flat floors in simulated scenes",
     )
     pitch_std_deg: float = setting(
         0.15,

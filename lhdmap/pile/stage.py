@@ -28,7 +28,7 @@ _AROUND_M, _MOST_AROUND = 10.0, 12_000
 _TOE_STD_M = 0.5  # the deadline acts at the last estimate before it, of which the distance is not known better
 _FORGET_M = 2.0  # travel without a face after which the last one was none
 _NOTHING = 0.5  # probability of none above which nothing closes the drift
-_BLURRED_DEG = 15.0  # an inclination that is less sure is none
+_BLURRED_DEG = 25.0  # an inclination that is less sure is none
 
 
 class ScanHits(NamedTuple):

@@ -9,7 +9,7 @@ from lhdmap.pile.end_frame import Frame2
 from lhdmap.pile.face import Face
 from lhdmap.pile.judge import _ROCK_M, _RUBBLE_M
 from lhdmap.pile.limits import Limits
-from lhdmap.pile.relief import boulders, grain_m, relief
+from lhdmap.pile.relief import CELL_M, boulders, grain_m, relief
 from lhdmap.pile.surface import Scene
 
 HALF_M = 2.0
@@ -93,16 +93,19 @@ def test_bulge_over_most_of_the_width_is_no_boulder() -> None:
     assert boulders(scene, relief(scene)) == ()
 
 
+def _grain(flat: Scene, bump_m: FloatArray) -> float:
+    rough = flat._replace(points=flat.points + np.outer(bump_m, [1.0, 0.0, 0.0, 0.0]))
+    return grain_m(relief(rough), 0.2, 1.6)
+
+
 @pytest.mark.parametrize("seed", range(3))
 def test_grain_tells_waves_from_stones(seed: int) -> None:
-    """Both surfaces are rough by 8 cm: blasted rock in waves of more than half a metre, rubble stone by stone."""
-    rng = np.random.default_rng(seed)
-    hits = _plane(0.1)
-    wave = 0.115 * np.sin(2.0 * np.pi * (hits[:, 1] / 1.3 + rng.random())) * np.cos(2.0 * np.pi * hits[:, 2] / 2.5)
-    stones = rng.normal(0.0, 0.08, (40, 40))[(hits[:, 1] / 0.12).astype(int) + 20, (hits[:, 2] / 0.12).astype(int)]
-    rock, rubble = (
-        grain_m(relief(_scene(0.1, hits + np.outer(bump, [1.0, 0.0, 0.0, 0.0]))), 0.2, 1.6) for bump in (wave, stones)
-    )
+    """Both surfaces are as rough: blasted rock in waves of more than a metre, rubble stone by stone."""
+    rng, flat = np.random.default_rng(seed), _scene(STEEP)
+    _, y, z, _ = flat.points.T
+    wave = 0.115 * np.sin(2.0 * np.pi * (y / 1.3 + rng.random())) * np.cos(2.0 * np.pi * z / 2.5)
+    stones = rng.normal(0.0, 0.08, (50, 50))[((y + HALF_M) / CELL_M).astype(int), (z / CELL_M).astype(int)]
+    rock, rubble = (_grain(flat, bump) for bump in (wave, stones))
     assert rock < _ROCK_M
     assert rubble > _RUBBLE_M
 
