@@ -15,6 +15,7 @@ from lhdmap.pile.surface import HIGH_M, LOW_M, Scene
 
 _UNSEEN, _SEEN_LEAST_M = 1.4, 0.3  # slope of the heights that were not seen, in roughnesses over the height that was
 UNSURE_DEG = 8.0  # an inclination that is less sure than this is not said: it may be that of any status
+_PILE_DEG, _PILE_STD_DEG = -42.0, 10.0  # how rock that can be loaded lies
 _DEFINITION_DEG = 0.4  # rubble within the height that the inclination is defined over
 _SUSPECT_M = 0.2  # a boulder draws the face to itself: it stands out by less than it will
 _WIDTH_DEFINITION_M = 0.07
@@ -42,20 +43,23 @@ def measure(scene: Scene) -> PileEstimate:
             face.inclination_std_deg,
         )
     )
+    status, inclination_deg = max(share, key=lambda name: share[name]), face.inclination_deg
+    if status == "loadable":
+        inclination_deg, std_deg = _as_rock_lies(inclination_deg, std_deg)
     off = (face.x_at(on[:, 1], on[:, 2]) - on[:, 0]) / math.sqrt(1.0 + face.b**2 + face.c**2)
     toe = _toe(scene, np.linspace(limits.left_m, limits.right_m, 15))
     volume, volume_std = _volume(scene, seen)
     middle = np.array([0.0, 0.5 * (limits.left_m + limits.right_m), float(np.median(on[:, 2]))])
     middle[0] = float(face.x_at(middle[1:2], middle[2:3])[0])
     return PileEstimate(
-        status=max(share, key=lambda name: share[name]) if std_deg < UNSURE_DEG else "none",
+        status=status if std_deg < UNSURE_DEG else "none",
         probabilities=share,
         center_m=scene.frame.map(middle),
         left_limit_m=scene.frame.map(toe[0]),
         right_limit_m=scene.frame.map(toe[-1]),
         width_m=width,
         width_std_m=math.hypot(width_std, _WIDTH_DEFINITION_M),
-        inclination_deg=face.inclination_deg,
+        inclination_deg=inclination_deg,
         inclination_std_deg=std_deg,
         volume_m3=volume,
         volume_std_m3=volume_std,
@@ -82,6 +86,15 @@ def _unseen_deg(face: Face, height_m: float) -> float:
     missing = max(1.0 - height_m / (HIGH_M - LOW_M), 0.0)
     # an error of rough_m along the normal over height_m, at the two ends of a line as steep as the face
     return math.degrees(_UNSEEN * missing * face.rough_m / (max(height_m, _SEEN_LEAST_M) * math.sqrt(1.0 + face.c**2)))
+
+
+def _as_rock_lies(inclination_deg: float, std_deg: float) -> tuple[float, float]:
+    """Return the inclination of a pile, and its deviation, with what is known of loose rock: it counts where little was seen.
+
+    The status is not drawn along: what was seen alone says whether this is a pile at all.
+    """
+    share = _PILE_STD_DEG**2 / (_PILE_STD_DEG**2 + std_deg**2)
+    return _PILE_DEG + share * (inclination_deg - _PILE_DEG), std_deg * math.sqrt(share)
 
 
 def _toe(scene: Scene, y: FloatArray) -> FloatArray:
