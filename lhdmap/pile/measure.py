@@ -13,6 +13,7 @@ from lhdmap.pile.relief import Relief, boulders, grain_m, hits_on, patches, reli
 from lhdmap.pile.result import AttackPoint, PileEstimate
 from lhdmap.pile.surface import HIGH_M, LOW_M, Scene
 
+_CLEAR = 0.75  # probability of a pile above which a face that was seen badly counts as one
 _UNSEEN, _SEEN_LEAST_M = 1.4, 0.3  # slope of the heights that were not seen, in roughnesses over the height that was
 UNSURE_DEG = 8.0  # an inclination that is less sure than this is not said: it may be that of any status
 _PILE_DEG, _PILE_STD_DEG = -42.0, 10.0  # how rock that can be loaded lies
@@ -44,7 +45,7 @@ def measure(scene: Scene) -> PileEstimate:
         )
     )
     status, inclination_deg = max(share, key=lambda name: share[name]), face.inclination_deg
-    if status == "loadable":
+    if status == "loadable" and (std_deg < UNSURE_DEG or share[status] > _CLEAR):
         inclination_deg, std_deg = _as_rock_lies(inclination_deg, std_deg)
     off = (face.x_at(on[:, 1], on[:, 2]) - on[:, 0]) / math.sqrt(1.0 + face.b**2 + face.c**2)
     toe = _toe(scene, np.linspace(limits.left_m, limits.right_m, 15))

@@ -222,7 +222,7 @@ def test_drive_that_ends_at_the_deadline_is_decided(short_m: float) -> None:
 
 
 def test_slope_that_is_too_unsure_is_not_said() -> None:
-    table = drive(CastDrift(45.0, wave_rad=0.0), 21.0, LOST).to_json()
+    table = drive(CastDrift(56.0, wave_rad=0.0), 21.0, LOST).to_json()
     assert table["status"] == "none"
     assert table["identified"] is False
     assert table["inclination_deg"] is None
