@@ -41,5 +41,5 @@ def _scene(pile: PileEstimate, points_m: FloatArray) -> Scene:
     off = np.abs(face.x_at(local[:, 1], local[:, 2]) - local[:, 0]) / slant
     on = (off < _FACE_NEAR_M) & (local[:, 2] > LOW_M) & (local[:, 2] < HIGH_M)
     half, std = 0.5 * pile.width_m, pile.width_std_m / math.sqrt(2.0)
-    limits = Limits(half, -half, std, std, 0.0, 0.0, 0.0, std)
+    limits = Limits(half, -half, std, std, 0.0, 0.0, 0.0)
     return Scene(frame, local, face, on, 0.0, True, limits)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from typing import NamedTuple
 
 import numba as nb
@@ -16,7 +15,9 @@ from lhdmap.pile.order import quantile
 _WALLS_M = 7.0  # length of wall before the face that its heading is taken from
 _FEWEST_BINS = 4
 _MOST_TURN = 0.35
-_STOPE_M = 0.35
+_STOPE_M = 0.35  # a wall at the face stands so much farther out than before: a stope's, the drift ends at its mouth
+_BEFORE_M = (4.5, 11.5)  # where the drift before a stope is looked for
+_NEAREST_BINS = 8
 
 
 class Frame2(NamedTuple):
@@ -65,18 +66,19 @@ class End(NamedTuple):
     half_m: float
 
 
-def _mouth_first(corridor: Corridor, face_x_m: float) -> Callable[[FloatArray, float], float]:
-    """Return a rule that takes a wall (K,) of the drift before a stope where the line of the last metres runs outside it."""
-    before = (corridor.x_m < face_x_m - 5.0) & (corridor.x_m > face_x_m - 12.0)
+def _mouth(corridor: Corridor, at_x_m: float, slope: float) -> tuple[float, float] | None:
+    """Return y of both walls of the drift some metres before x, carried on along the end's slope; None: hardly seen.
 
-    def inside(wall: FloatArray, at_face_m: float) -> float:
-        seen = before & np.isfinite(wall)
-        if seen.sum() < _FEWEST_BINS:
-            return at_face_m
-        usual = float(np.median(wall[seen]))
-        return usual if at_face_m > usual + _STOPE_M else at_face_m
-
-    return inside
+    A drift runs at any angle to the machine and bends: its width is what can be carried over, its walls' y is not.
+    """
+    before = (corridor.x_m < at_x_m - _BEFORE_M[0]) & (corridor.x_m > at_x_m - _BEFORE_M[1])
+    before &= np.isfinite(corridor.left_m) & np.isfinite(corridor.right_m)
+    if before.sum() < _FEWEST_BINS:
+        return None
+    left, right, x = corridor.left_m[before], corridor.right_m[before], corridor.x_m[before]
+    half = 0.5 * float(np.median(left - right))
+    middle = float(np.median((0.5 * (left + right) + slope * (at_x_m - x))[-_NEAREST_BINS:]))
+    return middle + half, middle - half
 
 
 def end_of(corridor: Corridor, face_x_m: float) -> End | None:
@@ -94,9 +96,11 @@ def end_of(corridor: Corridor, face_x_m: float) -> End | None:
     at = np.array([face_x_m])
     middle, half = float(corridor.centre_at(at)[0]), float(corridor.half_at(at)[0])
     if len(lines) == 2:
-        left, right = (offset + own * (face_x_m - 0.5) for own, offset in lines)
-        inside = _mouth_first(corridor, face_x_m)
-        left, right = inside(corridor.left_m, left), -inside(-corridor.right_m, -right)
+        last_x_m = face_x_m - 0.5
+        left, right = (offset + own * last_x_m for own, offset in lines)
+        mouth = _mouth(corridor, last_x_m, slope)
+        if mouth is not None and left - right > mouth[0] - mouth[1] + 2.0 * _STOPE_M:
+            left, right = mouth
         middle, half = 0.5 * (left + right), 0.5 * (left - right)
     return End(math.atan(slope), middle, half)
 

@@ -20,7 +20,7 @@ CELL_M = 0.1
 BLOCK_M = 0.3  # rocks are as large: residuals of cells nearer than this are alike
 _TRIES = 250
 _NEAR_M = 0.2
-_STEEPEST, _FLATTEST = -1.2, 6.0  # dx/dz: an overhang of 50 deg, a slope of 10 deg
+STEEPEST, _FLATTEST = -0.84, 6.0  # dx/dz: an overhang of 40 deg, a slope of 10 deg; floor that falls away leans more
 _MOST_ASKEW = 0.9
 _TUKEY = 4.7
 _MOST_POINTS = 1500
@@ -47,6 +47,11 @@ class Face(NamedTuple):
     def x_at(self, y: FloatArray, z: FloatArray) -> FloatArray:
         """Return x of the face at y and z."""
         return self.a + self.b * y + self.c * z
+
+    @property
+    def rough_m(self) -> float:
+        """Spread of the residuals along the normal."""
+        return self.spread_m / math.sqrt(1.0 + self.c * self.c)
 
     @property
     def inclination_deg(self) -> float:
@@ -129,7 +134,7 @@ def _plane(x, y, z, pick):  # type: ignore[no-untyped-def]
     if abs(det) <= 1e-3:
         return math.nan, math.nan, math.nan
     b, c = (x1 * z2 - x2 * z1) / det, (y1 * x2 - y2 * x1) / det
-    if c <= _STEEPEST or c >= _FLATTEST or abs(b) >= _MOST_ASKEW:
+    if c <= STEEPEST or c >= _FLATTEST or abs(b) >= _MOST_ASKEW:
         return math.nan, math.nan, math.nan
     return x[i] - b * y[i] - c * z[i], b, c
 

@@ -13,8 +13,8 @@ from typing import NamedTuple
 from lhdmap.pile.result import STATUSES
 
 _MODEL_STD_DEG = 1.5  # rubble over the height that is seen
-_SMOOTH_M = 0.075  # spread of bare rock, unless the drift's own walls are rougher: then theirs, and so much more
-_ROUGHER = 1.2
+_ROCK_M, _RUBBLE_M = 0.026, 0.033  # grain of bare rock and of rubble, measured in simulated scenes
+_STEEP = ("hang_up", "wall")
 FLOOR_DEG = 8.0  # flatter is floor that rises
 
 
@@ -42,47 +42,48 @@ class Shares(NamedTuple):
 
 def shares(steepness_deg: float, std_deg: float, bounds: Bounds = BOUNDS) -> Shares:
     """Return the share of each range; rubble over the height that is seen adds to the standard deviation."""
-    std = math.hypot(std_deg, _MODEL_STD_DEG)
-    a, b, c, d = (0.5 * math.erfc((steepness_deg - bound) / (std * math.sqrt(2.0))) for bound in bounds)
+    a, b, c, d = (_below(bound, steepness_deg, std_deg) for bound in bounds)
     return Shares(a, b - a, c - b, d - c, 1.0 - d)
+
+
+def _below(bound_deg: float, steepness_deg: float, std_deg: float) -> float:
+    std = math.hypot(std_deg, _MODEL_STD_DEG)
+    return 0.5 * math.erfc((steepness_deg - bound_deg) / (std * math.sqrt(2.0)))
 
 
 class Evidence(NamedTuple):
     """What the status follows from.
 
-    Inclination and deviation (deg, sign of Table 6), spread of the residuals along the normal (m), share of the width that the
-    face covers, share of it on which hits lie beyond the face, length before the face on which a wall is missing (m), spread of
-    the side walls (m).
+    Inclination and deviation (deg, sign of Table 6), grain (m): how unlike neighbouring decimetres are, share of the width that
+    the face covers, share of it on which hits lie beyond the face, length before the face on which a wall is missing (m),
+    deviation of the fit alone (deg): how little of a plane it is.
     """
 
     inclination_deg: float
     std_deg: float
-    spread_m: float
+    grain_m: float
     covered: float
     beyond: float
     gap_m: float
-    walls_m: float = 0.0
+    fit_std_deg: float = 0.0
 
 
 def probabilities(evidence: Evidence) -> dict[str, float]:
     """Return the probability of each status."""
     angle = -evidence.inclination_deg
     part = shares(angle, evidence.std_deg)
-    usual = max(_SMOOTH_M, _ROUGHER * evidence.walls_m)
-    rough = _ramp(evidence.spread_m, usual, 1.25 * usual)
+    rough = _ramp(evidence.grain_m, _ROCK_M, _RUBBLE_M)
     share = {
-        "too_shallow": part.shallow,
+        "too_shallow": max(part.shallow - _below(FLOOR_DEG, angle, evidence.std_deg), 0.0),
         "loadable": part.loadable,
         "hang_up": part.steep + part.overhang + part.upright * rough,
         "wall": part.upright * (1.0 - rough),
     }
     closes = _ramp(evidence.covered, 0.4, 0.7) * (1.0 - _ramp(evidence.beyond, 0.1, 0.3))
-    if angle > BOUNDS.steep_deg:  # the outer wall of a bend: on the inner side the drift goes on
-        closes *= 1.0 - _ramp(evidence.gap_m, 1.2, 2.5)
-        closes *= 1.0 - _ramp(evidence.std_deg, 4.5, 7.0)  # ... is curved besides, and fits no plane
-    if angle < FLOOR_DEG:
-        closes = 0.0
-    result = {name: share.get(name, 0.0) * closes for name in STATUSES}
+    # the outer wall of a bend: on the inner side the drift goes on, and it is curved besides and fits no plane
+    bend = 1.0 - (1.0 - _ramp(evidence.gap_m, 1.2, 2.5)) * (1.0 - _ramp(evidence.fit_std_deg, 4.5, 7.0))
+    steep = closes * (1.0 - bend)
+    result = {name: share.get(name, 0.0) * (steep if name in _STEEP else closes) for name in STATUSES}
     result["none"] = max(1.0 - sum(result.values()), 0.0)
     return result
 

@@ -30,7 +30,7 @@ class Limits(NamedTuple):
 
     Either the walls reach the face, or the drift opens into a stope and its mouth counts: `mouth_chance` is the probability of
     the latter, and the limits are the mean of both, weighted by it. `step_m`: by how much the walls stand farther apart than the
-    mouth. `gap_m`: length before the face on which the worse side's wall was not seen. `rough_m`: spread of the smoother wall.
+    mouth. `gap_m`: length before the face on which the worse side's wall was not seen.
     """
 
     left_m: float
@@ -40,7 +40,6 @@ class Limits(NamedTuple):
     mouth_chance: float
     step_m: float
     gap_m: float
-    rough_m: float
 
     def width_m(self, askew: float) -> tuple[float, float]:
         """Return the width in the plane of a face that stands askew (dx/dy), and its standard deviation.
@@ -80,7 +79,6 @@ def _limits(points, face, floor, half):  # type: ignore[no-untyped-def]
     left_step, right_step, widens = left - mouth_left, right - mouth_right, left + right - 2.0 * half
     beyond = min(left_end, right_end) - (a + c * floor)
     chance, left_step, right_step = _opening(left_step, right_step, widens, beyond)
-    rough = 2.0 * min(left_std, right_std) if chance < 0.5 else 2.0 * min(mouth_left_std, mouth_right_std) + 0.1
     if math.isnan(left):
         left_std = math.hypot(mouth_left_std, _UNSEEN_STEP_M)
     if math.isnan(right):
@@ -94,7 +92,6 @@ def _limits(points, face, floor, half):  # type: ignore[no-untyped-def]
         chance,
         left_step + right_step,
         gap,
-        rough,
     )
 
 

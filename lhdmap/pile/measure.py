@@ -7,13 +7,18 @@ import math
 import numpy as np
 
 from lhdmap.messages import FloatArray
+from lhdmap.pile.face import Face
 from lhdmap.pile.judge import Evidence, probabilities
-from lhdmap.pile.relief import Relief, boulders, relief
+from lhdmap.pile.relief import Relief, boulders, grain_m, hits_on, patches, relief
 from lhdmap.pile.result import AttackPoint, PileEstimate
 from lhdmap.pile.surface import HIGH_M, LOW_M, Scene
 
-_UNSEEN_DEG = 5.0  # the slope of the heights that were not seen
+_CLEAR = 0.75  # probability of a pile above which a face that was seen badly counts as one
+_UNSEEN, _SEEN_LEAST_M = 1.4, 0.3  # slope of the heights that were not seen, in roughnesses over the height that was
+UNSURE_DEG = 8.0  # an inclination that is less sure than this is not said: it may be that of any status
+_PILE_DEG, _PILE_STD_DEG = -42.0, 10.0  # how rock that can be loaded lies
 _DEFINITION_DEG = 0.4  # rubble within the height that the inclination is defined over
+_SUSPECT_M = 0.2  # a boulder draws the face to itself: it stands out by less than it will
 _WIDTH_DEFINITION_M = 0.07
 _BEYOND_M = 1.5
 WORTH = 0.5  # probability of a pile below which nobody should drive into it
@@ -22,39 +27,40 @@ _MACHINE_HALF_M = 1.3
 
 def measure(scene: Scene) -> PileEstimate:
     """Return the estimate of a scene, in the map."""
+    scene, seen = _beside_rocks(scene)
     face, limits = scene.face, scene.limits
-    seen = relief(scene)
     width, width_std = limits.width_m(face.b)
     on = scene.points[scene.on_face]
-    unseen = max(1.0 - float(np.ptp(on[:, 2])) / (HIGH_M - LOW_M), 0.0)
-    std_deg = math.hypot(face.inclination_std_deg, _DEFINITION_DEG + _UNSEEN_DEG * unseen)
+    std_deg = math.hypot(face.inclination_std_deg, _DEFINITION_DEG, _unseen_deg(face, float(np.ptp(on[:, 2]))))
     covered, beyond = _closure(scene)
-    spread = face.spread_m / math.sqrt(1.0 + face.c**2)
     share = probabilities(
         Evidence(
             face.inclination_deg,
             std_deg,
-            spread,
+            grain_m(seen, scene.floor_m + LOW_M, scene.floor_m + HIGH_M),
             covered,
             beyond,
             limits.gap_m,
-            limits.rough_m,
+            face.inclination_std_deg,
         )
     )
+    status, inclination_deg = max(share, key=lambda name: share[name]), face.inclination_deg
+    if status == "loadable" and (std_deg < UNSURE_DEG or share[status] > _CLEAR):
+        inclination_deg, std_deg = _as_rock_lies(inclination_deg, std_deg)
     off = (face.x_at(on[:, 1], on[:, 2]) - on[:, 0]) / math.sqrt(1.0 + face.b**2 + face.c**2)
     toe = _toe(scene, np.linspace(limits.left_m, limits.right_m, 15))
     volume, volume_std = _volume(scene, seen)
     middle = np.array([0.0, 0.5 * (limits.left_m + limits.right_m), float(np.median(on[:, 2]))])
     middle[0] = float(face.x_at(middle[1:2], middle[2:3])[0])
     return PileEstimate(
-        status=max(share, key=lambda name: share[name]),
+        status=status if std_deg < UNSURE_DEG else "none",
         probabilities=share,
         center_m=scene.frame.map(middle),
         left_limit_m=scene.frame.map(toe[0]),
         right_limit_m=scene.frame.map(toe[-1]),
         width_m=width,
         width_std_m=math.hypot(width_std, _WIDTH_DEFINITION_M),
-        inclination_deg=face.inclination_deg,
+        inclination_deg=inclination_deg,
         inclination_std_deg=std_deg,
         volume_m3=volume,
         volume_std_m3=volume_std,
@@ -64,6 +70,32 @@ def measure(scene: Scene) -> PileEstimate:
         face_m=scene.frame.map(on[:, :3]),
         residuals_m=off,
     )
+
+
+def _beside_rocks(scene: Scene) -> tuple[Scene, Relief]:
+    """Return the scene with the face of the rubble alone: boulders stand out of it and are no part of its slope."""
+    seen = relief(scene)
+    rocks = patches(scene, seen, _SUSPECT_M)
+    if not rocks:
+        return scene, seen
+    scene = scene.without(hits_on(scene, seen, rocks))
+    return scene, relief(scene)
+
+
+def _unseen_deg(face: Face, height_m: float) -> float:
+    """Return how much the slope of the whole height may differ from that of the height that was seen, from the roughness."""
+    missing = max(1.0 - height_m / (HIGH_M - LOW_M), 0.0)
+    # an error of rough_m along the normal over height_m, at the two ends of a line as steep as the face
+    return math.degrees(_UNSEEN * missing * face.rough_m / (max(height_m, _SEEN_LEAST_M) * math.sqrt(1.0 + face.c**2)))
+
+
+def _as_rock_lies(inclination_deg: float, std_deg: float) -> tuple[float, float]:
+    """Return the inclination of a pile, and its deviation, with what is known of loose rock: it counts where little was seen.
+
+    The status is not drawn along: what was seen alone says whether this is a pile at all.
+    """
+    share = _PILE_STD_DEG**2 / (_PILE_STD_DEG**2 + std_deg**2)
+    return _PILE_DEG + share * (inclination_deg - _PILE_DEG), std_deg * math.sqrt(share)
 
 
 def _toe(scene: Scene, y: FloatArray) -> FloatArray:

@@ -38,11 +38,11 @@ class PileSettings:
         doc="Nearer to the toe than this the last estimate stands: the bucket hides the face.",
     )
     scale_std: float = setting(
-        0.0015,
+        0.003,
         unit="m/m",
         minimum=0.0,
         doc="Scale error of the odometry, standard deviation.",
-        source="evaluation/odometry.md",
+        source="drives over flat floors in simulated scenes",
     )
     pitch_std_deg: float = setting(
         0.15,

@@ -23,9 +23,12 @@ _MOST_HISTORY = 400
 _SURE_STD_DEG = 2.5
 _ELSEWHERE_M = 5.0
 _GRADE_M = 10.0
-_IDLE = 6.0  # times the travel between estimates while nothing closes the drift
+_IDLE = 2.0  # times the travel between estimates while nothing closes the drift
 _AROUND_M, _MOST_AROUND = 10.0, 12_000
-_BLURRED_DEG = 15.0  # an inclination that is less sure is none
+_TOE_STD_M = 0.5  # the deadline acts at the last estimate before it, of which the distance is not known better
+_FORGET_M = 2.0  # travel without a face after which the last one was none
+_NOTHING = 0.5  # probability of none above which nothing closes the drift
+_BLURRED_DEG = 25.0  # an inclination that is less sure is none
 
 
 class ScanHits(NamedTuple):
@@ -56,6 +59,7 @@ class PileStage:
         self._history: list[Snapshot] = []
         self._decision: Snapshot | None = None
         self._best: Snapshot | None = None
+        self._found_m = 0.0
 
     def update(self, scan: ScanHits) -> Snapshot | None:
         """Take one scan; return the new estimate where the machine has moved far enough for one."""
@@ -122,23 +126,37 @@ class PileStage:
         if len(self._history) > _MOST_HISTORY:
             del self._history[1::2]
         estimate = snapshot.estimate
-        self._idle = not estimate.found or estimate.status == "none"
+        self._idle = not estimate.found or estimate.probabilities["none"] > _NOTHING
         if not estimate.found:
+            self._forget()
             return snapshot
         if snapshot.distance_m >= self._settings.closest_m:
-            self._best = snapshot
-        if self._decision is not None and _elsewhere(self._decision.estimate, estimate):
-            self._decision = None  # what was decided on was not the end: the drift goes on behind it
+            self._best, self._found_m = snapshot, self._travelled_m
+            self._withdraw(estimate)
         if self._decision is None and self._sure(snapshot):
             self._decision = snapshot
         return snapshot
+
+    def _forget(self) -> None:
+        """Drop an estimate of something that is not seen any more, unless the bucket hides it."""
+        if self._best is None:
+            return
+        moved_m = self._travelled_m - self._found_m
+        if abs(moved_m) > _FORGET_M and self._best.distance_m - moved_m > self._settings.closest_m:
+            self._best = self._decision = None
+
+    def _withdraw(self, now: PileEstimate) -> None:
+        """Take the decision back where what it was on is not the end: the drift goes on behind it, or nothing closes it."""
+        decided = self._decision
+        if decided is not None and (now.status == "none" or _elsewhere(decided.estimate, now)):
+            self._decision = None
 
     def _sure(self, snapshot: Snapshot) -> bool:
         estimate, settings = snapshot.estimate, self._settings
         if estimate.status == "none":
             return False
         chance = estimate.probabilities[estimate.status]
-        if snapshot.distance_m <= settings.deadline_m:
+        if snapshot.distance_m <= settings.deadline_m + settings.update_m + _TOE_STD_M:
             return chance >= settings.likely
         return chance >= settings.sure and estimate.inclination_std_deg <= _SURE_STD_DEG
 

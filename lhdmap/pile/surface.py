@@ -17,7 +17,7 @@ import numpy.typing as npt
 from lhdmap.messages import FloatArray
 from lhdmap.pile.corridor import Corridor, trace
 from lhdmap.pile.end_frame import Frame2, end_of, floor_before, turned_near
-from lhdmap.pile.face import Face, Registration, find, fit
+from lhdmap.pile.face import STEEPEST, Face, Registration, find, fit
 from lhdmap.pile.limits import Limits, limits_of
 from lhdmap.pile.order import quantile
 from lhdmap.pile.tilt import Tilt
@@ -42,6 +42,15 @@ class Scene(NamedTuple):
     floor_m: float
     floor_seen: bool
     limits: Limits
+    registration: Registration = Registration(0.0, 0.0)
+
+    def without(self, rocks: Mask) -> Scene:
+        """Return the scene with the face fitted anew, without the hits (N,) on rocks that stand out of it."""
+        left = self.on_face & ~rocks
+        if left.sum() < _FEWEST_HITS:
+            return self
+        face = fit(self.points[left], np.array([self.face.a, self.face.b, self.face.c]), self.registration)
+        return self._replace(face=face) if face.c > STEEPEST and face.blocks >= _FEWEST_BLOCKS else self
 
     def face_in(self, base: Frame2) -> FloatArray:
         """Return a, b, c of the face in another frame."""
@@ -134,10 +143,12 @@ def _refined(
         if hits < _FEWEST_HITS:
             return None
         face = fit(points[used], model, registration)
+        if face.c < STEEPEST:
+            return None
         model = np.array([face.a, face.b, face.c])
         limits = limits_of(points, face, floor, half_m)
         left, right = limits.left_m, limits.right_m
-        scene = Scene(frame, points, face, used, floor, seen, limits)
+        scene = Scene(frame, points, face, used, floor, seen, limits, registration)
     return scene if scene is not None and scene.face.blocks >= _FEWEST_BLOCKS else None
 
 

@@ -64,7 +64,7 @@ def test_wall_that_was_not_seen_stands_as_the_other_one() -> None:
 
 
 def test_doubt_between_mouth_and_wall_is_part_of_the_deviation() -> None:
-    sure, open_, torn = (Limits(2.0, -2.0, 0.05, 0.05, chance, 0.4, 0.1, 0.1) for chance in (0.0, 1.0, 0.5))
+    sure, open_, torn = (Limits(2.0, -2.0, 0.05, 0.05, chance, 0.4, 0.1) for chance in (0.0, 1.0, 0.5))
     assert sure.width_m(0.0) == pytest.approx((4.0, 0.05 * math.sqrt(2.0)))
     assert open_.width_m(0.7) == pytest.approx((4.0, 0.05 * math.sqrt(2.0)))
     width, std = torn.width_m(0.0)

@@ -7,8 +7,9 @@ import pytest
 from lhdmap.messages import FloatArray
 from lhdmap.pile.end_frame import Frame2
 from lhdmap.pile.face import Face
+from lhdmap.pile.judge import _ROCK_M, _RUBBLE_M
 from lhdmap.pile.limits import Limits
-from lhdmap.pile.relief import boulders, relief
+from lhdmap.pile.relief import CELL_M, boulders, grain_m, relief
 from lhdmap.pile.surface import Scene
 
 HALF_M = 2.0
@@ -50,7 +51,7 @@ def _seen(points: FloatArray) -> FloatArray:
 def _scene(slope: float, *parts: FloatArray) -> Scene:
     points = _seen(np.concatenate([_plane(slope), *parts]))
     face = Face(0.0, 0.0, slope, 0.0, 1e-6 * np.eye(4), 0.05, 50)
-    limits = Limits(HALF_M, -HALF_M, 0.05, 0.05, 0.0, 0.0, 0.1, 0.1)
+    limits = Limits(HALF_M, -HALF_M, 0.05, 0.05, 0.0, 0.0, 0.1)
     on = (points[:, 2] > 0.2) & (points[:, 2] < 1.6)
     return Scene(Frame2(np.zeros(3), 0.0), points, face, on, 0.0, True, limits)
 
@@ -90,3 +91,30 @@ def test_bulge_over_most_of_the_width_is_no_boulder() -> None:
     points[np.abs(points[:, 1]) < 1.3, 0] -= 0.6
     scene = scene._replace(points=points)
     assert boulders(scene, relief(scene)) == ()
+
+
+def _grain(flat: Scene, bump_m: FloatArray) -> float:
+    rough = flat._replace(points=flat.points + np.outer(bump_m, [1.0, 0.0, 0.0, 0.0]))
+    return grain_m(relief(rough), 0.2, 1.6)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_grain_tells_waves_from_stones(seed: int) -> None:
+    """Both surfaces are as rough: blasted rock in waves of more than a metre, rubble stone by stone."""
+    rng, flat = np.random.default_rng(seed), _scene(STEEP)
+    _, y, z, _ = flat.points.T
+    wave = 0.115 * np.sin(2.0 * np.pi * (y / 1.3 + rng.random())) * np.cos(2.0 * np.pi * z / 2.5)
+    stones = rng.normal(0.0, 0.08, (50, 50))[((y + HALF_M) / CELL_M).astype(int), (z / CELL_M).astype(int)]
+    rock, rubble = (_grain(flat, bump) for bump in (wave, stones))
+    assert rock < _ROCK_M
+    assert rubble > _RUBBLE_M
+
+
+@pytest.mark.parametrize("slope", [0.7, 1.0, 1.4])
+@pytest.mark.parametrize("size_m", [1.0, 1.4])
+def test_ball_half_in_the_face_is_where_it_is(slope: float, size_m: float) -> None:
+    at = (0.2, 0.9)
+    scene = _scene(slope, _seen(np.concatenate([_plane(slope), _ball(slope, size_m, at)])))
+    (found,) = boulders(scene, relief(scene))
+    assert found.center_m == pytest.approx([slope * at[1], *at], abs=0.2)
+    assert found.size_m == pytest.approx(size_m, rel=0.2)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -16,7 +17,7 @@ from lhdmap.pile.result import PileEstimate, PileReport, Snapshot, estimate_json
 from lhdmap.pile.settings import PileSettings
 from lhdmap.pile.stage import PileStage
 
-from tests.pile.cast_drift import STEP_M, TOE_M, Box, CastDrift, Segments, drive, last_of
+from tests.pile.cast_drift import EXACT, STEP_M, TOE_M, Box, CastDrift, Segments, drive, last_of
 
 KEYS = {
     *("status", "center_m", "left_limit_m", "right_limit_m", "width_m", "inclination_deg", "width_std_m"),
@@ -205,3 +206,69 @@ def test_what_does_not_close_the_drift_is_not_measured_as_a_pile() -> None:
     assert table["boulders"] == []
     assert table["probabilities"]["wall"] == 0.1
     assert table["warnings"] == ["said"]
+
+
+DRIFTING = Registration(0.01, math.radians(0.2))
+LOST = Registration(0.015, math.radians(0.3))
+
+
+@pytest.mark.parametrize("short_m", [0.0, 0.1, 0.2, 0.3, 0.4])
+def test_drive_that_ends_at_the_deadline_is_decided(short_m: float) -> None:
+    """An estimate comes each half metre: the last one before a true 15 m must do."""
+    report = drive(CastDrift(45.0, wave_rad=0.0), TOE_M - PileSettings().deadline_m - short_m, DRIFTING)
+    assert last_of(report).estimate.inclination_std_deg > 2.5  # not sure enough to decide earlier
+    assert report.decision is not None
+    assert report.decision.estimate.status == "loadable"
+
+
+def test_slope_that_is_too_unsure_is_not_said() -> None:
+    table = drive(CastDrift(56.0, wave_rad=0.0), 21.0, LOST).to_json()
+    assert table["status"] == "none"
+    assert table["identified"] is False
+    assert table["inclination_deg"] is None
+    assert table["probabilities"]["none"] < 0.5  # that something closes the drift is sure
+    assert table["probabilities"]["loadable"] > 0.2
+
+
+def _fed(*found: Snapshot) -> PileReport:
+    """Return the report of a stage that came to these estimates, half a metre apart."""
+    stage = PileStage(PileSettings(), EXACT)
+    for one in found:
+        stage._travelled_m += 0.5
+        stage._take(one)
+    return stage.report()
+
+
+def test_decision_falls_with_what_it_was_on() -> None:
+    seen = driven(CastDrift(90.0)).last
+    assert seen is not None
+    nothing = seen._replace(estimate=replace(seen.estimate, status="none", probabilities={"none": 1.0}))
+    assert _fed(seen).to_json()["identified"] is True
+    table = _fed(seen, nothing).to_json()
+    assert (table["status"], table["identified"], table["decision"]) == ("none", False, None)
+
+
+def test_what_is_not_seen_any_more_is_forgotten() -> None:
+    seen = driven(CastDrift(90.0), 20.0).last
+    assert seen is not None
+    blind = Snapshot(seen.stamp_ns, math.nan, PileEstimate())
+    assert _fed(seen, blind).to_json()["status"] == "wall"  # a look that fails is not yet a change
+    table = _fed(seen, *[blind] * 6).to_json()
+    assert (table["status"], table["identified"]) == ("none", False)
+
+
+@pytest.mark.parametrize("fall", [0.04, 0.08, 0.12])
+def test_floor_that_falls_away_is_no_overhang(fall: float) -> None:
+    """The scanner paints the far floor line by line, the farther the lower: that is a plane, and no face."""
+    report = driven(CastDrift(None, grade=-fall, wave_rad=math.radians(1.0)))
+    assert report.decision is None
+    assert all(not one.estimate.inclination_deg < -130.0 for one in report.history)
+
+
+def test_rock_that_stands_out_does_not_tilt_the_face() -> None:
+    """A boulder low on the face and one high on it draw the slope to opposite sides, unless they are left out."""
+    for z in (0.1, 0.7):
+        rock = Box((TOE_M + z - 0.5, -0.6, z), (TOE_M + z + 1.0, 0.6, z + 0.8))
+        pile = _found(CastDrift(45.0, rocks=(rock,))).estimate
+        assert len(pile.boulders) == 1
+        assert pile.inclination_deg == pytest.approx(-45.0, abs=0.5)

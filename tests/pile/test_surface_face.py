@@ -10,8 +10,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from lhdmap.messages import FloatArray
-from lhdmap.pile.face import Registration, find, fit
+from lhdmap.pile.face import Face, Registration, find, fit
 from lhdmap.pile.judge import Evidence, probabilities
+from lhdmap.pile.measure import _unseen_deg
 from lhdmap.pile.result import STATUSES
 from lhdmap.pile.tilt import TiltCheck
 from lhdmap.pile.window import HitWindow
@@ -84,11 +85,11 @@ evidence = st.builds(
     Evidence,
     inclination_deg=st.floats(-175.0, 0.0),
     std_deg=st.floats(0.0, 90.0),
-    spread_m=st.floats(0.0, 2.0),
+    grain_m=st.floats(0.0, 2.0),
     covered=st.floats(0.0, 1.0),
     beyond=st.floats(0.0, 1.0),
     gap_m=st.floats(0.0, 99.0),
-    walls_m=st.floats(0.0, 1.0),
+    fit_std_deg=st.floats(0.0, 90.0),
 )
 
 
@@ -102,7 +103,7 @@ def test_probabilities_are_a_distribution(seen: Evidence) -> None:
 
 
 @pytest.mark.parametrize(
-    ("inclination_deg", "spread_m", "status"),
+    ("inclination_deg", "grain_m", "status"),
     [
         (-15.0, 0.05, "too_shallow"),
         (-45.0, 0.1, "loadable"),
@@ -113,14 +114,14 @@ def test_probabilities_are_a_distribution(seen: Evidence) -> None:
         (-3.0, 0.02, "none"),
     ],
 )
-def test_each_status_owns_its_range(inclination_deg: float, spread_m: float, status: str) -> None:
-    found = probabilities(Evidence(inclination_deg, 0.5, spread_m, 1.0, 0.0, 0.0, 0.03))
+def test_each_status_owns_its_range(inclination_deg: float, grain_m: float, status: str) -> None:
+    found = probabilities(Evidence(inclination_deg, 0.5, grain_m, 1.0, 0.0, 0.0))
     assert max(found, key=lambda name: found[name]) == status
     assert found[status] > 0.95
 
 
 def test_half_a_face_closes_nothing() -> None:
-    found = probabilities(Evidence(-45.0, 0.5, 0.1, 0.35, 0.0, 0.0, 0.03))
+    found = probabilities(Evidence(-45.0, 0.5, 0.1, 0.35, 0.0, 0.0))
     assert found["none"] == pytest.approx(1.0)
 
 
@@ -174,3 +175,17 @@ def test_window_takes_nothing_twice_while_the_machine_stands() -> None:
     for _ in range(5):
         window.add(fan, np.zeros(3), 0.0)
     assert len(window.hits(np.zeros(4), 0.0)) == 9
+
+
+def test_height_that_was_not_seen_is_as_unsure_as_the_face_is_rough() -> None:
+    smooth, rough = (Face(0.0, 0.0, 1.0, 0.0, np.eye(4), spread, 50) for spread in (0.07, 0.14))
+    assert _unseen_deg(smooth, 1.4) == pytest.approx(0.0, abs=1e-9)
+    assert _unseen_deg(smooth, 0.5) > _unseen_deg(smooth, 0.9) > 0.0
+    assert _unseen_deg(rough, 0.5) == pytest.approx(2.0 * _unseen_deg(smooth, 0.5))
+
+
+@pytest.mark.parametrize("std_deg", [4.0, 8.0])
+def test_probabilities_do_not_jump_with_the_slope(std_deg: float) -> None:
+    at = [Evidence(angle, std_deg, 0.1, 1.0, 0.0, 0.2, std_deg) for angle in np.arange(-100.0, 0.0, 0.25)]
+    steps = np.diff([[probabilities(one)[name] for name in STATUSES] for one in at], axis=0)
+    assert np.abs(steps).max() < 0.05
