@@ -21,16 +21,16 @@ _FARTHEST = (
 )
 _LEAN = 0.5  # rock a centimetre higher stands so many centimetres in or out
 _CUTOFF_SIGMAS, _LEAST_SIGMA_M = 6.0, 0.02
-LINE = 7
+LINE = 6
 
 
 @nb.njit(cache=True, nogil=True)
 def wall_lines(points):  # type: ignore[no-untyped-def]
-    """Return the wall at each hit of one scan, points (N, 3) in the order of the beams.
+    """Return the walls at the hits of one scan, points (N, 3) in the order of the beams, where there is one.
 
-    Rows (N, LINE): centre x, y, normal x, y, scatter across it (m²), height (m), 1 where there is a wall (else 0).
+    Rows (M, LINE): centre x, y, height (m), normal x, y, scatter across it (m²).
     """
-    out = np.zeros((points.shape[0], LINE))
+    out, count = np.empty((points.shape[0], LINE)), 0
     for i in range(points.shape[0]):
         n = mx = my = xx = xy = yy = 0.0
         for k in range(max(i - _NEIGHBOURS, 0), min(i + _NEIGHBOURS + 1, points.shape[0])):
@@ -47,74 +47,76 @@ def wall_lines(points):  # type: ignore[no-untyped-def]
         small, large = max(half - root, 0.0), half + root
         if large < 4e-4 or small > 0.3 * large:
             continue
-        along = 0.5 * math.atan2(2.0 * xy, xx - yy)
-        out[i, 0], out[i, 1] = points[i, 0] + mx, points[i, 1] + my
-        out[i, 2], out[i, 3], out[i, 4] = -math.sin(along), math.cos(along), small
-        out[i, 5], out[i, 6] = points[i, 2], 1.0
-    return out
+        along, row = 0.5 * math.atan2(2.0 * xy, xx - yy), out[count]
+        row[0], row[1], row[2] = points[i, 0] + mx, points[i, 1] + my, points[i, 2]
+        row[3], row[4], row[5] = -math.sin(along), math.cos(along), small
+        count += 1
+    return out[:count].copy()
 
 
 @nb.njit(cache=True, nogil=True)
-def placed(points, owners, poses):  # type: ignore[no-untyped-def]
-    """Return points (N, 3) of several scans in the common frame; `owners` (N,): row of `poses` (K, 3)."""
-    out = np.empty((points.shape[0], 3))
-    for i in range(points.shape[0]):
-        pose = poses[owners[i]]
-        c, s = math.cos(pose[2]), math.sin(pose[2])
-        out[i, 0] = pose[0] + c * points[i, 0] - s * points[i, 1]
-        out[i, 1] = pose[1] + s * points[i, 0] + c * points[i, 1]
-        out[i, 2] = points[i, 2]
-    return out
-
-
-@nb.njit(cache=True, nogil=True)
-def _sorted_into_cells(walls, wall_owner, lines, travelled, low, shape):  # type: ignore[no-untyped-def]
-    """Return the wall hits that have a line, by cell: rows x, y, z, travelled, hit; and where each cell's begin."""
-    starts, cells = np.zeros(shape[0] * shape[1] + 1, np.int64), np.empty(walls.shape[0], np.int64)
-    for i in range(walls.shape[0]):
-        if lines[i, 6] > 0.0:
-            ix, iy = int((walls[i, 0] - low[0]) / CELL_M), int((walls[i, 1] - low[1]) / CELL_M)
-            cells[i] = ix * shape[1] + iy
-            starts[cells[i] + 1] += 1
+def _into_cells(x, y, shape):  # type: ignore[no-untyped-def]
+    """Return the points by cell, and where each cell's begin; x and y count from the grid's corner."""
+    cells, starts = np.empty(x.size, np.int64), np.zeros(shape[0] * shape[1] + 1, np.int64)
+    for i in range(x.size):
+        cells[i] = int(x[i] / CELL_M) * shape[1] + int(y[i] / CELL_M)
+        starts[cells[i] + 1] += 1
     for k in range(starts.size - 1):
         starts[k + 1] += starts[k]
-    rows, filled = np.empty((starts[-1], 5)), starts.copy()
-    for i in range(walls.shape[0]):
-        if lines[i, 6] > 0.0:
-            row = rows[filled[cells[i]]]
-            row[0], row[1], row[2], row[3], row[4] = walls[i, 0], walls[i, 1], walls[i, 2], travelled[wall_owner[i]], i
-            filled[cells[i]] += 1
-    return rows, starts
+    order, filled = np.empty(x.size, np.int64), starts.copy()
+    for i in range(x.size):
+        order[filled[cells[i]]] = i
+        filled[cells[i]] += 1
+    return order, starts
 
 
 @nb.njit(cache=True, nogil=True)
-def same_height(walls, wall_owner, lines, hits, hit_owner, travelled, apart_m):  # type: ignore[no-untyped-def]
-    """Return for each hit (M,) the wall hit that it saw again, -1 where there is none.
+def _placed(points, owners, poses):  # type: ignore[no-untyped-def]
+    """Return x and y of the rows of points (N, 2+) of several scans in the common frame; `owners` (N,): row of `poses` (K, 3)."""
+    x, y, at, c, s = np.empty(points.shape[0]), np.empty(points.shape[0]), -1, 1.0, 0.0
+    for i in range(points.shape[0]):
+        if owners[i] != at:
+            at = owners[i]
+            c, s = math.cos(poses[at, 2]), math.sin(poses[at, 2])
+        x[i] = poses[at, 0] + c * points[i, 0] - s * points[i, 1]
+        y[i] = poses[at, 1] + s * points[i, 0] + c * points[i, 1]
+    return x, y
 
-    `walls` (N, 3) with `lines` (N, LINE) and `hits` (M, 3) in the common frame, the scans they belong to, and how far the
-    machine had travelled at each scan (K,): scans nearer to each other than `apart_m` are not compared.
+
+@nb.njit(cache=True, nogil=True)
+def same_height(lines, wall_owner, hits, hit_owner, poses, travelled, apart_m):  # type: ignore[no-untyped-def]
+    """Return for each hit (M,) the wall that it saw again, -1 where there is none.
+
+    `lines` (N, LINE) and `hits` (M, 3) in the frames of their scans, given as rows of `poses` (K, 3); `travelled` (K,): how far
+    the machine had driven by then. Scans nearer to each other than `apart_m` are not compared.
     """
     found = np.full(hits.shape[0], -1, np.int64)
-    if not walls.shape[0] or not hits.shape[0]:
+    if not lines.shape[0] or not hits.shape[0]:
         return found
-    low = (walls[:, 0].min(), walls[:, 1].min())
-    shape = (int((walls[:, 0].max() - low[0]) / CELL_M) + 1, int((walls[:, 1].max() - low[1]) / CELL_M) + 1)
-    rows, starts = _sorted_into_cells(walls, wall_owner, lines, travelled, low, shape)
+    wall_x, wall_y = _placed(lines, wall_owner, poses)
+    x, y = _placed(hits, hit_owner, poses)
+    low_x, low_y = wall_x.min(), wall_y.min()
+    shape = (int((wall_x.max() - low_x) / CELL_M) + 1, int((wall_y.max() - low_y) / CELL_M) + 1)
+    order, starts = _into_cells(wall_x - low_x, wall_y - low_y, shape)
+    rows = np.empty((order.size, 4))  # what is compared lies together in memory
+    for k, i in enumerate(order):
+        rows[k, 0], rows[k, 1], rows[k, 2], rows[k, 3] = wall_x[i], wall_y[i], lines[i, 2], travelled[wall_owner[i]]
     per_m, per_height = 1.0 / _APART_SIGMA_M**2, 1.0 / _HEIGHT_SIGMA_M**2
     for i in range(hits.shape[0]):
-        x, y, z, mine = hits[i, 0], hits[i, 1], hits[i, 2], travelled[hit_owner[i]]
-        cx, cy = int(math.floor((x - low[0]) / CELL_M)), int(math.floor((y - low[1]) / CELL_M))
-        nearest = _FARTHEST
+        mine, nearest = travelled[hit_owner[i]], _FARTHEST
+        cx, cy = int(math.floor((x[i] - low_x) / CELL_M)), int(math.floor((y[i] - low_y) / CELL_M))
         for ix in range(max(cx - 1, 0), min(cx + 2, shape[0])):
             first, last = ix * shape[1] + max(cy - 1, 0), ix * shape[1] + min(cy + 2, shape[1])
-            for k in range(starts[first], starts[last] if first < last else 0):
-                dz = rows[k, 2] - z
+            if first >= last:
+                continue
+            for k in range(starts[first], starts[last]):
+                dz = rows[k, 2] - hits[i, 2]
                 away = dz * dz * per_height
                 if away >= nearest or abs(rows[k, 3] - mine) < apart_m:
                     continue
-                away += ((rows[k, 0] - x) ** 2 + (rows[k, 1] - y) ** 2) * per_m
+                away += ((rows[k, 0] - x[i]) ** 2 + (rows[k, 1] - y[i]) ** 2) * per_m
                 if away < nearest:
-                    nearest, found[i] = away, int(rows[k, 4])
+                    nearest, found[i] = away, order[k]
     return found
 
 
@@ -147,7 +149,7 @@ def add_pairs(lines, wall_owner, pairs, poses, joint, noise_m, H, g):  # type: i
         k = pairs.line[i]
         a, b = wall_owner[k], pairs.owner[i]
         ca, sa, cb, sb = math.cos(poses[a, 2]), math.sin(poses[a, 2]), math.cos(poses[b, 2]), math.sin(poses[b, 2])
-        nx, ny = ca * lines[k, 2] - sa * lines[k, 3], sa * lines[k, 2] + ca * lines[k, 3]
+        nx, ny = ca * lines[k, 3] - sa * lines[k, 4], sa * lines[k, 3] + ca * lines[k, 4]
         wx, wy = ca * lines[k, 0] - sa * lines[k, 1], sa * lines[k, 0] + ca * lines[k, 1]
         x, y, turned_x, turned_y = pairs.hits[i, 0], pairs.hits[i, 1], 0.0, 0.0
         if pairs.swings[i]:
@@ -155,8 +157,8 @@ def add_pairs(lines, wall_owner, pairs, poses, joint, noise_m, H, g):  # type: i
             x, y = x + joint.offset_rad * turned_x, y + joint.offset_rad * turned_y
         hx, hy = cb * x - sb * y, sb * x + cb * y
         d = nx * (poses[b, 0] + hx - poses[a, 0] - wx) + ny * (poses[b, 1] + hy - poses[a, 1] - wy)
-        dz = pairs.hits[i, 2] - lines[k, 5]
-        variance = noise_m * noise_m + lines[k, 4] + (_LEAN * dz) ** 2
+        dz = pairs.hits[i, 2] - lines[k, 2]
+        variance = noise_m * noise_m + lines[k, 5] + (_LEAN * dz) ** 2
         u2 = d * d / (_CUTOFF_SIGMAS**2 * max(variance, _LEAST_SIGMA_M**2))
         if u2 >= 1.0:
             continue

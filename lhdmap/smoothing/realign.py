@@ -107,9 +107,7 @@ class Realigner:
         hits = np.concatenate([rear, front[::2]])
         serial = self._nodes[-1].serial + 1 if self._nodes else 0
         lines, pose_odom = wall_lines(front), scan.pose.copy()
-        self._nodes.append(
-            Node(serial, scan.time_ns, travelled_m, pose_odom, sigmas, front, lines, hits, len(rear), [])
-        )
+        self._nodes.append(Node(serial, scan.time_ns, travelled_m, pose_odom, sigmas, lines, hits, len(rear), []))
         self._poses.append(pose)
         self._weak = False
 

@@ -13,7 +13,7 @@ from scipy.linalg import solve
 
 from lhdmap.geometry import se2
 from lhdmap.messages import FloatArray
-from lhdmap.smoothing.height_pairs import Indices, Joint, Pairs, add_pairs, add_steps, placed, same_height
+from lhdmap.smoothing.height_pairs import Indices, Joint, Pairs, add_pairs, add_steps, same_height
 
 _ROUNDS = 2  # the next window begins where this one ended
 _APART_M = 3.0  # scans nearer to each other share the error that is to be found
@@ -21,22 +21,27 @@ _NOISE_M = 0.015
 _JOINT_STD_RAD = math.radians(0.3)
 
 
-class Node(NamedTuple):
-    """A scan that is aligned, `serial` counts all: `lines` of its front hits, and `hits`, the rear ones first, in its own frame.
+class Seen(NamedTuple):
+    """What a node saw again: its hits (P, 3), rear ones or not, serial of the node that saw the wall, row of that node's `lines`."""
 
-    `pairs` (P, 3): row of `hits`, serial of the node that saw the same wall at the same height, row of that node's `lines`.
-    """
+    hits: FloatArray
+    swings: npt.NDArray[np.bool_]
+    partner: Indices
+    line: Indices
+
+
+class Node(NamedTuple):
+    """A scan that is aligned, `serial` counts all; `lines` of its front hits and `hits`, rear ones first, are in its own frame."""
 
     serial: int
     time_ns: int
     travelled_m: float
     pose: FloatArray
     step_sigmas: FloatArray
-    front: FloatArray
     lines: FloatArray
     hits: FloatArray
     behind: int
-    pairs: list[Indices]
+    seen: list[Seen]
 
 
 class Window(NamedTuple):
@@ -51,10 +56,11 @@ class Window(NamedTuple):
 
 def solved(window: Window) -> Window:
     """Return the window with its poses moved: Gauss-Newton over those that are not final."""
-    _pair(window)
     nodes, poses, joint, first = window.nodes, window.poses.copy(), window.joint, window.first
     lines, owners = _stacked([node.lines for node in nodes])
-    pairs = _pairs_of(nodes, first, np.searchsorted(owners, np.arange(len(nodes))))
+    starts = np.searchsorted(owners, np.arange(len(nodes)))
+    _pair(window, lines, owners, starts)
+    pairs = _pairs_of(nodes, first, starts)
     steps = np.array([se2.between(a.pose, b.pose) for a, b in pairwise(nodes)])
     sigmas = np.array([node.step_sigmas for node in nodes[1:]])
     size = 3 * len(nodes) + 1
@@ -70,46 +76,33 @@ def solved(window: Window) -> Window:
     return window._replace(poses=poses, joint=joint, unpaired=len(nodes))
 
 
-def _pair(window: Window) -> None:
+def _pair(window: Window, lines: FloatArray, owners: Indices, starts: Indices) -> None:
     """Find what the new nodes saw again, where the odometry's steps put them: they are centimetres off by then."""
     nodes, new = window.nodes, window.nodes[window.unpaired :]
-    walls, wall_owner = _stacked([node.front for node in nodes])
-    hits, owner = _stacked([node.hits for node in new])
-    found = same_height(
-        placed(walls, wall_owner, window.poses),
-        wall_owner,
-        np.concatenate([node.lines for node in nodes]),
-        placed(hits, owner + window.unpaired, window.poses),
-        owner + window.unpaired,
-        np.array([node.travelled_m for node in nodes]),
-        _APART_M,
-    )
-    wall_starts = np.searchsorted(wall_owner, np.arange(len(nodes)))
-    starts = np.searchsorted(owner, np.arange(len(new) + 1))
-    for node, start, end in zip(new, starts[:-1], starts[1:], strict=True):
+    hits, hit_owner = _stacked([node.hits for node in new])
+    travelled = np.array([node.travelled_m for node in nodes])
+    found = same_height(lines, owners, hits, hit_owner + window.unpaired, window.poses, travelled, _APART_M)
+    ends = np.searchsorted(hit_owner, np.arange(len(new) + 1))
+    for node, start, end in zip(new, ends[:-1], ends[1:], strict=True):
         mine = np.flatnonzero(found[start:end] >= 0)
         wall = found[start + mine]
-        partner = wall_owner[wall]
-        node.pairs.append(np.column_stack([mine, nodes[0].serial + partner, wall - wall_starts[partner]]))
+        partner = owners[wall]
+        node.seen.append(Seen(node.hits[mine], mine < node.behind, nodes[0].serial + partner, wall - starts[partner]))
 
 
-def _pairs_of(nodes: Sequence[Node], first: int, wall_starts: Indices) -> Pairs:
-    """Return the pairs of the nodes from `first` on whose partner is still there."""
-    hits, owners, lines, swings = (
-        [np.zeros((0, 3))],
-        [np.zeros(0, np.int64)],
-        [np.zeros(0, np.int64)],
-        [np.zeros(0, bool)],
+def _pairs_of(nodes: Sequence[Node], first: int, starts: Indices) -> Pairs:
+    """Return the pairs of the nodes from `first` on whose partner is still there; `starts` (K,): of each node's lines."""
+    seen = [(row, one) for row, node in enumerate(nodes[first:], first) for one in node.seen]
+    hits = np.concatenate([np.zeros((0, 3)), *(one.hits for _, one in seen)])
+    swings = np.concatenate([np.zeros(0, bool), *(one.swings for _, one in seen)])
+    partner, line = (
+        np.concatenate([np.zeros(0, np.int64), *(getattr(one, name) for _, one in seen)])
+        for name in ("partner", "line")
     )
-    for row, node in enumerate(nodes[first:], first):
-        for pairs in node.pairs:
-            partner = pairs[:, 1] - nodes[0].serial
-            kept = partner >= 0
-            hits.append(node.hits[pairs[kept, 0]])
-            owners.append(np.full(int(kept.sum()), row))
-            lines.append(wall_starts[partner[kept]] + pairs[kept, 2])
-            swings.append(pairs[kept, 0] < node.behind)
-    return Pairs(*(np.concatenate(parts) for parts in (hits, owners, lines, swings)))
+    owner = np.repeat(np.array([row for row, _ in seen], np.int64), [len(one.line) for _, one in seen])
+    there = partner >= nodes[0].serial
+    wall = starts[partner[there] - nodes[0].serial] + line[there]
+    return Pairs(hits[there], owner[there], wall, swings[there])
 
 
 def _stacked(parts: list[FloatArray]) -> tuple[FloatArray, npt.NDArray[np.int64]]:

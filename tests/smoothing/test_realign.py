@@ -120,23 +120,32 @@ def test_the_final_path_has_all_poses_once_and_keeps_heights() -> None:
 
 
 def test_pairs_are_at_the_same_height_and_from_scans_apart() -> None:
-    walls = np.column_stack([np.linspace(0.0, 1.0, 21), np.zeros(21), np.full(21, 1.0)])
-    lines = wall_lines(walls)
+    lines = wall_lines(np.column_stack([np.linspace(0.0, 1.0, 21), np.zeros(21), np.full(21, 1.0)]))
     assert lines.shape == (21, LINE)
-    assert np.abs(lines[:, 3]) == pytest.approx(1.0)  # the normal is across the wall
-    hits = np.array([[0.5, 0.02, 1.01], [0.5, 0.02, 1.2], [0.5, 0.6, 1.0]])
-    owners, travelled = np.array([1, 1, 1]), np.array([0.0, 10.0])
-    found = same_height(walls, np.zeros(21, np.int64), lines, hits, owners, travelled, 3.0)
-    assert found[0] >= 0  # the height and the place are right
-    assert (found[1:] == -1).all()  # another height; another place
-    assert (same_height(walls, np.zeros(21, np.int64), lines, hits, owners, travelled, 11.0) == -1).all()
+    assert np.abs(lines[:, 4]) == pytest.approx(1.0)  # the normal is across the wall
+    hits = np.array([[0.5, 0.02, 1.01], [0.5, 0.02, 1.2], [0.5, 0.6, 1.0], [1e6, 1e6, 1.0], [0.5, 1e6, 1.0], [-1e6, -1e6, 1.0]])
+    owners, poses, travelled = (np.zeros(21, np.int64), np.ones(6, np.int64)), np.zeros((2, 3)), np.array([0.0, 10.0])
+    found = same_height(lines, owners[0], hits, owners[1], poses, travelled, 3.0)
+    assert lines[found[0], 0] == pytest.approx(0.5)  # the height and the place are right
+    assert (found[1:] == -1).all()  # another height; other places, far from all walls, too
+    assert (same_height(lines, owners[0], hits, owners[1], poses, travelled, 11.0) == -1).all()
+
+
+def test_corners_and_lone_hits_are_no_walls() -> None:
+    corner = np.array(
+        [[0.0, 0.2, 0.0], [0.0, 0.1, 0.0], [0.0, 0.0, 0.0], [0.1, 0.0, 0.0], [0.2, 0.0, 0.0], [9.0, 9.0, 0.0]]
+    )
+    assert not (np.abs(wall_lines(corner)[:, :2] - corner[2, :2]).max(axis=1) < 0.05).any()
+    assert not (wall_lines(corner)[:, 0] > 5.0).any()
 
 
 def test_no_hits_at_all_are_no_pairs() -> None:
     none, owners = np.zeros((0, 3)), np.zeros(0, np.int64)
-    assert same_height(
-        none, owners, np.zeros((0, LINE)), np.zeros((2, 3)), np.zeros(2, np.int64), np.zeros(1), 3.0
-    ).tolist() == [-1, -1]
+    hits, owner = np.zeros((2, 3)), np.zeros(2, np.int64)
+    assert same_height(np.zeros((0, LINE)), owners, hits, owner, np.zeros((1, 3)), np.zeros(1), 3.0).tolist() == [
+        -1,
+        -1,
+    ]
     realigner = Realigner(SETTINGS)
     for k in range(400):
         realigner.update(AlignedScan(k * STEP_NS, np.array([0.1 * k, 0.0, 0.0]), none, none, weak=False))
