@@ -22,7 +22,7 @@ _JOINT_STD_RAD = math.radians(0.3)
 
 
 class Seen(NamedTuple):
-    """What a node saw again: its hits (P, 3), rear ones or not, serial of the node that saw the wall, row of that node's `lines`."""
+    """What a node saw again: its hits (P, 3), rear or not, serial of the node that saw the wall, row of that node's `lines`."""
 
     hits: FloatArray
     swings: npt.NDArray[np.bool_]
