@@ -31,6 +31,7 @@ _SURPRISE = 3.5  # sigmas from the prediction
 _USUAL_RESIDUAL = 0.75  # weighted rms in sigmas that matches have whose noise is stated rightly
 _NOISE_GAIN = 0.05
 _NOISE_SCALES = (0.8, 6.0)
+_FRONT_STEP = 3  # one in three hits of the front scanner: as exact with the rear one's, and faster
 _FLAT_M = 0.02  # a scan whose heights differ by less is planar
 
 
@@ -109,8 +110,8 @@ class AnchoredMatcher:
         self.behind = NO_POINTS
         if not self._layered or not len(seen.points):
             return Hits(points, len(points), self._layered)
-        self._turn = 1 - self._turn  # every other hit of the front scanner: as exact with the rear one's, and faster
-        front, self.behind = points[self._turn :: 2], self._joint.turned(seen)
+        self._turn = (self._turn + 1) % _FRONT_STEP
+        front, self.behind = points[self._turn :: _FRONT_STEP], self._joint.turned(seen)
         return Hits(np.concatenate([front, self.behind]), len(front), True)
 
     def _match(self, hits: Hits, heading: tuple[float, float]) -> Match:

@@ -40,7 +40,7 @@ class OdometrySettings:
         doc="A scan with more beams is thinned, each time from another beam on.",
     )
     max_rear_beams: int = setting(
-        200,
+        130,
         unit="beams",
         minimum=20,
         source="measured: twice as many gain nothing (docs/odometry.md)",

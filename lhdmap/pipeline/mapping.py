@@ -88,6 +88,7 @@ class MappingPipeline:
         self._newest_ns = self._time_ns = -(2**62)
         self._clock_ns = -(2**62)
         self._disordered = False
+        self._attitude_of: tuple[int, tuple[float, float]] = (-(2**63), (0.0, 0.0))
         self._waiting: deque[tuple[LaserScan | PointCloud, int]] = deque()
         self._boxes = own_boxes(machine, settings.integration.body_margin_m)
 
@@ -251,8 +252,10 @@ class MappingPipeline:
 
     def _attitude_at(self, time_ns: int) -> tuple[float, float]:
         """Return roll and pitch; a log without inclinometer, or a gap of it, counts as level."""
-        found = self.attitude.attitude_at(time_ns) if self.has_inclinometer else None
-        return (0.0, 0.0) if found is None else (found.roll_rad, found.pitch_rad)
+        if self._attitude_of[0] != time_ns:  # a scan asks twice, and the filter fits anew each time
+            found = self.attitude.attitude_at(time_ns) if self.has_inclinometer else None
+            self._attitude_of = (time_ns, (0.0, 0.0) if found is None else (found.roll_rad, found.pitch_rad))
+        return self._attitude_of[1]
 
     def _wheel_step(self, before_ns: int, time_ns: int) -> WheelStep | None:
         """Return the wheels' motion since the scan before, as far as the sensors tell."""

@@ -45,14 +45,17 @@ _MEANING = {
 
 def write_pile_report(report: PileReport, path: Path, title: str) -> None:
     """Write one self-contained HTML page of what is said of the pile."""
-    path.write_text(markup.document(title, pile_sections(report)), encoding="utf-8")
+    path.write_text(markup.document(title, pile_sections(report, drawn=True)), encoding="utf-8")
 
 
-def pile_sections(report: PileReport) -> str:
-    """Return the sections as markup: for a page of their own, and within another."""
+def pile_sections(report: PileReport, *, drawn: bool = False) -> str:
+    """Return the sections as markup: for a page of their own, and within another.
+
+    `drawn`: with pictures also where the last estimate is none, to see why.
+    """
     pile = report.last.estimate if report.last is not None else PileEstimate()
     parts = [markup.section("Ore pile", markup.cards(_figures(report, pile)) + markup.listed(pile.warnings, "warning"))]
-    if not pile.found:
+    if not pile.found or (pile.status == "none" and not drawn):
         words = "No face was found that closes the drift, so there is nothing to draw.\n"
         return "".join([*parts, f"<p>{words}</p>\n"])
     with charts.styled():

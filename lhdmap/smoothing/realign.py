@@ -26,6 +26,7 @@ _SOLVE_SHARE = 0.3  # of the lag between two solutions
 _REST_SHARE = 0.2  # of the lag in time between nodes at rest
 _ANCHOR_M = 18.0  # of final poses that the others are tied to: as far as the rear scanner looks back
 _MOST_HITS = 400  # of a scan
+_FRONT_STEP = 6  # of the front hits so many are looked up once: the rear ones tell more
 # Random walk of the odometry of tilted scanners (m, m, deg per root metre), measured on simulated drives; where a direction
 # was weak or the scan lost, so many times as much.
 _WALK, _WEAK = np.array([0.02, 0.01, math.radians(0.03)]), 5.0
@@ -104,7 +105,7 @@ class Realigner:
             pose, length_m = scan.pose, _SHORTEST_M
         sigmas = _WALK * math.sqrt(length_m) * (_WEAK if self._weak else 1.0)
         front, rear = _thinned(scan.front), _thinned(scan.rear)
-        hits = np.concatenate([rear, front[::2]])
+        hits = np.concatenate([rear, front[::_FRONT_STEP]])
         serial = self._nodes[-1].serial + 1 if self._nodes else 0
         lines, pose_odom = wall_lines(front), scan.pose.copy()
         self._nodes.append(Node(serial, scan.time_ns, travelled_m, pose_odom, sigmas, lines, hits, len(rear), []))

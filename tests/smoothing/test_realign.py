@@ -123,7 +123,9 @@ def test_pairs_are_at_the_same_height_and_from_scans_apart() -> None:
     lines = wall_lines(np.column_stack([np.linspace(0.0, 1.0, 21), np.zeros(21), np.full(21, 1.0)]))
     assert lines.shape == (21, LINE)
     assert np.abs(lines[:, 4]) == pytest.approx(1.0)  # the normal is across the wall
-    hits = np.array([[0.5, 0.02, 1.01], [0.5, 0.02, 1.2], [0.5, 0.6, 1.0], [1e6, 1e6, 1.0], [0.5, 1e6, 1.0], [-1e6, -1e6, 1.0]])
+    hits = np.array(
+        [[0.5, 0.02, 1.01], [0.5, 0.02, 1.2], [0.5, 0.6, 1.0], [1e6, 1e6, 1.0], [0.5, 1e6, 1.0], [-1e6, -1e6, 1.0]]
+    )
     owners, poses, travelled = (np.zeros(21, np.int64), np.ones(6, np.int64)), np.zeros((2, 3)), np.array([0.0, 10.0])
     found = same_height(lines, owners[0], hits, owners[1], poses, travelled, 3.0)
     assert lines[found[0], 0] == pytest.approx(0.5)  # the height and the place are right
