@@ -63,7 +63,7 @@ def measure(seed: int, distance_m: float) -> dict[str, FloatArray]:
         assert drive.mesh_file is not None
         pipeline = mapped(drive.log)
         times = np.array(pipeline.records.times_ns, dtype=np.int64)
-        own = trajectory_of(resample(pipeline.track.rows(), times), times)
+        own = trajectory_of(resample(pipeline.path.final.rows(), times), times)
         cloud = pipeline.sweeps.cloud()
         request = BuildRequest([drive.log], Path(folder) / "map")
         exact = integrate_again(request, pipeline, rows_of(drive.truth))
