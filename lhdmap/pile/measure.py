@@ -31,7 +31,7 @@ def measure(scene: Scene) -> PileEstimate:
     face, limits = scene.face, scene.limits
     width, width_std = limits.width_m(face.b)
     on = scene.points[scene.on_face]
-    std_deg = math.hypot(face.inclination_std_deg, _DEFINITION_DEG, _unseen_deg(face, float(np.ptp(on[:, 2]))))
+    std_deg = math.hypot(face.inclination_std_deg, _DEFINITION_DEG, _unseen_deg(face, scene.floor_m, on[:, 2]))
     covered, beyond = _closure(scene)
     share = probabilities(
         Evidence(
@@ -82,11 +82,13 @@ def _beside_rocks(scene: Scene) -> tuple[Scene, Relief]:
     return scene, relief(scene)
 
 
-def _unseen_deg(face: Face, height_m: float) -> float:
-    """Return how much the slope of the whole height may differ from that of the height that was seen, from the roughness."""
-    missing = max(1.0 - height_m / (HIGH_M - LOW_M), 0.0)
-    # an error of rough_m along the normal over height_m, at the two ends of a line as steep as the face
-    return math.degrees(_UNSEEN * missing * face.rough_m / (max(height_m, _SEEN_LEAST_M) * math.sqrt(1.0 + face.c**2)))
+def _unseen_deg(face: Face, floor_m: float, z: FloatArray) -> float:
+    """Return how much the slope of the defined heights may differ from that of those (N,) that were seen, from the roughness."""
+    low, high = floor_m + LOW_M, floor_m + HIGH_M
+    missing = max(1.0 - float(np.ptp(np.clip(z, low, high))) / (high - low), 0.0)
+    # an error of rough_m along the normal over the height that was seen, at the two ends of a line as steep as the face
+    height_m = max(float(np.ptp(z)), _SEEN_LEAST_M)
+    return math.degrees(_UNSEEN * missing * face.rough_m / (height_m * math.sqrt(1.0 + face.c**2)))
 
 
 def _as_rock_lies(inclination_deg: float, std_deg: float) -> tuple[float, float]:

@@ -24,6 +24,7 @@ from lhdmap.pile.tilt import Tilt
 
 Mask = npt.NDArray[np.bool_]
 LOW_M, HIGH_M = 0.2, 1.6  # heights over the floor at the toe that the inclination is defined over
+_LEAST_SPAN_M = 0.9
 _WALL_GAP_M = 0.3
 _CLEAR_M = 0.08
 _BLURRED_DEG = 5.0
@@ -168,7 +169,7 @@ def _ahead(hits, tilt, travelled):  # type: ignore[no-untyped-def]
 
 @nb.njit(cache=True, nogil=True)
 def _on_face(points, model, sides, path, used):  # type: ignore[no-untyped-def]
-    """Mark the hits on the face at the heights that the inclination is defined over.
+    """Mark the hits on the face at the heights that the inclination is defined over, and above where hardly any of these was seen.
 
     Returns z of the floor at the toe, never above the lowest hits of the face, whether it was seen, and how many hits are marked.
     """
@@ -187,8 +188,10 @@ def _on_face(points, model, sides, path, used):  # type: ignore[no-untyped-def]
     floor = floor_before(points, toe_x, 0.5 * (sides[0] - sides[1]))
     seen = not math.isnan(floor)
     floor = min(floor if seen else path[0] + path[1] * toe_x, quantile(low, count, 0.01))
+    # downhill the scan meets the face high up: what lies above the defined heights then tells more than their upper edge alone
+    top = max(floor + HIGH_M, quantile(low, count, 0.05) + _LEAST_SPAN_M)
     hits = 0
     for i in on[:count]:
-        used[i] = points[i, 2] > floor + LOW_M and points[i, 2] < floor + HIGH_M
+        used[i] = points[i, 2] > floor + LOW_M and points[i, 2] < top
         hits += used[i]
     return floor, seen, hits

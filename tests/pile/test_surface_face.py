@@ -14,6 +14,7 @@ from lhdmap.pile.face import Face, Registration, find, fit
 from lhdmap.pile.judge import Evidence, probabilities
 from lhdmap.pile.measure import _unseen_deg
 from lhdmap.pile.result import STATUSES
+from lhdmap.pile.surface import _on_face
 from lhdmap.pile.tilt import TiltCheck
 from lhdmap.pile.window import HitWindow
 
@@ -179,9 +180,25 @@ def test_window_takes_nothing_twice_while_the_machine_stands() -> None:
 
 def test_height_that_was_not_seen_is_as_unsure_as_the_face_is_rough() -> None:
     smooth, rough = (Face(0.0, 0.0, 1.0, 0.0, np.eye(4), spread, 50) for spread in (0.07, 0.14))
-    assert _unseen_deg(smooth, 1.4) == pytest.approx(0.0, abs=1e-9)
-    assert _unseen_deg(smooth, 0.5) > _unseen_deg(smooth, 0.9) > 0.0
-    assert _unseen_deg(rough, 0.5) == pytest.approx(2.0 * _unseen_deg(smooth, 0.5))
+    z = np.linspace(0.2, 1.6, 57)  # the heights that the inclination is defined over, floor at 0
+    assert _unseen_deg(smooth, 0.0, z) == pytest.approx(0.0, abs=1e-9)
+    assert _unseen_deg(smooth, 0.0, z[:20]) > _unseen_deg(smooth, 0.0, z[:36]) > 0.0
+    assert _unseen_deg(rough, 0.0, z[:20]) == pytest.approx(2.0 * _unseen_deg(smooth, 0.0, z[:20]))
+    above = np.linspace(1.4, 2.3, 37)  # hardly any of them, but much above: better than these alone, not as good as all
+    assert 0.0 < _unseen_deg(smooth, 0.0, above) < _unseen_deg(smooth, 0.0, above[above < 1.6])
+
+
+@pytest.mark.parametrize("lowest_m", [0.3, 1.3])
+def test_a_face_that_is_only_seen_high_up_is_measured_there(lowest_m: float) -> None:
+    """Downhill, a scan meets the face above most of the heights that the inclination is defined over."""
+    rng = np.random.default_rng(4)
+    y, z = rng.uniform(-1.8, 1.8, 4000), rng.uniform(lowest_m, 2.6, 4000)
+    points = np.column_stack([1.0 + z + rng.normal(0.0, 0.03, 4000), y, z, np.zeros(4000)])
+    used = np.zeros(len(points), np.bool_)
+    _, _, hits = _on_face(points, np.array([1.0, 0.0, 1.0]), (2.0, -2.0), (0.0, 0.0), used)
+    assert hits == used.sum()
+    assert np.ptp(points[used, 2]) > 0.85
+    assert points[used, 2].max() < max(1.6, lowest_m + 1.0) + 0.1
 
 
 @pytest.mark.parametrize("std_deg", [4.0, 8.0])
