@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import time
 
 import numpy as np
 import pytest
@@ -10,9 +11,11 @@ from lhdmap.geometry import se2
 from lhdmap.messages import FloatArray
 from lhdmap.pipeline.path import FinalPath
 from lhdmap.pipeline.track import Track
+from lhdmap.smoothing import realign
 from lhdmap.smoothing.height_pairs import LINE, same_height, wall_lines
 from lhdmap.smoothing.realign import AlignedScan, Realigner
 from lhdmap.smoothing.settings import SmoothingSettings
+from lhdmap.smoothing.window import Window, solved
 
 SCANNER_M, FALL = 1.8, math.tan(math.radians(2.5))
 JOINT_X_M, REAR_X_M = -1.7, -4.7
@@ -153,3 +156,24 @@ def test_no_hits_at_all_are_no_pairs() -> None:
         realigner.update(AlignedScan(k * STEP_NS, np.array([0.1 * k, 0.0, 0.0]), none, none, weak=False))
     realigner.finish()
     assert np.abs([T for _, T in realigner.moves]).max() < 1e-9
+
+
+def test_the_result_does_not_depend_on_how_fast_the_worker_is(monkeypatch: pytest.MonkeyPatch) -> None:
+    scans = drive(24.0)
+
+    def moves() -> list[tuple[int, FloatArray]]:
+        realigner = Realigner(SETTINGS, JOINT_X_M)
+        for _, scan in scans:
+            realigner.update(scan)
+        realigner.finish()
+        return realigner.moves
+
+    def slowly(window: Window) -> Window:
+        time.sleep(0.05)
+        return solved(window)
+
+    at_once = moves()
+    monkeypatch.setattr(realign, "solved", slowly)
+    later = moves()
+    assert [time_ns for time_ns, _ in later] == [time_ns for time_ns, _ in at_once]
+    assert all((one == other).all() for (_, one), (_, other) in zip(at_once, later, strict=True))
