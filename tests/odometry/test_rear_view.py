@@ -75,12 +75,17 @@ def log(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 class Errors(NamedTuple):
-    """Means over all segments of 10 m: of the odometry and of the final path, metres in the plane and degrees of heading."""
+    """Of the odometry and of the final path, metres in the plane and degrees of heading: means over all segments of 10 m.
+
+    `end_m`, `end_deg`: of the odometry's end, seen from its start.
+    """
 
     odometry_m: float
     odometry_deg: float
     final_m: float
     final_deg: float
+    end_m: float
+    end_deg: float
 
 
 def errors(log: Path, *, rear: bool, joint_deg: float = 0.0) -> Errors:
@@ -98,7 +103,9 @@ def errors(log: Path, *, rear: bool, joint_deg: float = 0.0) -> Errors:
     heading = np.unwrap(se3.rpy_from_quaternions(truth.quaternions_xyzw)[:, 2])
     true = Rows(truth.stamps_ns, np.column_stack([truth.positions_m, np.zeros((len(heading), 2)), heading]))
     found = [segment_errors(path.rows(), true) for path in (pipeline.track, pipeline.path.final)]
-    return Errors(*found[0], *found[1])
+    ends = [rows.poses[[0, -1]][:, [0, 1, 5]] for rows in (true, pipeline.track.rows())]
+    end = se2.between(*(se2.between(*pair) for pair in ends))
+    return Errors(*found[0], *found[1], float(np.hypot(end[0], end[1])), abs(math.degrees(float(end[2]))))
 
 
 def segment_errors(rows: Rows, truth: Rows) -> tuple[float, float]:
