@@ -1,21 +1,24 @@
 """The local map that scans are matched against: hits averaged in cells of three sizes, walls as moving-least-squares lines.
 
-Each level is a grid that wraps around (a cell's tag tells which place of the world it holds), so memory is fixed and the
-oldest places are replaced as the machine drives on. Coarse levels serve sparse, distant walls and starts. A tilted scanner
-sees a wall at another height from each distance, and rock is rough in height, too: cells are layered in height, and the line
-at a point is the wall's at the height of that point.
+Each level is a grid that wraps around, in tiles of 8 x 8 cells for each layer of height (a tag tells which place of the world
+a tile holds). Only tiles with hits have a block of memory; blocks are used in turn, so memory is fixed and the oldest places
+are forgotten. A bit for each cell tells where hits are: a fit looks at nothing else. Coarse levels serve sparse, distant walls
+and starts. A tilted scanner sees a wall at another height from each distance, and rock is rough in height, too: the line at a
+point is the wall's at the height of that point.
 """
 
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numba as nb
 import numpy as np
 import numpy.typing as npt
+from llvmlite import ir
+from numba.extending import intrinsic
 
-from lhdmap.messages import Float32Array, FloatArray
+from lhdmap.messages import FloatArray
 
 KERNEL_CELLS = 3  # a line is fitted to the cells within this many cells of a point
 LINE = 8  # numbers of a line: see `fit_line`
@@ -25,20 +28,27 @@ LAYER_M = 0.12
 _HEIGHT_SIGMA_M = 0.06
 _HEIGHT_PER_CELL = 1.5  # ... and at least so many cells: measured, a third less heading drift of a tilted scanner
 _FINE_M = 0.05
+_STEPS = 65536.0  # a mean is kept in so many steps of its cell: below a micrometre in fine cells
+_COLUMNS = 0x0101010101010101  # the bit of the first cell of each of the eight rows of a tile
 
 
 class Level(NamedTuple):
-    """One grid of `size` x `size` columns of cells, kept in tiles of 8 x 8: what a fit reads lies close together in memory.
+    """One grid of `size` x `size` columns of cells, which wraps around; T = (size / 8)² tiles.
 
-    `layers` (tiles, 64) uint8: a bit for each layer of a column that ever held hits; `tags` (tiles, LAYERS, 64) int32 (0: empty);
-    `hits` (tiles, LAYERS, 64, 4) float32: count and mean offset x, y, z from the cell's corner, metres.
+    `tags` (T, LAYERS) int32: the place of the world (0: none); `cells` (T, LAYERS) int64: a bit for each cell with hits;
+    `blocks` (T, LAYERS) int32: which 64 of `hits` (64 N,) int64 are theirs, each four numbers of 16 bits: mean offset x, y, z
+    from the cell's corner, in 1 / 65536 of its size, and count. `owners` (N,) int32: tile * LAYERS + layer of each block;
+    `used` (1,): blocks taken so far.
     """
 
     cell_m: float
     size: int
-    layers: npt.NDArray[np.uint8]
     tags: npt.NDArray[np.int32]
-    hits: Float32Array
+    cells: npt.NDArray[np.int64]
+    blocks: npt.NDArray[np.int32]
+    owners: npt.NDArray[np.int32]
+    hits: npt.NDArray[np.int64]
+    used: npt.NDArray[np.int64]
 
 
 class SurfaceMap(NamedTuple):
@@ -49,7 +59,7 @@ class SurfaceMap(NamedTuple):
     coarse: Level
 
 
-def empty_map(cell_m: float, cells: int = 1024) -> SurfaceMap:
+def empty_map(cell_m: float, cells: int = 2048) -> SurfaceMap:
     """Return an empty map with cells of `cell_m`, 3 x and 9 x that; the fine window is `cells * cell_m` wide."""
     return SurfaceMap(_level(cell_m, cells), _level(3 * cell_m, cells // 2), _level(9 * cell_m, cells // 4))
 
@@ -60,23 +70,48 @@ def _level(cell_m: float, cells: int) -> Level:
     return Level(
         cell_m,
         cells,
-        np.zeros((tiles, 64), np.uint8),
-        np.zeros((tiles, LAYERS, 64), np.int32),
-        np.zeros((tiles, LAYERS, 64, 4), np.float32),
+        np.zeros((tiles, LAYERS), np.int32),
+        np.zeros((tiles, LAYERS), np.int64),
+        np.zeros((tiles, LAYERS), np.int32),
+        np.zeros(tiles, np.int32),
+        np.zeros(tiles * 64, np.int64),
+        np.zeros(1, np.int64),
     )
 
 
 @nb.njit(cache=True, nogil=True, inline="always")
 def _tag(ix: int, iy: int, iz: int, shift: int) -> int:
-    """Return a tag, never 0, that tells the cell (ix, iy, iz) from those that share its place in the window."""
+    """Return a tag, never 0, that tells the tile of cell (ix, iy, iz) from those that share its place in the window."""
     return (((ix >> shift) & 0x7FF) << 20 | ((iy >> shift) & 0xFFF) << 8 | ((iz >> 3) & 0xFF)) + 1
 
 
 @nb.njit(cache=True, nogil=True, inline="always")
-def _column(ix: int, iy: int, size: int) -> tuple[int, int]:
-    """Return tile and place in it of the column (ix, iy) in a window of `size`."""
-    jx, jy = ix & (size - 1), iy & (size - 1)
-    return (jx >> 3) * (size >> 3) + (jy >> 3), (jx & 7) << 3 | (jy & 7)
+def _tile(ix: int, iy: int, size: int) -> int:
+    """Return the tile of the column (ix, iy) in a window of `size`."""
+    return ((ix & (size - 1)) >> 3) * (size >> 3) + ((iy & (size - 1)) >> 3)
+
+
+@nb.njit(cache=True, nogil=True)
+def _begin(level, tile, layer, tag):  # type: ignore[no-untyped-def]
+    """Give a tile to another place of the world, with an empty block: the one whose turn it is."""
+    if level.tags[tile, layer] == 0:
+        block = level.used[0] % level.owners.shape[0]
+        level.used[0] += 1
+        owner = level.owners[block]
+        if level.blocks[owner // LAYERS, owner % LAYERS] == block:
+            level.tags[owner // LAYERS, owner % LAYERS] = 0
+            level.cells[owner // LAYERS, owner % LAYERS] = 0
+        level.owners[block] = tile * LAYERS + layer
+        level.blocks[tile, layer] = block
+    level.tags[tile, layer] = tag
+    level.cells[tile, layer] = 0
+
+
+@nb.njit(cache=True, nogil=True, inline="always")
+def _averaged(step: int, offset: float, inverse_n: float) -> int:
+    """Return a mean (steps of a cell) with one more offset (share of a cell) in it, the n-th."""
+    mean = step + (offset * _STEPS - step) * inverse_n
+    return int(min(max(mean + 0.5, 0.0), _STEPS - 1.0))
 
 
 @nb.njit(cache=True, nogil=True)
@@ -85,23 +120,25 @@ def insert(level: Level, points_m: FloatArray, count_limit: float) -> None:
     shift = int(round(math.log2(level.size)))
     inverse = 1.0 / level.cell_m
     for i in range(points_m.shape[0]):
-        fx, fy, fz = points_m[i, 0] * inverse, points_m[i, 1] * inverse, points_m[i, 2] / LAYER_M
+        fx, fy, fz = points_m[i, 0] * inverse, points_m[i, 1] * inverse, points_m[i, 2] * (1.0 / LAYER_M)
         if not (abs(fx) < 1e8 and abs(fy) < 1e8 and abs(fz) < 1e6):
             continue
         ix, iy, iz = int(math.floor(fx)), int(math.floor(fy)), int(math.floor(fz))
-        tile, place = _column(ix, iy, level.size)
-        layer = iz & (LAYERS - 1)
+        tile, place, layer = _tile(ix, iy, level.size), (ix & 7) << 3 | (iy & 7), iz & (LAYERS - 1)
         tag = _tag(ix, iy, iz, shift)
-        cell = level.hits[tile, layer, place]
-        if level.tags[tile, layer, place] != tag:
-            level.tags[tile, layer, place] = tag
-            level.layers[tile, place] |= np.uint8(1 << layer)
-            cell[:] = 0.0
-        n = min(cell[0] + 1.0, count_limit)
-        cell[0] = n
-        cell[1] += (points_m[i, 0] - ix * level.cell_m - cell[1]) / n
-        cell[2] += (points_m[i, 1] - iy * level.cell_m - cell[2]) / n
-        cell[3] += (points_m[i, 2] - iz * LAYER_M - cell[3]) / n
+        if level.tags[tile, layer] != tag:
+            _begin(level, tile, layer, tag)
+        at, bit = level.blocks[tile, layer] * 64 + place, 1 << place
+        hit = level.hits[at] if level.cells[tile, layer] & bit else 0
+        level.cells[tile, layer] |= bit
+        n = min((hit >> 48) + 1.0, count_limit)
+        inverse_n = 1.0 / n
+        level.hits[at] = (
+            int(n) << 48
+            | _averaged(hit >> 32 & 0xFFFF, fz - iz, inverse_n) << 32
+            | _averaged(hit >> 16 & 0xFFFF, fy - iy, inverse_n) << 16
+            | _averaged(hit & 0xFFFF, fx - ix, inverse_n)
+        )
 
 
 @nb.njit(cache=True, nogil=True)
@@ -110,6 +147,16 @@ def insert_all(map_: SurfaceMap, points_m: FloatArray, count_limit: float) -> No
     insert(map_.fine, points_m, count_limit)
     insert(map_.middle, points_m, count_limit)
     insert(map_.coarse, points_m, count_limit)
+
+
+def _trailing_zeros(_context: Any, _bits: Any) -> Any:
+    def code(_context: Any, builder: ir.IRBuilder, _signature: Any, arguments: Any) -> Any:
+        return builder.cttz(arguments[0], ir.Constant(ir.IntType(1), 1))
+
+    return nb.types.int64(nb.types.int64), code
+
+
+_lowest_bit: Any = intrinsic(_trailing_zeros)  # the place of the lowest bit that is set: one instruction
 
 
 @nb.njit(cache=True, nogil=True, inline="always")
@@ -123,6 +170,15 @@ def _neighbours(level: Level, z: float, layered: bool) -> tuple[int, int]:
     return (own - 1, own) if z / LAYER_M - own < 0.5 else (own, own + 1)
 
 
+@nb.njit(cache=True, nogil=True, inline="always")
+def _within(tile_ix: int, tile_iy: int, cx: int, cy: int) -> int:
+    """Return the bits of the cells of a tile that begins at (tile_ix, tile_iy) within the kernel's square around (cx, cy)."""
+    x0, x1 = max(cx - KERNEL_CELLS - tile_ix, 0), min(cx + KERNEL_CELLS - tile_ix, 7)
+    y0, y1 = max(cy - KERNEL_CELLS - tile_iy, 0), min(cy + KERNEL_CELLS - tile_iy, 7)
+    rows = (_COLUMNS << (8 * x0)) & (_COLUMNS >> (8 * (7 - x1)))
+    return ((2 << y1) - (1 << y0)) * rows
+
+
 @nb.njit(cache=True, nogil=True)
 def _gather(level: Level, x: float, y: float, z: float, layered: bool, sums: FloatArray) -> bool:
     """Add up the cells around (x, y, z) with Gaussian weights; False where there are none.
@@ -133,32 +189,32 @@ def _gather(level: Level, x: float, y: float, z: float, layered: bool, sums: Flo
     cx, cy = int(math.floor(x / cell)), int(math.floor(y / cell))
     z_low, z_high = _neighbours(level, z, layered)
     scale, z_scale = -0.5 / (KERNEL_SIGMA_CELLS * cell) ** 2, -0.5 / max(_HEIGHT_SIGMA_M, _HEIGHT_PER_CELL * cell) ** 2
-    reach = (KERNEL_CELLS * cell) ** 2
-    wanted = 0
-    for iz in range(z_low, z_high + 1):
-        wanted |= 1 << (iz & (LAYERS - 1))
+    reach, step_m, layer_step_m = (KERNEL_CELLS * cell) ** 2, cell / _STEPS, LAYER_M / _STEPS
     s0 = s1 = sx = sy = sz = sxx = sxy = syy = 0.0
-    for ix in range(cx - KERNEL_CELLS, cx + KERNEL_CELLS + 1):
-        for iy in range(cy - KERNEL_CELLS, cy + KERNEL_CELLS + 1):
-            tile, place = _column(ix, iy, level.size)
-            if level.layers[tile, place] & wanted == 0:
-                continue
+    for tile_ix in range((cx - KERNEL_CELLS) & ~7, cx + KERNEL_CELLS + 1, 8):
+        for tile_iy in range((cy - KERNEL_CELLS) & ~7, cy + KERNEL_CELLS + 1, 8):
+            tile, near = _tile(tile_ix, tile_iy, level.size), _within(tile_ix, tile_iy, cx, cy)
             for iz in range(z_low, z_high + 1):
                 layer = iz & (LAYERS - 1)
-                if level.tags[tile, layer, place] != _tag(ix, iy, iz, shift):
+                bits = level.cells[tile, layer] & near
+                if bits == 0 or level.tags[tile, layer] != _tag(tile_ix, tile_iy, iz, shift):
                     continue
-                hit = level.hits[tile, layer, place]
-                dx = ix * cell + hit[1] - x
-                dy = iy * cell + hit[2] - y
-                d2 = dx * dx + dy * dy
-                if d2 > reach:
-                    continue
-                dz = iz * LAYER_M + hit[3] - z
-                n = hit[0]
-                w = math.exp(scale * d2 + z_scale * dz * dz) * n / (n + 1.0)
-                wx, wy = w * dx, w * dy
-                s0, s1, sx, sy, sz = s0 + w, s1 + w * w, sx + wx, sy + wy, sz + w * dz
-                sxx, sxy, syy = sxx + wx * dx, sxy + wx * dy, syy + wy * dy
+                block, z_m = level.blocks[tile, layer], iz * LAYER_M - z
+                while bits != 0:
+                    place = _lowest_bit(bits)
+                    bits &= bits - 1
+                    hit = level.hits[block * 64 + place]
+                    dx = (tile_ix + (place >> 3)) * cell - x + (hit & 0xFFFF) * step_m
+                    dy = (tile_iy + (place & 7)) * cell - y + (hit >> 16 & 0xFFFF) * step_m
+                    d2 = dx * dx + dy * dy
+                    if d2 > reach:
+                        continue
+                    dz = z_m + (hit >> 32 & 0xFFFF) * layer_step_m
+                    n = float(hit >> 48)
+                    w = math.exp(scale * d2 + z_scale * dz * dz) * n / (n + 1.0)
+                    wx, wy = w * dx, w * dy
+                    s0, s1, sx, sy, sz = s0 + w, s1 + w * w, sx + wx, sy + wy, sz + w * dz
+                    sxx, sxy, syy = sxx + wx * dx, sxy + wx * dy, syy + wy * dy
     sums[0], sums[1], sums[2], sums[3], sums[4] = s0, s1, sx, sy, sz
     sums[5], sums[6], sums[7] = sxx, sxy, syy
     return s0 > 1e-9

@@ -94,3 +94,34 @@ def test_hits_that_are_not_numbers_stay_out() -> None:
     map_, line = mapped(wall((0.0, 0.0), 0.0), np.array([[np.nan, 0.0, 0.0], [np.inf, 0.0, 0.0]])), np.zeros(LINE)
     assert fit_line(map_.fine, (0.0, 0.0, 0.01), False, 4.0, ROOM, line)
     assert np.isfinite(map_.fine.hits).all()
+
+
+def test_the_oldest_places_are_forgotten_when_the_blocks_are_used_up() -> None:
+    """A drive through more places than there are blocks, one layer of height after the other, keeps the newest."""
+    map_, line = empty_map(CELL_M, 32), np.zeros(LINE)
+    assert len(map_.fine.owners) == 16
+    for layer in range(40):
+        insert(map_.fine, wall((0.1, 0.1), 0.3, (layer + 0.5) * LAYER_M)[90:110], 50.0)
+    newest, oldest = (0.1, 0.1, 39.5 * LAYER_M), (0.1, 0.1, 0.5 * LAYER_M)
+    assert fit_line(map_.fine, newest, False, 2.0, ROOM, line)
+    assert not fit_line(map_.fine, oldest, False, 2.0, ROOM, line)
+    kept = [
+        layer for layer in range(40) if fit_line(map_.fine, (0.1, 0.1, (layer + 0.5) * LAYER_M), False, 2.0, ROOM, line)
+    ]
+    assert kept == list(range(min(kept), 40))
+
+
+@settings(max_examples=30, deadline=None)
+@given(st.integers(1, 120), st.integers(0, 2**32 - 1))
+def test_a_cell_holds_the_mean_of_its_hits(count: int, seed: int) -> None:
+    """Up to the limit; packed into 16 bits a number, each hit may add a step of rounding."""
+    hits = np.random.default_rng(seed).uniform(0.0, [CELL_M, CELL_M, LAYER_M], (count, 3))
+    level = mapped(hits).fine
+    packed = level.hits[level.hits != 0]
+    assert packed.size == 1
+    found = np.array([packed[0] & 0xFFFF, packed[0] >> 16 & 0xFFFF, packed[0] >> 32 & 0xFFFF]) / 65536.0
+    mean = np.zeros(3)
+    for i, hit in enumerate(hits):
+        mean += (hit - mean) / min(i + 1, 50)
+    assert packed[0] >> 48 == min(count, 50)
+    assert found * [CELL_M, CELL_M, LAYER_M] == pytest.approx(mean, abs=0.12 * 20 / 65536)
