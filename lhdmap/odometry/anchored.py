@@ -97,7 +97,8 @@ class AnchoredMatcher:
         self._motion.correct(result.pose, result.information + heading[1] * _HEADING_AXIS)
         if self._jumped and abs(self._motion.velocity[2]) > _SPINNING_RPS:
             self._motion.distrust_velocity(velocity)
-        travelled = float(np.hypot(*(self._motion.pose[:2] - before[:2])))
+        after = self._motion.pose
+        travelled = math.hypot(after[0] - before[0], after[1] - before[1])
         self._motion.forget(1.0 - math.exp(-travelled / self._anchor.memory_m))
         self._grow(points)
         doubtful = self._doubt > 0 or result.support < _DOUBTFUL_SUPPORT
@@ -118,8 +119,9 @@ class AnchoredMatcher:
         """Match from the prediction (and a heading with its information); where that does not fit, search widely."""
         predicted, motion = self._motion.pose, self._motion.prior_information
         information = motion + heading[1] * _HEADING_AXIS
-        error = np.array([0.0, 0.0, heading[1] * se2.wrap(heading[0] - predicted[2])])
-        predicted += np.linalg.solve(information, error)
+        if heading[1] > 0.0:
+            error = np.array([0.0, 0.0, heading[1] * se2.wrap(heading[0] - predicted[2])])
+            predicted += np.linalg.solve(information, error)
         prior = Prior(predicted, information)
         result = match(self._map, hits, prior, predicted, self._model)
         if self._trusted(result):

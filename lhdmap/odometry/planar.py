@@ -36,6 +36,7 @@ class View(NamedTuple):
 
 
 _PLAIN = View()
+Placement = FloatArray | Callable[[], FloatArray]
 
 
 class PlanarOdometry:
@@ -73,14 +74,16 @@ class PlanarOdometry:
         self.points = np.zeros((0, 3))  # hits of the last processed scan, level base frame, heights in odom
 
     def update(
-        self, scan: LaserScan, T_level_sensor: FloatArray, wheels: WheelStep | None = None, view: View = _PLAIN
+        self, scan: LaserScan, T_level_sensor: Placement, wheels: WheelStep | None = None, view: View = _PLAIN
     ) -> OdometryStep:
-        """Process one scan; `T_level_sensor` (4, 4): mount and attitude."""
+        """Process one scan; `T_level_sensor` (4, 4): mount and attitude, or what tells it where the scan is processed."""
         dt_s = self._clock.step(scan.stamp_ns)
         self._fuse(wheels, dt_s)
         self._motion.predict(dt_s)
         if not self._rate.due(dt_s, self._motion.velocity) and not self._clock.bunched:
             return self._step(scan, None)
+        if not isinstance(T_level_sensor, np.ndarray):
+            T_level_sensor = T_level_sensor()
         floor_m = self._settings.min_height_m if T_level_sensor[2, 3] > 2.0 * self._settings.min_height_m else -math.inf
         points = planar_points(scan, T_level_sensor, self._motion.velocity, floor_m, view.boxes_m, self._part(scan))
         points[:, 2] += view.height_m

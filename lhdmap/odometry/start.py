@@ -13,7 +13,7 @@ import numpy as np
 
 from lhdmap.geometry import se2
 from lhdmap.messages import FloatArray, LaserScan
-from lhdmap.odometry.planar import PlanarOdometry, View
+from lhdmap.odometry.planar import Placement, PlanarOdometry, View
 from lhdmap.odometry.steps import OdometryStep, WheelStep
 
 _SPAN_SCANS = 6  # the starting speed is the mean over so many scans
@@ -24,7 +24,7 @@ class ScanInput(NamedTuple):
     """What `PlanarOdometry.update` takes for one scan."""
 
     scan: LaserScan
-    T_level_sensor: FloatArray
+    T_level_sensor: Placement
     wheels: WheelStep | None = None
     view: View = View()
 

@@ -30,6 +30,7 @@ from lhdmap.messages import (
 from lhdmap.odometry.cloud_motion import CloudPrior
 from lhdmap.odometry.cloud_odometry import CloudOdometry, CloudStep
 from lhdmap.odometry.planar import PlanarOdometry, View
+from lhdmap.odometry.rear_view import RearView
 from lhdmap.odometry.scan_points import NO_BOXES, half_sweep_ns
 from lhdmap.odometry.start import ScanInput, starting_velocity
 from lhdmap.odometry.steps import OdometryStep, WheelStep
@@ -199,8 +200,7 @@ class MappingPipeline:
                     self.settings.smoothing, -(self.machine or _DEFAULT_MACHINE).dimensions.joint_to_front_axle_m
                 )
         time_ns = max(stamp_ns + half_sweep_ns(scan), self._time_ns + 1)
-        given = self._input(scan, self._time_ns, time_ns)
-        step = self.odometry.update(*given)
+        step = self.odometry.update(*self._input(scan, self._time_ns, time_ns))
         self._time_ns = time_ns
         self.records.add_scan(scan.stamp_ns, stamp_ns)
         self._hold("front", stamp_ns, scan)
@@ -210,14 +210,14 @@ class MappingPipeline:
             self.smoother.keys.update(time_ns, step.T_odom_base, front, weak=step.degenerate)
             self.path.update(AlignedScan(time_ns, step.T_odom_base, front, rear, weak=step.lost))
             self._record(scan.stamp_ns, time_ns, step)
-            self._look_for_pile(scan, given.T_level_sensor, step)
+            self._look_for_pile(scan, time_ns, step)
             self.sweeps.advance(self.path.final, self.wheels)
 
-    def _look_for_pile(self, scan: LaserScan, T_level_sensor: FloatArray, step: OdometryStep) -> None:
+    def _look_for_pile(self, scan: LaserScan, time_ns: int, step: OdometryStep) -> None:
         if self.pile is not None and self.has_inclinometer:
             x, y, heading = step.T_odom_base
             pose = np.array([x, y, self.track.height_m, heading])
-            self.pile.update(scan_hits(scan, T_level_sensor, step.velocity, self._boxes, pose))
+            self.pile.update(scan_hits(scan, self._placement(scan, time_ns), step.velocity, self._boxes, pose))
 
     def _hold(self, role: str, time_ns: int, sweep: LaserScan | PointCloud) -> None:
         if self._cloud:
@@ -244,11 +244,16 @@ class MappingPipeline:
 
     def _input(self, scan: LaserScan, before_ns: int, time_ns: int) -> ScanInput:
         """Return a scan with all that is known of the machine at `time_ns`, the middle of its sweep."""
-        roll, pitch = self._attitude_at(time_ns)
-        T_level_sensor = level_sensor(self.mounts.of(scan.frame_id, "front"), roll, pitch)
-        rear = partial(self.rear.near, time_ns, roll, pitch) if self.has_inclinometer else None
+        rear = partial(self._behind, time_ns) if self.has_inclinometer else None
         view = View(self.track.height_m, self._boxes, rear)
-        return ScanInput(scan, T_level_sensor, self._wheel_step(before_ns, time_ns), view)
+        return ScanInput(scan, partial(self._placement, scan, time_ns), self._wheel_step(before_ns, time_ns), view)
+
+    def _placement(self, scan: LaserScan, time_ns: int) -> FloatArray:
+        """Return `T_level_sensor` (4, 4) of the front scanner."""
+        return level_sensor(self.mounts.of(scan.frame_id, "front"), *self._attitude_at(time_ns))
+
+    def _behind(self, time_ns: int) -> RearView | None:
+        return self.rear.near(time_ns, *self._attitude_at(time_ns))
 
     def _attitude_at(self, time_ns: int) -> tuple[float, float]:
         """Return roll and pitch; a log without inclinometer, or a gap of it, counts as level."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections import deque
 
 import numpy as np
@@ -59,5 +60,8 @@ class RearScans:
 
     def _articulation(self, time_ns: int) -> float | None:
         angles = self._wheels.articulations_at(time_ns + _AVERAGED_NS)
+        total = float(angles.sum())
+        if math.isfinite(total):
+            return total / len(angles)
         both = np.isfinite(angles) & np.isfinite(angles[::-1])
         return float(angles[both].mean()) if both.any() else None

@@ -23,7 +23,7 @@ from lhdmap.proprioception.wheels import WheelOdometry
 
 ScanSink = Callable[[str, int, FloatArray], None]
 _BATCH_POINTS = 40_000  # sweeps are handed over together: switching between threads costs more than a small sweep
-_MOST_PENDING = 3  # batches handed over and not yet done: bounds the memory
+_MOST_PENDING = 24  # batches handed over and not yet done: bounds the memory; realigned poses come many metres at once
 
 
 class _Sweep(NamedTuple):

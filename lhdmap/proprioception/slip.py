@@ -185,9 +185,11 @@ def _robust_mean(values: FloatArray) -> tuple[float, float]:
     From the median on, values beyond 2.5 sigma (by the median deviation) are left out: outliers that are all on one
     side, as slip makes them, would pull the median itself.
     """
-    centre = float(np.median(values))
+    centre, kept = float(np.median(values)), np.zeros(len(values), dtype=bool)
     for _ in range(5):
-        spread = max(1.4826 * float(np.median(np.abs(values - centre))), 1e-4)
-        kept = values[np.abs(values - centre) <= 2.5 * spread]
-        centre = float(kept.mean())
-    return centre, max(float(kept.std()) / math.sqrt(len(kept)), 0.001)
+        off = np.abs(values - centre)
+        before, kept = kept, off <= 2.5 * max(1.4826 * float(np.median(off)), 1e-4)
+        if np.array_equal(kept, before):
+            break
+        centre = float(values[kept].mean())
+    return centre, max(float(values[kept].std()) / math.sqrt(np.count_nonzero(kept)), 0.001)

@@ -47,9 +47,10 @@ def wall_lines(points):  # type: ignore[no-untyped-def]
         small, large = max(half - root, 0.0), half + root
         if large < 4e-4 or small > 0.3 * large:
             continue
-        along, row = 0.5 * math.atan2(2.0 * xy, xx - yy), out[count]
+        row, cos2 = out[count], difference / root
         row[0], row[1], row[2] = points[i, 0] + mx, points[i, 1] + my, points[i, 2]
-        row[3], row[4], row[5] = -math.sin(along), math.cos(along), small
+        row[3] = -math.copysign(math.sqrt(max(0.5 * (1.0 - cos2), 0.0)), xy)  # half-angle formulas
+        row[4], row[5] = math.sqrt(max(0.5 * (1.0 + cos2), 0.0)), small
         count += 1
     return out[:count].copy()
 

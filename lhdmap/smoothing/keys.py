@@ -38,7 +38,7 @@ class KeyScans:
     def update(self, time_ns: int, pose: FloatArray, points: FloatArray, *, weak: bool) -> None:
         """Take a processed scan: pose (3,) in `odom`, hits (N, 3) in the level base frame."""
         if self._last is not None:
-            self._travelled_m += float(np.hypot(*(pose[:2] - self._last[:2])))
+            self._travelled_m += math.hypot(pose[0] - self._last[0], pose[1] - self._last[1])
         self._last = pose.copy()
         self._weak |= weak
         if self._due(pose) and len(points) > 0:

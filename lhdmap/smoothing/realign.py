@@ -65,7 +65,7 @@ class Realigner:
     def update(self, scan: AlignedScan) -> None:
         """Take a processed scan, in time order."""
         if self._last is not None:
-            self._travelled_m += float(np.hypot(*(scan.pose[:2] - self._last[:2])))
+            self._travelled_m += math.hypot(scan.pose[0] - self._last[0], scan.pose[1] - self._last[1])
         self._last = scan.pose
         self._weak |= scan.weak
         if self._due(scan.time_ns):
