@@ -50,8 +50,7 @@ class Motion:
     @property
     def prior_information(self) -> FloatArray:
         """Inverse of the pose's covariance, shape (3, 3)."""
-        information: FloatArray = np.linalg.inv(self.P[:3, :3] + 1e-12 * np.eye(3)).astype(np.float64)
-        return information
+        return motion_filter.pose_information(self.P)
 
     def predict(self, dt_s: float) -> None:
         """Move on by `dt_s`. After a long gap the old speed says little: the model runs for a second at most."""

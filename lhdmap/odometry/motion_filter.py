@@ -99,6 +99,13 @@ def update_pose(state: FloatArray, P: FloatArray, matched: FloatArray, informati
 
 
 @nb.njit(cache=True)
+def pose_information(P: FloatArray) -> FloatArray:
+    """Return the inverse of the pose's covariance, shape (3, 3)."""
+    information: FloatArray = np.linalg.inv(np.ascontiguousarray(P[:3, :3]) + 1e-12 * np.eye(3)).astype(np.float64)
+    return information
+
+
+@nb.njit(cache=True)
 def forget_pose(P: FloatArray, share: float) -> None:
     """Shrink the pose's uncertainty by `share`: the map that it is relative to is renewed at the pose itself."""
     keep = math.sqrt(max(1.0 - share, 0.0))

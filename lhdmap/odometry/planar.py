@@ -158,10 +158,10 @@ class PlanarOdometry:
     def _weak(self, information: FloatArray) -> bool:
         """Return whether a direction or the heading is not observed well enough by this scan alone."""
         s = self._settings
-        along, across, heading = 1.0 / np.sqrt(np.maximum(information, 1e-12))
+        along, across, heading = (1.0 / math.sqrt(max(value, 1e-12)) for value in information.tolist())
         worse, better = max(along, across), min(along, across)
         one_sided = worse > s.weak_sigma_m and worse > s.weak_ratio * better
-        return bool(one_sided or worse > s.blind_sigma_m or heading > math.radians(s.weak_sigma_deg))
+        return one_sided or worse > s.blind_sigma_m or heading > math.radians(s.weak_sigma_deg)
 
 
 def _planar_mount(T_level_sensor: FloatArray) -> FloatArray:
