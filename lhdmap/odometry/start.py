@@ -6,8 +6,8 @@ see the speed at all. The scans are run twice, the second time from what the fir
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from typing import NamedTuple
+from collections.abc import Sequence
+from typing import NamedTuple, Protocol
 
 import numpy as np
 
@@ -18,6 +18,9 @@ from lhdmap.odometry.steps import OdometryStep, WheelStep
 
 _SPAN_SCANS = 6  # the starting speed is the mean over so many scans
 _LONGEST_SPAN_S = 1.0
+# Share of weak scans from which range flow tells the speed: its information has the noise of the slopes taken out, while a map of
+# a few scans of a smooth wall holds any speed fast.
+_WEAK_SHARE = 0.2
 
 
 class ScanInput(NamedTuple):
@@ -29,23 +32,28 @@ class ScanInput(NamedTuple):
     view: View = View()
 
 
-def starting_velocity(
-    make: Callable[[FloatArray | None], PlanarOdometry], inputs: Sequence[ScanInput]
-) -> FloatArray | None:
-    """Return forward, lateral and turning speed (3,) at the first scan, or None where the scans do not show it.
+class Maker(Protocol):
+    """Makes an odometry with a starting velocity (None: unknown) and a method (empty: as it is set)."""
 
-    `make` builds an odometry with a starting velocity (None: unknown).
-    """
+    def __call__(self, velocity: FloatArray | None, method: str = "") -> PlanarOdometry: ...
+
+
+def starting_velocity(make: Maker, inputs: Sequence[ScanInput]) -> FloatArray | None:
+    """Return forward, lateral and turning speed (3,) at the first scan, or None where the scans do not show it."""
     if len(inputs) < 3:
         return None
-    velocity: FloatArray | None = None
-    for _ in range(2):
-        odometry = make(velocity)
-        steps = [odometry.update(*one) for one in inputs]
-        if any(step.lost for step in steps):
-            return velocity
-        velocity = steps[-1].velocity if velocity is None else _mean_velocity(steps)
-    return velocity
+    steps = _run(make(None), inputs)
+    if any(step.lost for step in steps):
+        return None
+    if np.mean([step.degenerate for step in steps if step.processed]) > _WEAK_SHARE:
+        steps = _run(make(None, "range_flow"), inputs)
+    velocity = steps[-1].velocity
+    steps = _run(make(velocity), inputs)
+    return velocity if any(step.lost for step in steps) else _mean_velocity(steps)
+
+
+def _run(odometry: PlanarOdometry, inputs: Sequence[ScanInput]) -> list[OdometryStep]:
+    return [odometry.update(*one) for one in inputs]
 
 
 def _mean_velocity(steps: Sequence[OdometryStep]) -> FloatArray | None:

@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 from lhdmap.messages import FloatArray
+from lhdmap.odometry.planar import PlanarOdometry
 
 from tools.evaluate.figures import Figure
 from tools.evaluate.worlds import (
@@ -32,7 +33,11 @@ def drive_run(drive: Drive, method: str = "anchored", *, wheels: bool = False, r
     """Run the odometry over one drive."""
     truth, scans = scans_of(drive)
     steps = wheels_of(truth, drive.rate_hz, drive.seed) if wheels else None
-    return run(scans, truth, lambda velocity: odometry(method, velocity, range_noise_m=range_noise_m), steps)
+
+    def make(velocity: FloatArray | None, other: str = "") -> PlanarOdometry:
+        return odometry(other or method, velocity, range_noise_m=range_noise_m)
+
+    return run(scans, truth, make, steps)
 
 
 def ten_metres(run_: Run) -> SegmentErrors:

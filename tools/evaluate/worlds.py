@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import functools
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -14,7 +14,7 @@ from lhdmap.geometry import se2
 from lhdmap.messages import FloatArray, LaserScan
 from lhdmap.odometry.planar import PlanarOdometry
 from lhdmap.odometry.settings import AnchorSettings, OdometrySettings, RangeFlowSettings, SearchSettings
-from lhdmap.odometry.start import ScanInput, starting_velocity
+from lhdmap.odometry.start import Maker, ScanInput, starting_velocity
 from lhdmap.odometry.steps import OdometryStep, WheelStep
 from lhdmap.pipeline.track import Rows, resample
 from lhdmap.simulation.planar import PlanarScanner, PlanarWorld, drift_world, drive_along, simulate_scans
@@ -142,7 +142,7 @@ def odometry(method: str = "anchored", velocity: FloatArray | None = None, **val
 def run(
     scans: Sequence[LaserScan],
     truth: FloatArray,
-    make: Callable[[FloatArray | None], PlanarOdometry],
+    make: Maker,
     wheels: list[WheelStep] | None = None,
 ) -> Run:
     """Send all scans through the odometry as the pipeline does: a dry run first tells the speed at the start.
