@@ -16,7 +16,7 @@ from lhdmap.odometry.motion import FORWARD, TURNING, Motion
 from lhdmap.odometry.rear_view import NO_POINTS, NOTHING_BEHIND, Behind, RearView, behind
 from lhdmap.odometry.scan_points import NO_BOXES, half_sweep_ns, planar_points
 from lhdmap.odometry.settings import AnchorSettings, OdometrySettings, RangeFlowSettings, SearchSettings
-from lhdmap.odometry.steps import Matched, OdometryStep, WheelStep, body_information, marginal_information
+from lhdmap.odometry.steps import Matched, OdometryStep, WheelStep, body_information, inflated, marginal_information
 
 _FIRST_SCANS = 10
 _SHORTEST_STEP_S = 1e-3
@@ -140,6 +140,8 @@ class PlanarOdometry:
         information = marginal_information(body_information(matched.information, pose[2]))
         weak = self._weak(information) or matched.lost or matched.doubtful
         substitute = ("wheels" if self._wheels_used else "motion") if weak else ""
+        if weak:
+            covariance = inflated(covariance, int(np.argmin(information[:2])), self._settings.weak_inflation)
         return OdometryStep(
             stamp_ns,
             time_ns,

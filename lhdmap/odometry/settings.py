@@ -77,6 +77,13 @@ class OdometrySettings:
     blind_sigma_m: float = setting(
         0.03, unit="m", doc="Worse than this is flagged whatever the other direction is.", minimum=0.0
     )
+    weak_inflation: float = setting(
+        3.0,
+        doc="The covariance of a weak direction times this: scan after scan is matched with the same cells of the map, so what is "
+        "wrong with these does not average out.",
+        minimum=1.0,
+        source="measured in smooth walls (docs/odometry.md)",
+    )
     weak_sigma_deg: float = setting(0.2, unit="deg", doc="The same for the heading.", minimum=0.0, source="lhdmap")
     wheel_noise_mps: float = setting(
         0.03, unit="m/s", doc="Noise of the wheels' speed.", minimum=0.001, source="lhdmap"

@@ -21,6 +21,8 @@ _LONGEST_SPAN_S = 1.0
 # Share of weak scans from which range flow tells the speed: its information has the noise of the slopes taken out, while a map of
 # a few scans of a smooth wall holds any speed fast.
 _WEAK_SHARE = 0.2
+_FLOW_EVERY = 2  # scans between the beginnings of such runs
+_DRY_SCANS = 25  # of a run against the map; range flow wants more
 
 
 class ScanInput(NamedTuple):
@@ -35,21 +37,42 @@ class ScanInput(NamedTuple):
 class Maker(Protocol):
     """Makes an odometry with a starting velocity (None: unknown) and a method (empty: as it is set)."""
 
-    def __call__(self, velocity: FloatArray | None, method: str = "") -> PlanarOdometry: ...
+    def __call__(self, velocity: FloatArray | None, method: str = "") -> PlanarOdometry:
+        """Return the odometry."""
 
 
 def starting_velocity(make: Maker, inputs: Sequence[ScanInput]) -> FloatArray | None:
     """Return forward, lateral and turning speed (3,) at the first scan, or None where the scans do not show it."""
     if len(inputs) < 3:
         return None
+    all_inputs, inputs = inputs, inputs[:_DRY_SCANS]
     steps = _run(make(None), inputs)
     if any(step.lost for step in steps):
         return None
     if np.mean([step.degenerate for step in steps if step.processed]) > _WEAK_SHARE:
-        steps = _run(make(None, "range_flow"), inputs)
-    velocity = steps[-1].velocity
+        velocity = _by_flow(make, all_inputs)
+    else:
+        velocity = steps[-1].velocity
     steps = _run(make(velocity), inputs)
     return velocity if any(step.lost for step in steps) else _mean_velocity(steps)
+
+
+def _by_flow(make: Maker, inputs: Sequence[ScanInput]) -> FloatArray:
+    """Return the speed (3,) at the last scan by range flow, the median over runs that begin at one scan or another.
+
+    A run whose first pair is far off stays off; where it begins elsewhere it is not.
+    """
+    late = range(0, len(inputs) // 2, _FLOW_EVERY)
+    runs = [_settled_velocity(_run(make(None, "range_flow"), inputs[first:])) for first in late]
+    found: FloatArray = np.median(runs, axis=0)
+    return found
+
+
+def _settled_velocity(steps: Sequence[OdometryStep]) -> FloatArray:
+    """Return the mean speed (3,) over the second half of a run."""
+    processed = [step for step in steps if step.processed]
+    mean = _between(processed[len(processed) // 2 :])
+    return steps[-1].velocity if mean is None else mean
 
 
 def _run(odometry: PlanarOdometry, inputs: Sequence[ScanInput]) -> list[OdometryStep]:
@@ -58,9 +81,15 @@ def _run(odometry: PlanarOdometry, inputs: Sequence[ScanInput]) -> list[Odometry
 
 def _mean_velocity(steps: Sequence[OdometryStep]) -> FloatArray | None:
     processed = [step for step in steps if step.processed][:_SPAN_SCANS]
+    mean = _between(processed)
+    return processed[-1].velocity if mean is None and processed else mean
+
+
+def _between(processed: Sequence[OdometryStep]) -> FloatArray | None:
+    """Return the mean speed (3,) from the first to the last step, None where that is no time or a long one."""
     dt_s = (processed[-1].time_ns - processed[0].time_ns) * 1e-9 if len(processed) > 1 else 0.0
     if not 0.0 < dt_s < _LONGEST_SPAN_S:
-        return processed[-1].velocity if processed else None
+        return None
     step = se2.between(processed[0].T_odom_base, processed[-1].T_odom_base)
     middle = 0.5 * step[2]
     c, s = np.cos(middle), np.sin(middle)

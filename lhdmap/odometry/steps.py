@@ -84,3 +84,10 @@ def marginal_information(H: FloatArray) -> FloatArray:
         u, v = H[axis, i], H[axis, j]
         out[axis] = max(H[axis, axis] - (u * u * d - 2.0 * u * v * b + v * v * a) / (a * d - b * b), 0.0)
     return out
+
+
+def inflated(covariance: FloatArray, axis: int, factor: float) -> FloatArray:
+    """Return a covariance (3, 3) with the variance of one axis times a factor, correlations kept."""
+    scale = np.ones(3)
+    scale[axis] = math.sqrt(factor)
+    return covariance * np.outer(scale, scale)

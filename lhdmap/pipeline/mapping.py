@@ -49,7 +49,7 @@ from lhdmap.smoothing.realign import AlignedScan
 from lhdmap.smoothing.smoother import Smoother
 
 _DEFAULT_MACHINE = Machine()
-_WARM_SCANS, _FEWEST_WARM_SCANS, _WARM_NS = 25, 6, 1_500_000_000
+_WARM_SCANS, _FEWEST_WARM_SCANS, _WARM_NS = 50, 6, 1_500_000_000
 _TILTED = 0.01  # rise of the scan plane ahead (m/m)
 _QUEUE_SCANS = 2000  # a sensor that stops must not hold back scans without bound
 

@@ -19,7 +19,7 @@ LEVEL = np.eye(4)
 RATE_HZ = 25.0
 ROUGH_M, SMOOTH_M = 0.12, 0.005
 PIECES = ((20.0, 0.0), (12.0 * math.pi / 6, math.pi / 6), (14.0, 0.0))
-WARM_SCANS = 25
+WARM_SCANS = 50
 
 
 class Driven(NamedTuple):
@@ -66,8 +66,8 @@ def along(speeds_mps: FloatArray, start: int = 0) -> FloatArray:
 def run(scans: tuple[LaserScan, ...], truth: FloatArray, method: str = "anchored") -> Driven:
     inputs = [ScanInput(scan, LEVEL) for scan in scans]
 
-    def make(velocity: FloatArray | None, other: str = "") -> PlanarOdometry:
-        return PlanarOdometry(OdometrySettings(method=other or method), velocity=velocity)
+    def make(velocity: FloatArray | None, method: str = method) -> PlanarOdometry:
+        return PlanarOdometry(OdometrySettings(method=method), velocity=velocity)
 
     odometry = make(starting_velocity(make, inputs[:WARM_SCANS]))
     steps = [odometry.update(*one) for one in inputs]

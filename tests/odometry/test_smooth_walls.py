@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
+import pytest
+from lhdmap.geometry import se2
 from lhdmap.messages import FloatArray
 from lhdmap.odometry.planar import PlanarOdometry
 from lhdmap.odometry.settings import AnchorSettings, OdometrySettings
+from lhdmap.odometry.start import ScanInput, starting_velocity
 from lhdmap.simulation.planar import PlanarScanner, drift_world, drive_along, simulate_scans
 
-from tests.odometry.planar_drives import LEVEL
+from tests.odometry.planar_drives import LEVEL, WARM_SCANS, Driven
 
 SPEED_MPS, RATE_HZ = 12.0 / 3.6, 25.0
 
@@ -32,3 +37,57 @@ def test_the_speed_does_not_creep_towards_standing_still() -> None:
     errors = [scale_error_pct(seed) for seed in (401, 402, 403, 404, 405)]
     assert abs(float(np.median(errors))) < 0.4
     assert max(map(abs, errors)) < 1.0
+
+
+def begun(velocity: FloatArray | None, method: str = "anchored") -> PlanarOdometry:
+    return PlanarOdometry(OdometrySettings(method=method), velocity=velocity)
+
+
+@pytest.mark.parametrize(("speed_mps", "rate_hz"), [(12.0 / 3.6, 25.0), (12.0 / 3.6, 50.0), (24.0 / 3.6, 25.0)])
+def test_the_first_scans_tell_the_speed_of_a_machine_that_drives_already(speed_mps: float, rate_hz: float) -> None:
+    """A map of a few scans held any speed fast, zero before all: one drive in ten was taken to stand for its first 10 s."""
+    for seed in range(411, 419):
+        world = drift_world(seed, rms_m=0.005)
+        poses = drive_along(world.centre_line_m, speed_mps, rate_hz)[:WARM_SCANS]
+        scans = simulate_scans(world, poses, PlanarScanner(noise_m=0.012), rate_hz, seed)
+        velocity = starting_velocity(begun, [ScanInput(scan, LEVEL) for scan in scans])
+        assert velocity is not None
+        assert velocity[0] == pytest.approx(speed_mps, rel=0.2)
+
+
+@pytest.mark.parametrize("speed_mps", [0.0, -2.0])
+def test_a_machine_that_stands_or_reverses_is_seen_to(speed_mps: float) -> None:
+    for seed in range(421, 425):
+        world = drift_world(seed, rms_m=0.005)
+        start = drive_along(world.centre_line_m, 5.0, 1.0)[8]
+        back = speed_mps / RATE_HZ * np.arange(WARM_SCANS)
+        poses = start + np.column_stack([back * np.cos(start[2]), back * np.sin(start[2]), 0.0 * back])
+        scans = simulate_scans(world, poses, PlanarScanner(noise_m=0.012), RATE_HZ, seed)
+        velocity = starting_velocity(begun, [ScanInput(scan, LEVEL) for scan in scans])
+        assert velocity is not None
+        assert velocity[0] == pytest.approx(speed_mps, abs=0.5)
+
+
+def smooth_drive(seed: int) -> Driven:
+    world = drift_world(seed, rms_m=0.005)
+    poses = drive_along(world.centre_line_m, SPEED_MPS, RATE_HZ)
+    scans = simulate_scans(world, poses, PlanarScanner(noise_m=0.012), RATE_HZ, seed)
+    inputs = [ScanInput(scan, LEVEL) for scan in scans]
+    stage = begun(starting_velocity(begun, inputs[:WARM_SCANS]))
+    steps = [stage.update(*one) for one in inputs]
+    return Driven(np.array([step.T_odom_base for step in steps]), poses, steps)
+
+
+def test_what_it_says_of_its_error_is_true() -> None:
+    """Half of the errors over 10 m along would be within 0.67 deviations, 95 % within 1.96; it may be more careful than that."""
+    inside = []
+    for seed in (431, 432, 433):
+        run = smooth_drive(seed)
+        path = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(run.truth[:, :2], axis=0).T))])
+        variance = np.cumsum([step.covariance[0, 0] * (1.0 - math.exp(-SPEED_MPS / RATE_HZ)) for step in run.steps])
+        for first in range(0, len(path), 25):
+            last = int(np.searchsorted(path, path[first] + 10.0))
+            if last < len(path):
+                moved, true = (se2.between(p[first], p[last]) for p in (run.estimate, run.truth))
+                inside.append((moved[0] - true[0]) ** 2 < 3.84 * (variance[last] - variance[first]))
+    assert np.mean(inside) > 0.88

@@ -23,7 +23,7 @@ BoolArray = npt.NDArray[np.bool_]
 LEVEL = np.eye(4)
 ROUGH_M, MODERATE_M, SMOOTH_M = 0.12, 0.03, 0.005
 SEEDS = (101, 102, 103)  # worlds that no setting was chosen on
-WARM_SCANS = 25  # of the dry run at the start, as the pipeline takes
+WARM_SCANS = 50  # of the dry run at the start, as the pipeline takes
 _STEP_START_M = 0.5
 
 
