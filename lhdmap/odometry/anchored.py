@@ -32,6 +32,9 @@ _USUAL_RESIDUAL = 0.75  # weighted rms in sigmas that matches have whose noise i
 _NOISE_GAIN = 0.05
 _NOISE_SCALES = (0.8, 6.0)
 _FRONT_STEP = 3  # one in three hits of the front scanner: as exact with the rear one's, and faster
+_FEWEST_AGREEING = 15  # hits
+_GAIN, _FORETOLD_GAIN = 0.02, 0.1  # of support, that a jump must bring
+_FORETOLD_M, _FORETOLD_RAD = 0.2, math.radians(6.0)
 _FLAT_M = 0.02  # a scan whose heights differ by less is planar
 
 
@@ -88,7 +91,7 @@ class AnchoredMatcher:
         self._jumped = False
         hits = self._hits(points, seen)
         result = self._match(hits, heading)
-        if result.support < self._anchor.min_support:
+        if result.support < self._anchor.min_support and not self._at_the_edge(result, hits):
             return self._lose(points, T_base_scanner, result.support)
         self._lost_in_a_row = 0
         self._learn_noise(result.residual_sigmas)
@@ -137,10 +140,11 @@ class AnchoredMatcher:
             self._wide.cell_m,
             math.radians(self._wide.step_deg),
         )
+        gain = _FORETOLD_GAIN if self._foretold() else _GAIN
         # A jump contradicts the prior by definition: it must not hold the match back, so it is weakened here.
         for start in starts[(np.abs(starts) < 1e29).all(axis=1)]:
             found = match(self._map, hits, _weak(prior), start, self._model)
-            if found.support > result.support + 0.02:
+            if found.support > result.support + gain:
                 result, self._doubt, self._jumped = found, _DOUBT_SCANS, True
         return result
 
@@ -163,6 +167,16 @@ class AnchoredMatcher:
         return result.support > 0.6 or (
             result.support > 0.8 * result.covered and result.support > self._anchor.min_support
         )
+
+    def _at_the_edge(self, result: Match, hits: Hits) -> bool:
+        """Return whether the scan sees mostly what the map does not hold yet, and half of that agrees."""
+        agrees = result.support > 0.5 * result.covered and result.support * hits.front >= _FEWEST_AGREEING
+        return agrees and self._foretold()
+
+    def _foretold(self) -> bool:
+        """Return whether the wheels foretell the pose well."""
+        sigma = np.sqrt(np.diag(self._motion.P)[:3])
+        return self._motion.measured and bool(sigma[:2].max() < _FORETOLD_M and sigma[2] < _FORETOLD_RAD)
 
     def _begin(self, points: FloatArray, T_base_scanner: FloatArray) -> Matched:
         """Start the map with one scan; it is the reference for those that follow closely."""
@@ -190,6 +204,8 @@ class AnchoredMatcher:
     def _lose(self, points: FloatArray, T_base_scanner: FloatArray, support: float) -> Matched:
         """Go on by the motion alone; begin a new map at the predicted pose when nothing has fitted for a while."""
         self._lost_in_a_row += 1
+        if self._foretold():
+            self._insert(points)  # the next scan shall not be lost, too
         if self._lost_in_a_row >= _LOST_BEFORE_RESTART:
             self._map = empty_map(self._anchor.cell_m)
             self._recent.clear()

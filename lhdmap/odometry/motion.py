@@ -15,7 +15,7 @@ _GATE_SIGMAS = 4.0
 # Wheels that turn faster than the machine moves slip, for seconds; wheels that say anything else for longer than a moment
 # are right, and the match has run away along a direction that the walls do not fix.
 _SLIP_S, _DISSENT_S = 3.0, 0.5
-_LONGEST_STEP_S = 1.0
+_SHORTEST_STEP_S, _LONGEST_STEP_S = 1e-3, 1.0
 _STARTING_VARIANCE = np.diag([0.2**2, 0.05**2, 0.05**2])  # of a starting velocity from a dry run
 _DISTRUSTED_VARIANCE = np.diag([3.0**2, 0.3**2, 2.0**2])
 _GAP_VARIANCE = np.diag([4.0, 0.1, 0.5])
@@ -32,7 +32,9 @@ class Motion:
             [settings.forward_acceleration, settings.lateral_acceleration, settings.turning_acceleration]
         )
         self.state, self.P = motion_filter.initial(np.zeros(3))
-        self._dissent_s = 0.0
+        self._dissent_s = self._step_s = 0.0
+        self._way, self._joint = np.zeros(3), np.zeros((10, 10))
+        self._measured: set[int] = set()
         if velocity is not None:
             self.state[3:6] = velocity
             self.P[3:6, 3:6] = _STARTING_VARIANCE
@@ -48,6 +50,11 @@ class Motion:
         return self.state[3:6].copy()
 
     @property
+    def measured(self) -> bool:
+        """Whether wheels measured both travel and turn of the step just predicted, and agree with the motion before."""
+        return {FORWARD, TURNING} <= self._measured
+
+    @property
     def prior_information(self) -> FloatArray:
         """Inverse of the pose's covariance, shape (3, 3)."""
         return motion_filter.pose_information(self.P)
@@ -55,17 +62,28 @@ class Motion:
     def predict(self, dt_s: float) -> None:
         """Move on by `dt_s`. After a long gap the old speed says little: the model runs for a second at most."""
         self._dissent_s += dt_s
-        motion_filter.predict(self.state, self.P, min(dt_s, _LONGEST_STEP_S), self._accelerations)
+        steps = min(dt_s, _LONGEST_STEP_S)
+        self._way, self._joint = motion_filter.predict(self.state, self.P, steps, self._accelerations)
+        self._step_s, self._measured = dt_s, set()
         if dt_s > _LONGEST_STEP_S:
             self.P[3:6, 3:6] += _GAP_VARIANCE
 
     def fuse_speed(self, axis: int, measured: float, sigma: float, *, scaled: bool) -> bool:
-        """Fuse a wheel speed; False where it contradicts the motion (slip) and was left out.
+        """Fuse the wheels' mean speed over the step just predicted; False where it contradicts the motion (slip) and was left out.
 
         With `scaled` the wheels' scale is part of the state and learned.
         """
-        nis = motion_filter.update_speed(self.state, self.P, axis, measured, sigma**2, scaled, _GATE_SIGMAS)
+        dt_s, heading = max(self._step_s, _SHORTEST_STEP_S), self.state[2] - 0.5 * self._way[2]
+        direction = np.array([math.cos(heading), math.sin(heading), 0.0] if axis == FORWARD else [0.0, 0.0, 1.0])
+        if dt_s > _LONGEST_STEP_S:
+            self._open(direction, axis)
+        nis = motion_filter.update_way(
+            self.state, self._joint, self._way, direction, measured * dt_s, (sigma * dt_s) ** 2, scaled, _GATE_SIGMAS
+        )
+        self.P[:, :] = self._joint[:7, :7]
         agrees = bool(nis <= _GATE_SIGMAS**2)
+        if agrees:
+            self._measured.add(axis)
         if axis != FORWARD:
             return agrees
         if agrees:
@@ -79,6 +97,15 @@ class Motion:
         motion_filter.update_speed(self.state, self.P, axis, measured, sigma**2, False, math.inf)
         self._dissent_s = 0.0
         return True
+
+    def _open(self, direction: FloatArray, axis: int) -> None:
+        """Let the way of a gap be anything: the model did not run through it."""
+        variance = _GAP_VARIANCE[axis - FORWARD, axis - FORWARD] * self._step_s**2
+        variance = variance if axis == FORWARD else min(variance, math.pi**2)
+        for rows in (slice(0, 3), slice(7, 10)):
+            for columns in (slice(0, 3), slice(7, 10)):
+                self._joint[rows, columns] += variance * np.outer(direction, direction)
+        self._joint[axis, axis] = self.P[axis, axis]
 
     def correct(self, matched: FloatArray, information: FloatArray) -> None:
         """Take over the matched pose (3,), found under the prior, with the match's own `information` (3, 3)."""

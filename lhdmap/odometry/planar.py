@@ -78,8 +78,8 @@ class PlanarOdometry:
     ) -> OdometryStep:
         """Process one scan; `T_level_sensor` (4, 4): mount and attitude, or what tells it where the scan is processed."""
         dt_s = self._clock.step(scan.stamp_ns)
-        self._fuse(wheels, dt_s)
         self._motion.predict(dt_s)
+        self._fuse(wheels, dt_s)
         if not self._rate.due(dt_s, self._motion.velocity) and not self._clock.bunched:
             return self._step(scan, None)
         if not isinstance(T_level_sensor, np.ndarray):

@@ -47,6 +47,13 @@ class WheelSettings:
     pose_drift_deg: float = setting(
         6.0, unit="deg/m", minimum=0.0, doc="Dead reckoning: heading error for each metre driven."
     )
+    pose_time_std_s: float = setting(
+        0.05,
+        unit="s",
+        source="measured: robots' logs (docs/odometry.md)",
+        minimum=0.0,
+        doc="Dead reckoning: by how much the stamps of poses and scans may differ.",
+    )
     max_gap_s: float = setting(0.5, unit="s", minimum=0.01, doc="Tachometer, joints: across a longer gap no motion.")
     max_hold_s: float = setting(0.2, unit="s", minimum=0.0, doc="The last samples stand for this long after them.")
     max_speed_mps: float = setting(15.0, unit="m/s", minimum=0.1, doc="A faster machine is an error of the sensor.")
@@ -85,9 +92,8 @@ class WheelOdometry:
         self._gap_ns, self._hold_ns = round(settings.max_gap_s * 1e9), round(settings.max_hold_s * 1e9)
         self._limits_ns = self._gap_ns, self._hold_ns
         self._bending, self._straight = self._drive_errors()
-        limits = ReckoningLimits(
-            settings.max_speed_mps, settings.max_jump_m, round(settings.max_pose_gap_s * 1e9), self._hold_ns
-        )
+        self._pose_gap_ns = round(settings.max_pose_gap_s * 1e9)
+        limits = ReckoningLimits(settings.max_speed_mps, settings.max_jump_m, self._pose_gap_ns, self._hold_ns)
         self._poses = DeadReckoning(limits, keep_s, self.warnings)
 
     def update(self, message: Tachometer | Joints | WheelPose) -> None:
@@ -106,10 +112,12 @@ class WheelOdometry:
     def ready_until_ns(self, now_ns: int) -> int:
         """Return the latest time up to which later messages will not change a motion any more.
 
-        `now_ns` is the newest stamp of the log. A sensor that has been silent for `max_gap_s` is not waited for.
+        `now_ns` is the newest stamp of the log. A sensor that has been silent for `max_gap_s` (poses: `max_pose_gap_s`) is not
+        waited for.
         """
-        newest = (samples.latest_ns for samples in (self._speeds, self._angles, self._poses.samples))
-        return min((ns for ns in newest if ns is not None and now_ns - ns <= self._gap_ns), default=now_ns)
+        limits = ((self._speeds, self._gap_ns), (self._angles, self._gap_ns), (self._poses.samples, self._pose_gap_ns))
+        newest = ((samples.latest_ns, limit_ns) for samples, limit_ns in limits)
+        return min((ns for ns, limit_ns in newest if ns is not None and now_ns - ns <= limit_ns), default=now_ns)
 
     def speed_at(self, stamp_ns: int) -> float | None:
         """Return the tachometer's speed as it was measured (m/s, not calibrated), or None where there is none."""
@@ -186,7 +194,11 @@ class WheelOdometry:
         delta = self._poses.delta_between(start_ns, end_ns)
         if delta is None:
             return None
-        path_m = math.hypot(delta[0], delta[1])
+        path_m, late = (
+            math.hypot(delta[0], delta[1]),
+            settings.pose_time_std_s / max(abs(end_ns - start_ns) * 1e-9, 0.01),
+        )
         turn = math.hypot(settings.pose_turn_std * delta[2], math.radians(settings.pose_drift_deg) * path_m)
-        along = math.hypot(settings.pose_distance_std * path_m, RESOLUTION)
-        return Motion(delta, motion_covariance(along, along, math.hypot(turn, RESOLUTION), delta), "wheel_pose")
+        turn = math.hypot(turn, late * delta[2], RESOLUTION)
+        along = math.hypot(settings.pose_distance_std * path_m, late * path_m, RESOLUTION)
+        return Motion(delta, motion_covariance(along, along, turn, delta), "wheel_pose")

@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from lhdmap.messages import FloatArray
 from lhdmap.odometry import motion_filter
-from lhdmap.odometry.motion import FORWARD, Motion
+from lhdmap.odometry.motion import FORWARD, TURNING, Motion
 from lhdmap.odometry.settings import OdometrySettings
 
 ACCELERATION = np.array([0.7, 0.1, 1.0])
@@ -55,6 +55,55 @@ def test_white_acceleration_grows_as_it_should() -> None:
     assert np.diag(P)[3:6] == pytest.approx(q * 0.5)
     assert np.diag(P)[:3] == pytest.approx(q * 0.5**3 / 3.0)
     assert [P[0, 3], P[1, 4], P[2, 5]] == pytest.approx(q * 0.5**2 / 2.0)
+
+
+def test_the_way_stands_behind_the_state_with_its_covariances() -> None:
+    """State and way as functions of the state before: the Jacobian, by differences, tells all covariances."""
+    state, P = some_state(4)
+    dt = 0.6
+
+    def both(before: FloatArray) -> FloatArray:
+        after = moved(before, dt)
+        return np.concatenate([after, after[:3] - before[:3]])
+
+    J = np.array([(both(state + step) - both(state - step)) / 2e-6 for step in 1e-6 * np.eye(7)]).T
+    expected, wanted = both(state), J @ P @ J.T
+    way, joint = motion_filter.predict(state, P, dt, np.zeros(3))
+    wanted[6, 6] += 1e-7 * dt
+    assert way == pytest.approx(expected[7:], abs=1e-12)
+    assert pytest.approx(wanted, abs=1e-8) == joint
+
+
+@pytest.mark.parametrize("scaled", [False, True])
+def test_a_measured_way_is_kalmans(scaled: bool) -> None:
+    state, P = some_state(5)
+    way, joint = motion_filter.predict(state, P, 0.6, ACCELERATION)
+    direction, scale = np.array([0.8, 0.6, 0.0]), state[6] if scaled else 1.0
+    h = np.concatenate([np.zeros(7), scale * direction])
+    h[6] = direction @ way if scaled else 0.0
+    S = h @ joint @ h + 0.02**2
+    K = joint @ h / S
+    expected, wanted = np.concatenate([state, way]) + K * 0.1, (np.eye(10) - np.outer(K, h)) @ joint
+    nis = motion_filter.update_way(
+        state, joint, way, direction, float(scale * direction @ way) + 0.1, 0.02**2, scaled, 9.0
+    )
+    assert nis == pytest.approx(0.01 / S)
+    assert np.concatenate([state, way]) == pytest.approx(expected)
+    assert pytest.approx(wanted, abs=1e-12) == joint
+
+
+@pytest.mark.parametrize("dt_s", [0.2, 0.6, 0.9, 5.0])
+def test_wheels_tell_where_the_machine_has_come_to_however_long_it_took(dt_s: float) -> None:
+    """Their mean speed was taken for the speed at the start of the step: after 0.6 s the heading was known to 20 deg only."""
+    motion = Motion(OdometrySettings())
+    motion.predict(dt_s)
+    assert motion.fuse_speed(FORWARD, 0.5 / dt_s, 0.01 / dt_s, scaled=True)
+    assert motion.fuse_speed(TURNING, 0.4 / dt_s, 0.02 / dt_s, scaled=False)
+    assert motion.measured
+    assert np.hypot(motion.pose[0], motion.pose[1]) == pytest.approx(0.5, abs=0.03)
+    assert motion.pose[2] == pytest.approx(0.4, abs=0.02)
+    assert math.sqrt(motion.P[2, 2]) < 0.025
+    assert math.sqrt(motion.P[0, 0]) < 0.03
 
 
 def test_a_speed_update_is_kalmans() -> None:
@@ -104,7 +153,9 @@ def test_the_covariance_stays_symmetric_and_positive(steps: list[tuple[str, floa
         if kind == "p":
             motion.predict(size)
         elif kind == "s":
+            motion.predict(size)
             motion.fuse_speed(FORWARD, 5.0 * value, 0.03, scaled=True)
+            motion.fuse_speed(TURNING, value, 0.03, scaled=False)
         else:
             motion.correct(motion.pose + 0.1 * value, 1e4 * size * np.eye(3))
             motion.forget(min(size, 1.0) * 0.9)

@@ -281,3 +281,15 @@ def test_memory_stays_bounded() -> None:
         wheels.update(Tachometer(k * 10_000_000, 1.0))
     assert len(wheels._speeds._stamps) <= 2048
     assert wheels.motion_between(ns(297.0), ns(299.0)) is not None
+
+
+def test_poses_that_come_slowly_are_waited_for() -> None:
+    """A scanner at 1.6 Hz whose poses come with the scans: silent for 0.6 s, they were not waited for and never used."""
+    wheels = WheelOdometry(WheelSettings(), Machine())
+    for k in range(10):
+        assert wheels.ready_until_ns(ns(0.6 * k)) <= ns(0.6 * max(k - 1, 0))
+        wheels.update(WheelPose(ns(0.6 * k), 0.3 * k, 0.0, 0.0))
+    motion = wheels.motion_between(ns(4.8), ns(5.4))
+    assert motion is not None
+    assert motion.delta[0] == pytest.approx(0.3, abs=1e-6)
+    assert wheels.ready_until_ns(ns(20.0)) == ns(20.0)
