@@ -33,7 +33,8 @@ _NOISE_GAIN = 0.05
 _NOISE_SCALES = (0.8, 6.0)
 _FRONT_STEP = 3  # one in three hits of the front scanner: as exact with the rear one's, and faster
 _FEWEST_AGREEING = 15  # hits
-_GAIN, _FORETOLD_GAIN = 0.02, 0.1  # of support, that a jump must bring
+# Support that a jump must bring more, and have; less than that in a crowd is chance, and wheels know better.
+_GAIN, _FORETOLD_GAIN, _FORETOLD_SUPPORT = 0.02, 0.1, 0.45
 _FORETOLD_M, _FORETOLD_RAD = 0.2, math.radians(6.0)
 _FLAT_M = 0.02  # a scan whose heights differ by less is planar
 
@@ -127,24 +128,19 @@ class AnchoredMatcher:
             predicted += np.linalg.solve(information, error)
         prior = Prior(predicted, information)
         result = match(self._map, hits, prior, predicted, self._model)
-        if self._trusted(result):
-            return self._freed(hits, result, prior)
+        return self._freed(hits, result, prior) if self._trusted(result) else self._searched(hits, result, prior)
+
+    def _searched(self, hits: Hits, result: Match, prior: Prior) -> Match:
+        """Return the best match from all around the prediction, where that is better enough than the one near it."""
         points = hits.points[: hits.front]
         thin = points[:: max(len(points) // self._wide.beams, 1)]
-        starts = search(
-            np.concatenate(self._recent),
-            thin,
-            predicted,
-            information,
-            self._reach(),
-            self._wide.cell_m,
-            math.radians(self._wide.step_deg),
-        )
-        gain = _FORETOLD_GAIN if self._foretold() else _GAIN
+        cell_m, step_rad, seen = self._wide.cell_m, math.radians(self._wide.step_deg), np.concatenate(self._recent)
+        starts = search(seen, thin, prior.pose, prior.information, self._reach(), cell_m, step_rad)
+        least = max(result.support + _FORETOLD_GAIN, _FORETOLD_SUPPORT) if self._foretold() else 0.0
         # A jump contradicts the prior by definition: it must not hold the match back, so it is weakened here.
         for start in starts[(np.abs(starts) < 1e29).all(axis=1)]:
             found = match(self._map, hits, _weak(prior), start, self._model)
-            if found.support > result.support + gain:
+            if found.support > max(least, result.support + _GAIN):
                 result, self._doubt, self._jumped = found, _DOUBT_SCANS, True
         return result
 
