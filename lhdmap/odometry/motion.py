@@ -62,11 +62,12 @@ class Motion:
     def predict(self, dt_s: float) -> None:
         """Move on by `dt_s`. After a long gap the old speed says little: the model runs for a second at most."""
         self._dissent_s += dt_s
-        steps = min(dt_s, _LONGEST_STEP_S)
-        self._way, self._joint = motion_filter.predict(self.state, self.P, steps, self._accelerations)
+        model_s = min(dt_s, _LONGEST_STEP_S)
+        self._way, self._joint = motion_filter.predict(self.state, self.P, model_s, self._accelerations)
         self._step_s, self._measured = dt_s, set()
         if dt_s > _LONGEST_STEP_S:
-            self.P[3:6, 3:6] += _GAP_VARIANCE
+            self._joint[3:6, 3:6] += _GAP_VARIANCE
+            self.P[:, :] = self._joint[:7, :7]
 
     def fuse_speed(self, axis: int, measured: float, sigma: float, *, scaled: bool) -> bool:
         """Fuse the wheels' mean speed over the step just predicted; False where it contradicts the motion (slip) and was left out.
@@ -93,8 +94,9 @@ class Motion:
         slips = measured * speed > 0.0 and abs(measured) > abs(speed)
         if self._dissent_s < (_SLIP_S if slips else _DISSENT_S):
             return False
-        self.P[FORWARD, FORWARD] += (measured - speed) ** 2
-        motion_filter.update_speed(self.state, self.P, axis, measured, sigma**2, False, math.inf)
+        self._joint[FORWARD, FORWARD] += (measured - speed) ** 2
+        motion_filter.update_speed(self.state, self._joint, axis, measured, sigma**2, False, math.inf)
+        self.P[:, :] = self._joint[:7, :7]
         self._dissent_s = 0.0
         return True
 
@@ -105,7 +107,6 @@ class Motion:
         for rows in (slice(0, 3), slice(7, 10)):
             for columns in (slice(0, 3), slice(7, 10)):
                 self._joint[rows, columns] += variance * np.outer(direction, direction)
-        self._joint[axis, axis] = self.P[axis, axis]
 
     def correct(self, matched: FloatArray, information: FloatArray) -> None:
         """Take over the matched pose (3,), found under the prior, with the match's own `information` (3, 3)."""

@@ -52,10 +52,8 @@ def predict(state: FloatArray, P: FloatArray, dt_s: float, acceleration: FloatAr
     P[:, :] = FP @ F.T
     G = np.zeros((SIZE, 3))
     G[0, 0], G[0, 1], G[1, 0], G[1, 1], G[2, 2] = c, -s, s, c, 1.0
-    G[0, 2], G[1, 2] = (
-        -0.375 * dy,
-        0.375 * dx,
-    )  # a turn that is not foretold bends the way: cov(sideways, turn) = q v dt^4 / 8
+    # A turn that is not foretold bends the way: cov(sideways, turn) = q v dt^4 / 8.
+    G[0, 2], G[1, 2] = -0.375 * dy, 0.375 * dx
     for axis in range(3):
         q = acceleration[axis] ** 2
         # white acceleration over dt: the exact covariance of (displacement, velocity)
@@ -80,9 +78,10 @@ def update_speed(
 ) -> float:
     """Fuse one measured body speed (axis 3 forward, 4 lateral, 5 turning), in place; return its squared normalised innovation.
 
-    With `scaled` the measurement is `state[6]` times the speed. Beyond `gate` (sigmas) the measurement is left out.
+    `P`: of the state, or the joint covariance. With `scaled` the measurement is `state[6]` times the speed. Beyond `gate`
+    (sigmas) the measurement is left out.
     """
-    h = np.zeros(SIZE)
+    h = np.zeros(P.shape[0])
     h[axis] = state[6] if scaled else 1.0
     if scaled:
         h[6] = state[axis]
@@ -92,7 +91,7 @@ def update_speed(
     nis = innovation * innovation / S
     if nis <= gate * gate:
         gain = Ph / S
-        state += gain * innovation
+        state += gain[:SIZE] * innovation
         P -= np.outer(gain, Ph)
     return nis
 

@@ -106,6 +106,29 @@ def test_wheels_tell_where_the_machine_has_come_to_however_long_it_took(dt_s: fl
     assert math.sqrt(motion.P[0, 0]) < 0.03
 
 
+def test_one_axis_does_not_undo_what_the_other_did() -> None:
+    """Wheels that disagree for long are believed: the turn that is fused after them took the old covariance back."""
+    motion = Motion(OdometrySettings(), np.array([3.0, 0.0, 0.0]))
+    for _ in range(40):
+        motion.predict(0.04)
+        motion.correct(motion.pose, np.diag([1e6, 1e6, 1e8]))
+        if motion.fuse_speed(FORWARD, 1.0, 0.03, scaled=True):
+            break
+        motion.correct(motion.pose, np.diag([1e6, 1e6, 1e8]))
+    speed, variance = motion.velocity[0], motion.P[FORWARD, FORWARD]
+    motion.fuse_speed(TURNING, 0.0, 0.05, scaled=False)
+    assert speed == pytest.approx(1.0, abs=0.2)
+    assert motion.P[FORWARD, FORWARD] == pytest.approx(variance, rel=0.05)
+
+
+def test_after_a_gap_what_was_not_measured_is_uncertain() -> None:
+    motion = Motion(OdometrySettings(), np.array([1.0, 0.0, 0.0]))
+    motion.predict(5.0)
+    assert motion.fuse_speed(FORWARD, 1.0, 0.03, scaled=True)
+    assert motion.P[4, 4] >= 0.1
+    assert motion.P[TURNING, TURNING] >= 0.5
+
+
 def test_a_speed_update_is_kalmans() -> None:
     state, P = some_state(1)
     h = np.array([0.0, 0.0, 0.0, state[6], 0.0, 0.0, state[3]])
