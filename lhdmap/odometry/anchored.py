@@ -33,8 +33,9 @@ _NOISE_GAIN = 0.05
 _NOISE_SCALES = (0.8, 6.0)
 _FRONT_STEP = 3  # one in three hits of the front scanner: as exact with the rear one's, and faster
 _FEWEST_AGREEING = 15  # hits
-# Support that a jump must bring more, and have; less than that in a crowd is chance, and wheels know better.
-_GAIN, _FORETOLD_GAIN, _FORETOLD_SUPPORT = 0.02, 0.1, 0.45
+# A jump must bring that much more support, and more where wheels speak against it: the logarithm of the odds (Student's t, for
+# wheels that slip or lag) over the nats that support is worth. Measured: crowds win by chance with more, slip stays with less.
+_GAIN, _NATS_PER_SUPPORT, _WHEELS_FREEDOM = 0.02, 22.0, 4.0
 _FORETOLD_M, _FORETOLD_RAD = 0.2, math.radians(6.0)
 _FLAT_M = 0.02  # a scan whose heights differ by less is planar
 
@@ -99,8 +100,9 @@ class AnchoredMatcher:
         if len(hits.points) > hits.front:
             self._joint.update(result, hits, self._model, self._anchor.cell_m, seen.joint_x_m)
         self._motion.correct(result.pose, result.information + heading[1] * _HEADING_AXIS)
-        if self._jumped and abs(self._motion.velocity[2]) > _SPINNING_RPS:
-            self._motion.distrust_velocity(velocity)
+        if self._jumped:
+            spins = abs(self._motion.velocity[2]) > _SPINNING_RPS
+            self._motion.distrust_velocity(velocity if spins else self._motion.velocity)
         after = self._motion.pose
         travelled = math.hypot(after[0] - before[0], after[1] - before[1])
         self._motion.forget(1.0 - math.exp(-travelled / self._anchor.memory_m))
@@ -136,13 +138,21 @@ class AnchoredMatcher:
         thin = points[:: max(len(points) // self._wide.beams, 1)]
         cell_m, step_rad, seen = self._wide.cell_m, math.radians(self._wide.step_deg), np.concatenate(self._recent)
         starts = search(seen, thin, prior.pose, prior.information, self._reach(), cell_m, step_rad)
-        least = max(result.support + _FORETOLD_GAIN, _FORETOLD_SUPPORT) if self._foretold() else 0.0
         # A jump contradicts the prior by definition: it must not hold the match back, so it is weakened here.
         for start in starts[(np.abs(starts) < 1e29).all(axis=1)]:
             found = match(self._map, hits, _weak(prior), start, self._model)
-            if found.support > max(least, result.support + _GAIN):
+            dissent = self._dissent(found, prior) - self._dissent(result, prior)
+            if found.support > result.support + _GAIN + dissent / _NATS_PER_SUPPORT:
                 result, self._doubt, self._jumped = found, _DOUBT_SCANS, True
         return result
+
+    def _dissent(self, result: Match, prior: Prior) -> float:
+        """Return how much (nats) the wheels speak against a pose: with slip and lag, large errors are likelier than normal."""
+        if not self._motion.measured:
+            return 0.0
+        error = result.pose - prior.pose
+        error[2] = se2.wrap(error[2])
+        return 0.5 * _WHEELS_FREEDOM * math.log1p(float(error @ prior.information @ error) / _WHEELS_FREEDOM)
 
     def _freed(self, hits: Hits, result: Match, prior: Prior) -> Match:
         """Match again with a weak prior where the scan contradicts it: motion that no model of the past foretells."""
@@ -153,10 +163,16 @@ class AnchoredMatcher:
         return again if again.support >= result.support else result
 
     def _reach(self) -> FloatArray:
-        """Return how far to search: three sigmas of the prediction within the settings' limits, metres and radians."""
+        """Return how far to search: three sigmas of the prediction within the settings' limits, metres and radians.
+
+        After a gap the wheels' pose may be an old one: all that the settings allow is searched.
+        """
         sigma = np.sqrt(np.diag(self._motion.P)[:3])
-        shift = min(max(3.0 * float(sigma[:2].max()), 0.3), self._wide.reach_m)
-        return np.array([shift, min(max(3.0 * float(sigma[2]), math.radians(20.0)), math.radians(self._wide.turn_deg))])
+        widest = self._wide.reach_m, math.radians(self._wide.turn_deg)
+        if self._motion.after_gap:
+            return np.array(widest)
+        shift = min(max(3.0 * float(sigma[:2].max()), 0.3), widest[0])
+        return np.array([shift, min(max(3.0 * float(sigma[2]), math.radians(20.0)), widest[1])])
 
     def _trusted(self, result: Match) -> bool:
         """Return whether most of the hits that the map covers agree with it."""

@@ -6,7 +6,7 @@ _SHARE_OF_PERIOD = 0.3  # a scan sooner than this part of the period came in a b
 _BUNCHED_SHARE = 0.08  # share of such scans beyond which the stamps are those of delivery, not of measurement
 _FORGET = 0.01
 _PULL = 0.1
-_LONGEST_PERIODS = 12.0
+_LONGEST_PERIODS = 18.0
 _LEARN_SCANS = 30
 _LEAST_S = 1e-6  # stamps nearer than this (made rising by a nanosecond) tell no time: a period has passed
 

@@ -55,6 +55,11 @@ class Motion:
         return {FORWARD, TURNING} <= self._measured
 
     @property
+    def after_gap(self) -> bool:
+        """Whether the step just predicted was longer than the model runs for."""
+        return self._step_s > _LONGEST_STEP_S
+
+    @property
     def prior_information(self) -> FloatArray:
         """Inverse of the pose's covariance, shape (3, 3)."""
         return motion_filter.pose_information(self.P)
@@ -113,7 +118,7 @@ class Motion:
         motion_filter.update_pose(self.state, self.P, matched, information)
 
     def distrust_velocity(self, velocity: FloatArray) -> None:
-        """Go on with this velocity (3,), hardly known: that of a jump is not the machine's and would run away."""
+        """Go on with this velocity (3,), hardly known: that of a jump holds errors of the poses before and would run away."""
         self.state[FORWARD : TURNING + 1] = velocity
         self.P[FORWARD : TURNING + 1, :] = 0.0
         self.P[:, FORWARD : TURNING + 1] = 0.0

@@ -16,6 +16,7 @@ from lhdmap.odometry.motion import FORWARD, TURNING, Motion
 from lhdmap.odometry.rear_view import NO_POINTS, NOTHING_BEHIND, Behind, RearView, behind
 from lhdmap.odometry.scan_points import NO_BOXES, half_sweep_ns, planar_points
 from lhdmap.odometry.settings import AnchorSettings, OdometrySettings, RangeFlowSettings, SearchSettings
+from lhdmap.odometry.stale import StaleWheels
 from lhdmap.odometry.steps import Matched, OdometryStep, WheelStep, body_information, inflated, marginal_information
 
 _FIRST_SCANS = 10
@@ -71,6 +72,7 @@ class PlanarOdometry:
         self._turn = 0
         self._rate = AdaptiveRate(self._settings)
         self._wheels_used = False
+        self.stale = StaleWheels()
         self.points = np.zeros((0, 3))  # hits of the last processed scan, level base frame, heights in odom
 
     def update(
@@ -120,7 +122,7 @@ class PlanarOdometry:
     def _fuse(self, wheels: WheelStep | None, dt_s: float) -> None:
         """Tell the motion model the wheels' mean speeds; slipping wheels contradict it and stay out."""
         self._wheels_used = False
-        if wheels is None or dt_s < _SHORTEST_STEP_S:
+        if wheels is None or dt_s < _SHORTEST_STEP_S or not self.stale.believes(wheels, self._motion.velocity, dt_s):
             return
         s = self._settings
         sigma_mps = math.hypot(wheels.forward_sigma_m / dt_s, s.wheel_noise_mps)

@@ -51,6 +51,7 @@ from lhdmap.smoothing.smoother import Smoother
 _DEFAULT_MACHINE = Machine()
 _WARM_SCANS, _FEWEST_WARM_SCANS, _WARM_NS = 50, 6, 1_500_000_000
 _TILTED = 0.01  # rise of the scan plane ahead (m/m)
+_PATIENCE_SCANS = 3  # after a pause of the whole log, wheels may come within as many scans before they count as silent
 _QUEUE_SCANS = 2000  # a sensor that stops must not hold back scans without bound
 
 
@@ -89,6 +90,7 @@ class MappingPipeline:
         self.has_inclinometer = False
         self._newest_ns = self._time_ns = -(2**62)
         self._clock_ns = -(2**62)
+        self._scan_ns = (self._clock_ns, self._clock_ns)  # of the newest scan: its stamp, and that made rising
         self._disordered = False
         self._attitude_of: tuple[int, tuple[float, float]] = (-(2**63), (0.0, 0.0))
         self._waiting: deque[tuple[LaserScan | PointCloud, int]] = deque()
@@ -100,7 +102,8 @@ class MappingPipeline:
             case LaserScan() | PointCloud() if role == self._primary:
                 self._disordered |= message.stamp_ns < self._newest_ns
                 self._newest_ns = max(self._newest_ns, message.stamp_ns)
-                self._waiting.append((message, self._rising(message.stamp_ns)))
+                self._scan_ns = message.stamp_ns, self._rising(message.stamp_ns)
+                self._waiting.append((message, self._scan_ns[1]))
                 self._process_ready()
             case LaserScan() | PointCloud():
                 self._hold(role, message.stamp_ns, message)
@@ -111,7 +114,7 @@ class MappingPipeline:
             case Tachometer() | Joints():
                 self.wheels.update(message)
             case WheelPose():
-                self.wheels.update(message._replace(stamp_ns=self._rising(message.stamp_ns)))
+                self.wheels.update(message._replace(stamp_ns=self._beside_scan(message.stamp_ns)))
                 self._process_ready()
             case Mount():
                 self.mounts.update(message)
@@ -129,7 +132,11 @@ class MappingPipeline:
     @property
     def warnings(self) -> list[str]:
         """What the stages found odd, in words."""
-        return [*self.mounts.warnings, *self.attitude.warnings.texts(), *self.wheels.warnings.texts()]
+        stale = self.odometry.stale.steps if self.odometry is not None else 0
+        repeated = (
+            [f"wheel odometry: poses are repeated while the machine moves; {stale} steps left out"] if stale else []
+        )
+        return [*self.mounts.warnings, *self.attitude.warnings.texts(), *self.wheels.warnings.texts(), *repeated]
 
     def _take_inclination(self, message: Inclination) -> None:
         if not self.has_inclinometer:
@@ -141,7 +148,8 @@ class MappingPipeline:
 
     def _process_ready(self) -> None:
         """Process the scans whose attitude and wheel motion later messages will not change."""
-        ready_ns = self.wheels.ready_until_ns(self._newest_ns)
+        paused = len(self._waiting) < _PATIENCE_SCANS and self._time_ns > 0
+        ready_ns = self.wheels.ready_until_ns(self._newest_ns, self._time_ns if paused else None)
         if self.has_inclinometer:
             ready_ns = min(ready_ns, self.attitude.ready_until_ns(self._newest_ns))
         if self.clouds is None and self.odometry is None and not self._warm(ready_ns):
@@ -188,6 +196,10 @@ class MappingPipeline:
             stamp_ns = max(stamp_ns, self._clock_ns + 1)
         self._clock_ns = max(self._clock_ns, stamp_ns)
         return stamp_ns
+
+    def _beside_scan(self, stamp_ns: int) -> int:
+        """Return the stamp of a wheel pose, made rising; one that came with a scan stays with it."""
+        return self._scan_ns[1] if stamp_ns == self._scan_ns[0] else self._rising(stamp_ns)
 
     def _process(self, scan: LaserScan | PointCloud, stamp_ns: int) -> None:
         """Run one scan of the primary scanner through all stages; `stamp_ns` is its stamp made rising."""

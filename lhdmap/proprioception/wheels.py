@@ -109,15 +109,16 @@ class WheelOdometry:
         """Set the factor from the tachometer's speed to the machine's, as `SlipEstimator` learns it."""
         self.scale, self.scale_std = scale, scale_std
 
-    def ready_until_ns(self, now_ns: int) -> int:
+    def ready_until_ns(self, now_ns: int, judged_ns: int | None = None) -> int:
         """Return the latest time up to which later messages will not change a motion any more.
 
-        `now_ns` is the newest stamp of the log. A sensor that has been silent for `max_gap_s` (poses: `max_pose_gap_s`) is not
-        waited for.
+        `now_ns` is the newest stamp of the log. A sensor that has been silent for `max_gap_s` (poses: `max_pose_gap_s`) before
+        `judged_ns` is not waited for: the newest stamp, or an older one where the whole log paused.
         """
+        judged_ns = now_ns if judged_ns is None else judged_ns
         limits = ((self._speeds, self._gap_ns), (self._angles, self._gap_ns), (self._poses.samples, self._pose_gap_ns))
         newest = ((samples.latest_ns, limit_ns) for samples, limit_ns in limits)
-        return min((ns for ns, limit_ns in newest if ns is not None and now_ns - ns <= limit_ns), default=now_ns)
+        return min((ns for ns, limit_ns in newest if ns is not None and judged_ns - ns <= limit_ns), default=now_ns)
 
     def speed_at(self, stamp_ns: int) -> float | None:
         """Return the tachometer's speed as it was measured (m/s, not calibrated), or None where there is none."""
@@ -190,15 +191,12 @@ class WheelOdometry:
         return Motion(*drive(speed, articulation, (start_ns, end_ns), self._lengths, self.scale, errors), source)
 
     def _reckoned(self, start_ns: int, end_ns: int) -> Motion | None:
-        settings = self.settings
-        delta = self._poses.delta_between(start_ns, end_ns)
-        if delta is None:
+        settings, step = self.settings, self._poses.step_between(start_ns, end_ns)
+        if step is None:
             return None
-        path_m, late = (
-            math.hypot(delta[0], delta[1]),
-            settings.pose_time_std_s / max(abs(end_ns - start_ns) * 1e-9, 0.01),
-        )
+        delta, late_s = step.delta, settings.pose_time_std_s
+        path_m = math.hypot(delta[0], delta[1])
         turn = math.hypot(settings.pose_turn_std * delta[2], math.radians(settings.pose_drift_deg) * path_m)
-        turn = math.hypot(turn, late * delta[2], RESOLUTION)
-        along = math.hypot(settings.pose_distance_std * path_m, late * path_m, RESOLUTION)
+        turn = math.hypot(turn, late_s * step.turn_rps, RESOLUTION)
+        along = math.hypot(settings.pose_distance_std * path_m, late_s * step.speed_mps, RESOLUTION)
         return Motion(delta, motion_covariance(along, along, turn, delta), "wheel_pose")

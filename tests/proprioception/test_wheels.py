@@ -293,3 +293,23 @@ def test_poses_that_come_slowly_are_waited_for() -> None:
     assert motion is not None
     assert motion.delta[0] == pytest.approx(0.3, abs=1e-6)
     assert wheels.ready_until_ns(ns(20.0)) == ns(20.0)
+
+
+def test_after_a_pause_of_the_whole_log_the_wheels_are_waited_for() -> None:
+    wheels = WheelOdometry(WheelSettings(), Machine())
+    for k in range(10):
+        wheels.update(WheelPose(ns(0.2 * k), 0.1 * k, 0.0, 0.0))
+    assert wheels.ready_until_ns(ns(5.0)) == ns(5.0)
+    assert wheels.ready_until_ns(ns(5.0), judged_ns=ns(1.8)) == ns(1.8)
+
+
+def test_where_a_machine_stops_a_late_pose_is_off_by_what_was_driven_meanwhile() -> None:
+    wheels = WheelOdometry(WheelSettings(), Machine())
+    for k in range(40):
+        wheels.update(WheelPose(ns(0.2 * k), 0.2 * min(k, 10), 0.0, 0.0))
+    stopped, rested = wheels.motion_between(ns(2.0), ns(2.2)), wheels.motion_between(ns(7.0), ns(7.2))
+    assert stopped is not None
+    assert rested is not None
+    assert stopped.delta[0] == rested.delta[0] == 0.0
+    assert math.sqrt(stopped.covariance[0, 0]) > 0.02
+    assert math.sqrt(rested.covariance[0, 0]) < 0.002
