@@ -92,11 +92,19 @@ def _measures(values: dict[str, Any]) -> list[str]:
     if values["width_m"] is not None:
         lines.append(f"width        {values['width_m']:.2f} m{_deviation(values['width_std_m'], 2)}")
     if values["inclination_deg"] is not None:
-        lines.append(f"inclination  {values['inclination_deg']:.1f}°{_deviation(values['inclination_std_deg'], 1)}")
+        lines.append(
+            f"inclination  {values['inclination_deg']:.1f}°{_deviation(values['inclination_std_deg'], 1)}{_over(values)}"
+        )
     if values["volume_m3"] is not None:
         lines.append(f"volume seen  {values['volume_m3']:.1f} m³{_deviation(values['volume_std_m3'], 1)}")
     lines.extend(f"boulder      {one['size_m']:.1f} m" for one in values["boulders"])
     return lines
+
+
+def _over(values: dict[str, Any]) -> str:
+    """Return the heights that the inclination is of, in words."""
+    heights = values.get("inclination_heights_m")
+    return f" (from {max(heights[0], 0.0):.1f} to {heights[1]:.1f} m over the floor)" if heights else ""
 
 
 def _deviation(value: float | None, digits: int) -> str:

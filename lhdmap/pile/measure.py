@@ -62,6 +62,7 @@ def measure(scene: Scene) -> PileEstimate:
         width_std_m=math.hypot(width_std, _WIDTH_DEFINITION_M),
         inclination_deg=inclination_deg,
         inclination_std_deg=std_deg,
+        heights_m=_heights(on[:, 2] - scene.floor_m),
         volume_m3=volume,
         volume_std_m3=volume_std,
         boulders=boulders(scene, seen),
@@ -80,6 +81,12 @@ def _beside_rocks(scene: Scene) -> tuple[Scene, Relief]:
         return scene, seen
     scene = scene.without(hits_on(scene, seen, rocks))
     return scene, relief(scene)
+
+
+def _heights(above_m: FloatArray) -> tuple[float, float]:
+    """Return from where to where hits (N,) over the floor reach, but for one in fifty at each end."""
+    low, high = np.quantile(above_m, (0.02, 0.98))
+    return float(low), float(high)
 
 
 def _unseen_deg(face: Face, floor_m: float, z: FloatArray) -> float:

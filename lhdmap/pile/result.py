@@ -33,9 +33,10 @@ class PileEstimate:
     """One estimate of the pile; lengths in metres in the frame `map`.
 
     `probabilities`: of each status, they add up to 1. `inclination_deg` has the sign of Table 6: 0 is floor, -50 a pile, -90 a
-    wall, beyond an overhang. `left_limit_m`, `right_limit_m` (3,): E_L and E_R at the toe. `toe_m` (K, 3): the toe from left to
-    right. `face_m` (N, 3): points of the face; `residuals_m` (N,): how far they stand out of the fitted face towards the
-    machine. What is not known is NaN.
+    wall, beyond an overhang; `heights_m`: lowest and highest of the heights over the floor at the toe that it was fitted to.
+    `left_limit_m`, `right_limit_m` (3,): E_L and E_R at the toe. `toe_m` (K, 3): the toe from left to right. `face_m` (N, 3):
+    points of the face; `residuals_m` (N,): how far they stand out of the fitted face towards the machine. What is not known is
+    NaN.
     """
 
     status: str = "none"
@@ -47,6 +48,7 @@ class PileEstimate:
     width_std_m: float = math.nan
     inclination_deg: float = math.nan
     inclination_std_deg: float = math.nan
+    heights_m: tuple[float, float] = (math.nan, math.nan)
     volume_m3: float = math.nan
     volume_std_m3: float = math.nan
     boulders: tuple[Boulder, ...] = ()
@@ -117,6 +119,7 @@ def estimate_json(estimate: PileEstimate) -> dict[str, Any]:
         "width_std_m": _number(estimate.width_std_m),
         "inclination_deg": _number(estimate.inclination_deg),
         "inclination_std_deg": _number(estimate.inclination_std_deg),
+        "inclination_heights_m": _vector(np.array(estimate.heights_m)),
         "volume_m3": _number(estimate.volume_m3),
         "volume_std_m3": _number(estimate.volume_std_m3),
         "frame": FRAME,

@@ -77,6 +77,12 @@ def _picture(figure: Figure, caption: str) -> str:
     return markup.picture(charts.svg_uri(figure), caption)
 
 
+def _over(heights_m: tuple[float, float]) -> str:
+    """Return the heights that an inclination is of, in words."""
+    low, high = heights_m
+    return f", seen from {max(low, 0.0):.1f} to {high:.1f} m over the floor" if math.isfinite(high) else ""
+
+
 def _figures(report: PileReport, pile: PileEstimate) -> Iterator[tuple[str, str, str]]:
     """Yield name, value and meaning of the headline figures; ± is one standard deviation."""
     chance = 100.0 * pile.probabilities.get(pile.status, 0.0)
@@ -84,7 +90,7 @@ def _figures(report: PileReport, pile: PileEstimate) -> Iterator[tuple[str, str,
     if pile.found:
         width = f"{_deviation(pile.width_std_m, 2, ' m')}, one standard deviation; wall to wall before the face"
         yield "width", f"{pile.width_m:.2f} m", width
-        slope = f"{_deviation(pile.inclination_std_deg, 1, '°')}; 0 is the floor, -90 an upright wall"
+        slope = f"{_deviation(pile.inclination_std_deg, 1, '°')}{_over(pile.heights_m)}; 0 is the floor, -90 an upright wall"
         yield "inclination", f"{pile.inclination_deg:.1f}°", slope
     if math.isfinite(pile.volume_m3):
         volume = f"{_deviation(pile.volume_std_m3, 1, ' m³')}; above the floor, as far up as the face was seen"

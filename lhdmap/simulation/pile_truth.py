@@ -131,10 +131,22 @@ def _front_m(bodies: Bodies, floor_m: float) -> float:
     return float(points[seen, 0].min()) if seen.any() else 0.0
 
 
-def _face_hits(bodies: Bodies, floor_m: float) -> tuple[FloatArray, FloatArray]:
+def plane_over(world: DriftWorld, truth: PileTruth, heights_m: tuple[float, float]) -> FacePlane | None:
+    """Return the face as the definition has it, but over other heights above the floor at the toe: those that were seen.
+
+    What differs from the truth then is what a perfect observer of these heights would be off by. None where they hold no face.
+    """
+    assert world.pile is not None, "the scenario has no pile"  # noqa: S101
+    floor_m = truth.floor_m - float(world.pile.frame.origin_m[2])
+    return fit_face(*_face_hits(Bodies(world, world.pile), floor_m, heights_m))
+
+
+def _face_hits(
+    bodies: Bodies, floor_m: float, heights_m: tuple[float, float] = FACE_HEIGHTS_M
+) -> tuple[FloatArray, FloatArray]:
     """Return first hits on the face along the drift: x (N,) and the grid's (y, z) (N, 2), frame of the foot."""
     half = 0.5 * CELL_M
-    rows = np.arange(floor_m + FACE_HEIGHTS_M[0] + half, floor_m + FACE_HEIGHTS_M[1], CELL_M)
+    rows = np.arange(floor_m + heights_m[0] + half, floor_m + heights_m[1], CELL_M)
     reach = bodies.drift.settings.half_width_m + 2.0
     columns = np.arange(-reach, reach, CELL_M)
     z, y = np.meshgrid(rows, columns, indexing="ij")

@@ -17,7 +17,7 @@ from lhdmap.pile.result import PileEstimate, PileReport, Snapshot, estimate_json
 from lhdmap.pile.settings import PileSettings
 from lhdmap.pile.stage import PileStage
 
-from tests.pile.cast_drift import EXACT, STEP_M, TOE_M, Box, CastDrift, Segments, drive, last_of
+from tests.pile.cast_drift import EXACT, STEP_M, TILT_RAD, TOE_M, Box, CastDrift, Segments, drive, last_of
 
 KEYS = {
     *("status", "center_m", "left_limit_m", "right_limit_m", "width_m", "inclination_deg", "width_std_m"),
@@ -174,6 +174,18 @@ def _grow(values: FloatArray) -> float:
 def test_deviations_shrink_on_the_way() -> None:
     found = [one.estimate.inclination_std_deg for one in driven(CastDrift(45.0)).history if one.estimate.found]
     assert _grow(np.array(found)) < 0.6
+
+
+def test_it_says_which_heights_of_the_face_were_seen() -> None:
+    """A scanner 1.8 m high that looks down by 2.5° climbs a face of 45° from 0.28 m at 36 m to 1.16 m at 15 m."""
+    drift = CastDrift(45.0, wave_rad=0.0)
+    found = [one for one in driven(drift).history if one.estimate.found]
+    near = min(found, key=lambda one: abs(one.distance_m - 15.0))
+    low, high = near.estimate.heights_m
+    tilt = math.tan(TILT_RAD)
+    for height, distance_m in ((low, TOE_M), (high, near.distance_m)):
+        assert height == pytest.approx((1.8 - (distance_m - 1.5) * tilt) / (1.0 + tilt), abs=0.06)
+    assert estimate_json(near.estimate)["inclination_heights_m"] == [low, high]
 
 
 def test_json_holds_the_contract() -> None:

@@ -23,6 +23,8 @@ from lhdmap.pipeline.identify import identify
 from lhdmap.simulation.drive import simulate_drift
 from lhdmap.simulation.pile_facts import PileTruth
 from lhdmap.simulation.pile_scenes import scene
+from lhdmap.simulation.pile_truth import plane_over
+from lhdmap.simulation.world import DriftWorld
 
 RESULT = Path(__file__).resolve().parents[2] / "evaluation" / "pile.md"
 MAIN = ("normal", "stope", "too_shallow", "wall", "hang_up", "boulder")
@@ -54,6 +56,7 @@ class Row(NamedTuple):
     width_sigmas: float
     inclination_sigmas: float
     far_deg: float
+    bound_deg: float
     loadable: float
     boulders: tuple[int, int]
 
@@ -62,7 +65,8 @@ def rows_of(job: tuple[str, int]) -> list[Row]:
     """Simulate a scene and measure it with both kinds of poses."""
     variant, seed = job
     with tempfile.TemporaryDirectory() as folder:
-        drive = simulate_drift(scene(variant, seed), Path(folder) / "scene.mcap")
+        scenario = scene(variant, seed)
+        drive = simulate_drift(scenario, Path(folder) / "scene.mcap")
         if drive.pile is None:
             return []
         distances = drive.pile.distances_m(drive.truth.positions_m)
@@ -71,19 +75,20 @@ def rows_of(job: tuple[str, int]) -> list[Row]:
             int(stamps[np.flatnonzero(distances <= limit)[0]]) if (distances <= limit).any() else 0
             for limit in (15.0, 25.0)
         ]
+        world = DriftWorld(scenario)
         return [
-            _row(variant, poses, drive.pile, identify(drive.log, Settings(), given), at)
+            _row((variant, poses), (world, drive.pile), identify(drive.log, Settings(), given), at)
             for poses, given in POSES.items()
         ]
 
 
-def _row(variant: str, poses: str, truth: PileTruth, report: PileReport, at_ns: Sequence[int]) -> Row:
+def _row(kind: tuple[str, str], scene_: tuple[DriftWorld, PileTruth], report: PileReport, at_ns: Sequence[int]) -> Row:
+    world, truth = scene_
     near, far = (_until(report, stamp_ns) for stamp_ns in at_ns)
     best, early = near or PileEstimate(), far or PileEstimate()
     width, slope = best.width_m - truth.width_m, best.inclination_deg - truth.inclination_deg
     return Row(
-        variant,
-        poses,
+        *kind,
         truth.status,
         best.status,
         width,
@@ -91,9 +96,19 @@ def _row(variant: str, poses: str, truth: PileTruth, report: PileReport, at_ns: 
         width / best.width_std_m,
         slope / best.inclination_std_deg,
         early.inclination_deg - truth.inclination_deg if early.status != "none" else np.nan,
+        _bound_deg(world, truth, best),
         best.probabilities.get("loadable", 0.0),
         (len(truth.boulders), len(best.boulders)),
     )
+
+
+def _bound_deg(world: DriftWorld, truth: PileTruth, seen: PileEstimate) -> float:
+    """Return by how much the mesh's own slope over the heights that were seen differs from that over the defined ones."""
+    if not seen.found or not np.isfinite(truth.inclination_deg):
+        return np.nan
+    low, high = (min(max(height, 0.2), 1.6) for height in seen.heights_m)
+    plane = plane_over(world, truth, (low, high)) if high - low > 0.25 else None
+    return np.nan if plane is None else plane.inclination_deg - truth.inclination_deg
 
 
 def _until(report: PileReport, stamp_ns: int) -> PileEstimate | None:
@@ -109,6 +124,11 @@ def _statistics(values: Sequence[float]) -> str:
     return f"{np.median(known):.2f} | {known.mean():.2f} | {np.percentile(known, 90):.2f}"
 
 
+def _bound(rows: Sequence[Row]) -> str:
+    known = np.abs([row.bound_deg for row in rows if np.isfinite(row.bound_deg)])
+    return f"{known.mean():.2f} / {np.percentile(known, 90):.2f}" if known.size else "-"
+
+
 def _line(variant: str, poses: str, rows: Sequence[Row]) -> str:
     sigmas = [
         [abs(row.width_sigmas) <= 2.0, abs(row.inclination_sigmas) <= 2.0]
@@ -122,7 +142,8 @@ def _line(variant: str, poses: str, rows: Sequence[Row]) -> str:
     seen = f"{sum(row.boulders[1] > 0 for row in rows)} of {len(rows)}"
     return (
         f"| {variant} | {poses} | {measured} of {len(rows)} | {_statistics([row.width_m for row in rows])} "
-        f"| {_statistics([row.inclination_deg for row in rows])} | {inside} | {_statistics([row.far_deg for row in rows])} "
+        f"| {_statistics([row.inclination_deg for row in rows])} | {_bound(rows)} | {inside} "
+        f"| {_statistics([row.far_deg for row in rows])} "
         f"| {100 * right:.0f} | {confident} | {seen} |"
     )
 
@@ -133,12 +154,14 @@ def table(rows: Sequence[Row], seeds: str) -> str:
         "# The ore pile\n\nWritten by `python -m tools.evaluate.pile`; not edited by hand. Scenes of `lhdmap simulate pile` "
         f"({seeds}); truth from the mesh. At a true 15 m from the toe: scenes in which a face with a true inclination was "
         "measured, of all; of these errors of width (m) and inclination (deg) as median, mean "
-        "and 90th percentile of the absolute value, share within two standard deviations (width/inclination, %), "
+        "and 90th percentile of the absolute value; bound (mean / p90): by how much the slope of the "
+        "mesh itself over the heights that were seen until then differs from the defined one; "
+        "share within two standard deviations (width/inclination, %), "
         "inclination at 25 m (of those that were measured there), status right (%), "
         "scenes that are not loadable and called so with more than 90 %, scenes with a boulder found.\n\n"
-        "| variant | poses | measured | width median | mean | p90 | inclination median | mean | p90 | in 2 σ "
+        "| variant | poses | measured | width median | mean | p90 | inclination median | mean | p90 | bound | in 2 σ "
         "| 25 m: median | mean | p90 "
-        "| status | falsely loadable | boulders |\n" + "|---" * 16 + "|\n"
+        "| status | falsely loadable | boulders |\n" + "|---" * 17 + "|\n"
     )
     lines = []
     for variant in (*MAIN, *HARD):
