@@ -124,6 +124,11 @@ def _statistics(values: Sequence[float]) -> str:
     return f"{np.median(known):.2f} | {known.mean():.2f} | {np.percentile(known, 90):.2f}"
 
 
+def _largest(values: Sequence[float]) -> str:
+    known = np.abs([value for value in values if np.isfinite(value)])
+    return f"{known.max():.1f}" if known.size else "-"
+
+
 def _bound(rows: Sequence[Row]) -> str:
     known = np.abs([row.bound_deg for row in rows if np.isfinite(row.bound_deg)])
     return f"{known.mean():.2f} / {np.percentile(known, 90):.2f}" if known.size else "-"
@@ -143,7 +148,8 @@ def _line(variant: str, poses: str, rows: Sequence[Row]) -> str:
     return (
         f"| {variant} | {poses} | {measured} of {len(rows)} | {_statistics([row.width_m for row in rows])} "
         f"| {_statistics([row.inclination_deg for row in rows])} | {_bound(rows)} | {inside} "
-        f"| {_statistics([row.far_deg for row in rows])} "
+        f"| {sum(bool(np.isfinite(row.far_deg)) for row in rows)} of {len(rows)} "
+        f"| {_statistics([row.far_deg for row in rows])} | {_largest([row.far_deg for row in rows])} "
         f"| {100 * right:.0f} | {confident} | {seen} |"
     )
 
@@ -157,11 +163,11 @@ def table(rows: Sequence[Row], seeds: str) -> str:
         "and 90th percentile of the absolute value; bound (mean / p90): by how much the slope of the "
         "mesh itself over the heights that were seen until then differs from the defined one; "
         "share within two standard deviations (width/inclination, %), "
-        "inclination at 25 m (of those that were measured there), status right (%), "
+        "inclination at 25 m where a status other than none was reported, status right at 15 m (%), "
         "scenes that are not loadable and called so with more than 90 %, scenes with a boulder found.\n\n"
         "| variant | poses | measured | width median | mean | p90 | inclination median | mean | p90 | bound | in 2 σ "
-        "| 25 m: median | mean | p90 "
-        "| status | falsely loadable | boulders |\n" + "|---" * 17 + "|\n"
+        "| 25 m: reported | median | mean | p90 | largest "
+        "| status | falsely loadable | boulders |\n" + "|---" * 19 + "|\n"
     )
     lines = []
     for variant in (*MAIN, *HARD):
