@@ -82,7 +82,7 @@ class Motion:
         dt_s, heading = max(self._step_s, _SHORTEST_STEP_S), self.state[2] - 0.5 * self._way[2]
         direction = np.array([math.cos(heading), math.sin(heading), 0.0] if axis == FORWARD else [0.0, 0.0, 1.0])
         if dt_s > _LONGEST_STEP_S:
-            self._open(direction, axis)
+            self._open(direction, _GAP_VARIANCE[axis - FORWARD, axis - FORWARD] * dt_s**2)
         nis = motion_filter.update_way(
             self.state, self._joint, self._way, direction, measured * dt_s, (sigma * dt_s) ** 2, scaled, _GATE_SIGMAS
         )
@@ -99,16 +99,24 @@ class Motion:
         slips = measured * speed > 0.0 and abs(measured) > abs(speed)
         if self._dissent_s < (_SLIP_S if slips else _DISSENT_S):
             return False
-        self._joint[FORWARD, FORWARD] += (measured - speed) ** 2
-        motion_filter.update_speed(self.state, self._joint, axis, measured, sigma**2, False, math.inf)
+        self._override(direction, measured, sigma)
         self.P[:, :] = self._joint[:7, :7]
         self._dissent_s = 0.0
         return True
 
-    def _open(self, direction: FloatArray, axis: int) -> None:
-        """Let the way of a gap be anything: the model did not run through it."""
-        variance = _GAP_VARIANCE[axis - FORWARD, axis - FORWARD] * self._step_s**2
-        variance = variance if axis == FORWARD else min(variance, math.pi**2)
+    def _override(self, direction: FloatArray, measured: float, sigma: float) -> None:
+        """Believe the wheels' speed: the way of this step was foretold wrongly, too."""
+        dt_s = max(self._step_s, _SHORTEST_STEP_S)
+        self._open(direction, (measured * dt_s - float(direction @ self._way)) ** 2)
+        motion_filter.update_way(
+            self.state, self._joint, self._way, direction, measured * dt_s, (sigma * dt_s) ** 2, False, math.inf
+        )
+        self._joint[FORWARD, FORWARD] += (measured - float(self.state[FORWARD])) ** 2
+        motion_filter.update_speed(self.state, self._joint, FORWARD, measured, sigma**2, False, math.inf)
+
+    def _open(self, direction: FloatArray, variance: float) -> None:
+        """Let the way along a direction be anything within a variance: the model does not tell it."""
+        variance = variance if direction[2] == 0.0 else min(variance, math.pi**2)
         for rows in (slice(0, 3), slice(7, 10)):
             for columns in (slice(0, 3), slice(7, 10)):
                 self._joint[rows, columns] += variance * np.outer(direction, direction)
