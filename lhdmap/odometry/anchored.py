@@ -14,6 +14,7 @@ from lhdmap.odometry.motion import Motion
 from lhdmap.odometry.rear_view import NO_POINTS, NOTHING_BEHIND, Behind, JointOffset
 from lhdmap.odometry.search import search
 from lhdmap.odometry.settings import AnchorSettings, OdometrySettings, RangeFlowSettings, SearchSettings
+from lhdmap.odometry.slant import NO_RISE, slants
 from lhdmap.odometry.steps import BY_DEFINITION, Matched, marginal_information
 from lhdmap.odometry.surface_map import empty_map, insert_all
 
@@ -76,10 +77,16 @@ class AnchoredMatcher:
         self._turn = 0
         self.behind = NO_POINTS  # the rear hits of the last scan, shape (N, 3), level base frame
 
-    def step(self, points: FloatArray, T_base_scanner: FloatArray, seen: Behind = NOTHING_BEHIND) -> Matched:
+    def step(
+        self,
+        points: FloatArray,
+        T_base_scanner: FloatArray,
+        seen: Behind = NOTHING_BEHIND,
+        rise: FloatArray = NO_RISE,
+    ) -> Matched:
         """Match points (N, 3), level base frame with absolute heights, at the predicted pose; correct the motion, grow the map.
 
-        What is `seen` behind helps a tilted scanner.
+        A tilted scanner, whose plane rises by `rise` (2,), is helped by what is `seen` behind.
         """
         if not self._layered and len(points) and np.ptp(points[:, 2]) > _FLAT_M:
             self._layered = True  # coarse cells of a tilted scanner mix heights
@@ -91,7 +98,7 @@ class AnchoredMatcher:
         heading = self._young_heading(points, T_base_scanner)
         before, velocity = self._motion.pose, self._motion.velocity
         self._jumped = False
-        hits = self._hits(points, seen)
+        hits = self._hits(points, seen, rise)
         result = self._match(hits, heading)
         if result.support < self._anchor.min_support and not self._at_the_edge(result, hits):
             return self._lose(points, T_base_scanner, result.support)
@@ -112,14 +119,18 @@ class AnchoredMatcher:
         residual_m = result.residual_sigmas * self._noise_m
         return Matched(result.information, residual_m, result.support, lost=False, doubtful=doubtful)
 
-    def _hits(self, points: FloatArray, seen: Behind) -> Hits:
+    def _hits(self, points: FloatArray, seen: Behind, rise: FloatArray) -> Hits:
         """Return what is matched: a level scanner sees the same curve of the walls again by itself."""
         self.behind = NO_POINTS
-        if not self._layered or not len(seen.points):
-            return Hits(points, len(points), self._layered)
+        if not self._layered:
+            return Hits(points, len(points), layered=False)
+        along = slants(points, rise)
+        if not len(seen.points):
+            return Hits(points, len(points), True, along)
         self._turn = (self._turn + 1) % _FRONT_STEP
         front, self.behind = points[self._turn :: _FRONT_STEP], self._joint.turned(seen)
-        return Hits(np.concatenate([front, self.behind]), len(front), True)
+        both = np.concatenate([along[self._turn :: _FRONT_STEP], slants(self.behind, rise)])
+        return Hits(np.concatenate([front, self.behind]), len(front), True, both)
 
     def _match(self, hits: Hits, heading: tuple[float, float]) -> Match:
         """Match from the prediction (and a heading with its information); where that does not fit, search widely."""

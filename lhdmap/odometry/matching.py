@@ -14,6 +14,7 @@ from lhdmap.odometry.surface_map import LINE, fit_line
 # Finest cells that a pose may move before lines are fitted anew. Where the walls hold: measured, no loss, half the time. Where
 # they hardly do, one step corrects only a part of an error along them, and what pulls towards standing still adds up.
 _LINES_HOLD, _WEAK_LINES_HOLD = 0.3, 0.03
+NO_SLANTS = np.zeros((0, 2))
 _WEAK_M = 0.003  # deviation of a match in its worse direction from which walls hardly hold
 
 
@@ -32,13 +33,14 @@ class MatchModel(NamedTuple):
 class Hits(NamedTuple):
     """Points (N, 3) in the level base frame, heights absolute; `front`: how many come from the front scanner, which are first.
 
-    `layered`: the scanner tilts, heights matter. Other scanners' hits help to place the scan; how well it fits is judged by
-    the front one's alone.
+    `layered`: the scanner tilts, heights matter; then `slants` (N, 2) are those of `lhdmap.odometry.slant`. Other scanners'
+    hits help to place the scan; how well it fits is judged by the front one's alone.
     """
 
     points: FloatArray
     front: int
     layered: bool
+    slants: FloatArray = NO_SLANTS
 
 
 class Prior(NamedTuple):
@@ -98,6 +100,18 @@ def line_weight(line, distance2, incidence2, fine_m, model):  # type: ignore[no-
     return robust, robust / variance
 
 
+@nb.njit(cache=True, nogil=True, inline="always")
+def slanted(hits, i, line, c, s, nx, ny):  # type: ignore[no-untyped-def]
+    """Return how far (m) along the normal (nx, ny) hit `i` moves when it is put beside what it is like at the line's height.
+
+    `c`, `s`: cosine and sine of the heading.
+    """
+    if not hits.layered:
+        return 0.0
+    x, y = hits.slants[i, 0], hits.slants[i, 1]
+    return line[7] * (nx * (c * x - s * y) + ny * (s * x + c * y))
+
+
 @nb.njit(cache=True, nogil=True)
 def _eliminate(patch, lean, sums):  # type: ignore[no-untyped-def]
     """Take the unknown lean of a patch of wall out of the sums of the equations, and begin the next patch.
@@ -154,6 +168,7 @@ def normal_equations(pose, hits, lines, fine_m, model, H, b):  # type: ignore[no
         if towards < 0.0:  # one sign for all normals: a lean moves a patch as a whole
             nx, ny = -nx, -ny
         d = nx * (pose[0] + rx - lines[i, 0]) + ny * (pose[1] + ry - lines[i, 1])
+        d += slanted(hits, i, lines[i], c, s, nx, ny)
         robust, w = line_weight(lines[i], d * d, towards * towards / (rx * rx + ry * ry + 1e-12), fine_m, model)
         if w == 0.0:
             continue

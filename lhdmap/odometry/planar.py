@@ -16,6 +16,7 @@ from lhdmap.odometry.motion import FORWARD, TURNING, Motion
 from lhdmap.odometry.rear_view import NO_POINTS, NOTHING_BEHIND, Behind, RearView, behind
 from lhdmap.odometry.scan_points import NO_BOXES, half_sweep_ns, planar_points
 from lhdmap.odometry.settings import AnchorSettings, OdometrySettings, RangeFlowSettings, SearchSettings
+from lhdmap.odometry.slant import NO_RISE
 from lhdmap.odometry.stale import StaleWheels
 from lhdmap.odometry.steps import Matched, OdometryStep, WheelStep, body_information, inflated, marginal_information
 
@@ -28,12 +29,13 @@ class View(NamedTuple):
     """What else is known of a scan's surroundings.
 
     `height_m` of `base_link` in `odom`; `boxes_m` (K, 6): own bodies; `rear`: tells what the rear scanner sees at the same
-    time, asked for the scans that are processed only.
+    time, asked for the scans that are processed only; `rise` (2,): of the scanner's plane (`slant.rise_of`).
     """
 
     height_m: float = 0.0
     boxes_m: FloatArray = NO_BOXES
     rear: Callable[[], RearView | None] | None = None
+    rise: FloatArray = NO_RISE
 
 
 _PLAIN = View()
@@ -93,7 +95,7 @@ class PlanarOdometry:
         mount = _planar_mount(T_level_sensor)
         if isinstance(self._matcher, FlowMatcher):
             return self._step(scan, self._matcher.step(points, mount))
-        return self._step(scan, self._matcher.step(points, mount, self._behind(view, floor_m)))
+        return self._step(scan, self._matcher.step(points, mount, self._behind(view, floor_m), view.rise))
 
     def _behind(self, view: View, floor_m: float) -> Behind:
         """Return the rear scanner's hits; at rest they add nothing."""

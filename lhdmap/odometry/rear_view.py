@@ -14,7 +14,7 @@ import numba as nb
 import numpy as np
 
 from lhdmap.messages import FloatArray, LaserScan
-from lhdmap.odometry.matching import Hits, Match, MatchModel, line_weight
+from lhdmap.odometry.matching import Hits, Match, MatchModel, line_weight, slanted
 from lhdmap.odometry.scan_points import planar_points
 
 NO_POINTS = np.zeros((0, 3))
@@ -100,6 +100,7 @@ def _joint_equation(found, hits, model, fine_m, joint_x_m):  # type: ignore[no-u
         rx, ry = c * points[i, 0] - s * points[i, 1], s * points[i, 0] + c * points[i, 1]
         nx, ny = lines[i, 2], lines[i, 3]
         d = nx * (pose[0] + rx - lines[i, 0]) + ny * (pose[1] + ry - lines[i, 1])
+        d += slanted(hits, i, lines[i], c, s, nx, ny)
         incidence2 = (nx * rx + ny * ry) ** 2 / (rx * rx + ry * ry + 1e-12)
         w = line_weight(lines[i], d * d, incidence2, fine_m, model)[1]
         jt = -nx * (ry - s * joint_x_m) + ny * (rx - c * joint_x_m)

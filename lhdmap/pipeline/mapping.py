@@ -33,6 +33,7 @@ from lhdmap.odometry.cloud_odometry import CloudOdometry, CloudStep
 from lhdmap.odometry.planar import PlanarOdometry, View
 from lhdmap.odometry.rear_view import RearView
 from lhdmap.odometry.scan_points import NO_BOXES, half_sweep_ns
+from lhdmap.odometry.slant import rise_of
 from lhdmap.odometry.start import ScanInput, starting_velocity
 from lhdmap.odometry.steps import OdometryStep, WheelStep
 from lhdmap.pipeline.mounts import Mounts, level_sensor
@@ -259,7 +260,8 @@ class MappingPipeline:
     def _input(self, scan: LaserScan, before_ns: int, time_ns: int) -> ScanInput:
         """Return a scan with all that is known of the machine at `time_ns`, the middle of its sweep."""
         rear = partial(self._behind, time_ns) if self.has_inclinometer else None
-        view = View(self.track.height_m, self._boxes, rear)
+        rise = rise_of(self.mounts.of(scan.frame_id, "front").T_parent_child)
+        view = View(self.track.height_m, self._boxes, rear, rise)
         return ScanInput(scan, partial(self._placement, scan, time_ns), self._wheel_step(before_ns, time_ns), view)
 
     def _placement(self, scan: LaserScan, time_ns: int) -> FloatArray:

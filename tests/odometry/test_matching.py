@@ -97,7 +97,7 @@ def test_the_lean_of_a_patch_is_one_unknown_more() -> None:
     lines[:, 7] = rng.normal(0.03, 0.02, count)
     model = MODEL._replace(lean=0.2, lean_patch_m=5.0, cutoff_sigmas=1e6)
     H, b = np.zeros((3, 3)), np.zeros(3)
-    normal_equations(pose, Hits(points, count, layered=True), lines, 0.025, model, H, b)
+    normal_equations(pose, Hits(points, count, True, np.zeros((count, 2))), lines, 0.025, model, H, b)
     n = lines[:, 2:4]
     d = (n * (points[:, :2] - lines[:, :2])).sum(axis=1)
     beams = (n * points[:, :2]).sum(axis=1) ** 2 / (points[:, :2] ** 2).sum(axis=1)

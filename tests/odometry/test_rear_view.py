@@ -62,7 +62,8 @@ def test_the_joints_offset_is_learned(offset_deg: float) -> None:
     seen = Behind(np.column_stack([(rear[:, :2] - joint_at) @ R.T + joint_at, rear[:, 2]]), joint_x_m)
     joint, sure = JointOffset(), Prior(np.zeros(3), 1e9 * np.eye(3))
     for _ in range(400):
-        hits = Hits(np.concatenate([front, joint.turned(seen)]), len(front), layered=True)
+        both = np.concatenate([front, joint.turned(seen)])
+        hits = Hits(both, len(front), True, np.zeros((len(both), 2)))
         joint.update(match(map_, hits, sure, np.zeros(3), MODEL), hits, MODEL, 0.025, joint_x_m)
     assert math.degrees(joint.offset_rad) == pytest.approx(offset_deg, abs=0.05)
 
