@@ -22,8 +22,8 @@ DEFAULT, WALLS, PEERS = (
 )
 KISS, LINES = "KISS-ICP", "point-to-line ICP"
 LOGS = {
-    "intel": "Intel Research Lab, 519 m",
-    "aces": "ACES building, 338 m",
+    "intel": "Intel Research Lab, 513 m",
+    "aces": "ACES building, 333 m",
     "csail": "MIT CSAIL, 383 m (the one in `datasets/`)",
 }
 
