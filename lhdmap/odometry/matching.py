@@ -14,8 +14,8 @@ from lhdmap.odometry.surface_map import LINE, fit_line
 # Finest cells that a pose may move before lines are fitted anew. Where the walls hold: measured, no loss, half the time. Where
 # they hardly do, one step corrects only a part of an error along them, and what pulls towards standing still adds up.
 _LINES_HOLD, _WEAK_LINES_HOLD = 0.3, 0.03
-NO_SLANTS = np.zeros((0, 2))
 _WEAK_M = 0.003  # deviation of a match in its worse direction from which walls hardly hold
+NO_SLANTS = np.zeros((0, 2))
 
 
 class MatchModel(NamedTuple):
@@ -33,7 +33,7 @@ class MatchModel(NamedTuple):
 class Hits(NamedTuple):
     """Points (N, 3) in the level base frame, heights absolute; `front`: how many come from the front scanner, which are first.
 
-    `layered`: the scanner tilts, heights matter; then `slants` (N, 2) are those of `lhdmap.odometry.slant`. Other scanners'
+    `layered`: the scanner tilts, heights matter; `slants` (N, 2) of `lhdmap.odometry.slant`, or none. Other scanners'
     hits help to place the scan; how well it fits is judged by the front one's alone.
     """
 
@@ -106,7 +106,7 @@ def slanted(hits, i, line, c, s, nx, ny):  # type: ignore[no-untyped-def]
 
     `c`, `s`: cosine and sine of the heading.
     """
-    if not hits.layered:
+    if i >= hits.slants.shape[0]:
         return 0.0
     x, y = hits.slants[i, 0], hits.slants[i, 1]
     return line[7] * (nx * (c * x - s * y) + ny * (s * x + c * y))

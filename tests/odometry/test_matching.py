@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from lhdmap.geometry import se2
 from lhdmap.messages import FloatArray
-from lhdmap.odometry.matching import Hits, MatchModel, Prior, match, normal_equations, solve3
+from lhdmap.odometry.matching import NO_SLANTS, Hits, MatchModel, Prior, match, normal_equations, solve3
 from lhdmap.odometry.scan_points import planar_points
 from lhdmap.odometry.search import search
 from lhdmap.odometry.surface_map import LINE, SurfaceMap, empty_map, insert_all
@@ -106,3 +106,19 @@ def test_the_lean_of_a_patch_is_one_unknown_more() -> None:
     full = J.T @ (w[:, None] * J) + np.diag([0.0, 0.0, 0.0, 1.0 / 0.2**2])
     expected = np.linalg.solve(full, -J.T @ (w * d))[:3]
     assert np.linalg.solve(H, b) == pytest.approx(expected, rel=1e-6, abs=1e-9)
+
+
+def test_hits_without_slants_are_compared_where_they_are() -> None:
+    """A tilted scan of which no slants are known is matched as with slants of zero, not with what lies behind the array."""
+    count, lines = 40, np.zeros((40, LINE))
+    points = np.column_stack([np.linspace(2.0, 4.0, count), np.full(count, 2.0), np.zeros(count)])
+    lines[:, 0], lines[:, 1], lines[:, 3] = points[:, 0], 2.01, 1.0
+    lines[:, 4], lines[:, 5], lines[:, 6], lines[:, 7] = 1e-4, 8.0, 0.025, 0.04
+    found = []
+    for slants in (NO_SLANTS, np.zeros((count, 2))):
+        H, b = np.zeros((3, 3)), np.zeros(3)
+        normal_equations(np.zeros(3), Hits(points, count, True, slants), lines, 0.025, MODEL, H, b)
+        found.append((H, b))
+    assert (found[0][0] == found[1][0]).all()
+    assert (found[0][1] == found[1][1]).all()
+    assert found[0][1][1] > 0.0  # towards the wall
