@@ -35,6 +35,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--machine", type=Path, metavar="FILE.toml", help="machine description (dimensions, bodies, mounts)"
     )
+    parser.add_argument(
+        "--one-process",
+        action="store_true",
+        help="no second process for pile, recording and report: less memory, slower",
+    )
 
 
 def run(arguments: argparse.Namespace, console: Console) -> int:
@@ -51,6 +56,7 @@ def run(arguments: argparse.Namespace, console: Console) -> int:
         machine=load_machine(arguments.machine) if arguments.machine else None,
         progress=progress_of(console),
         poses=arguments.poses,
+        helper=not arguments.one_process,
     )
     result = build_map(request)
     for text in result.warnings:

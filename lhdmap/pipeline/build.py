@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import resource as process_resource
-import sys
+import os
 import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
@@ -22,8 +21,10 @@ from lhdmap.machine import Machine
 from lhdmap.mapfolder import MapFolderWriter, MapInfo
 from lhdmap.messages import Joints, LaserScan, Message, PointCloud
 from lhdmap.pile.result import PileReport
+from lhdmap.pipeline.beside import Beside, Here
 from lhdmap.pipeline.given import given_rows
 from lhdmap.pipeline.identify import identify_along
+from lhdmap.pipeline.inspection import Inspection, Inspector, PileBeside, peak_memory_mib
 from lhdmap.pipeline.interruption import Interruption
 from lhdmap.pipeline.mapping import MappingPipeline
 from lhdmap.pipeline.mounts import machine_of
@@ -31,15 +32,13 @@ from lhdmap.pipeline.sweeps import SweepIntegration
 from lhdmap.pipeline.track import FinalTrack, Rows, resample, trajectory_of
 from lhdmap.proprioception.wheels import WheelOdometry
 from lhdmap.provenance import source_entry
-from lhdmap.report import charts
 from lhdmap.report.data import ReportData, Summary, TopicRow
-from lhdmap.report.page import write_report
-from lhdmap.report.pile_recording import add_pile
-from lhdmap.report.recording import RecordingWriter, record_run
+from lhdmap.report.recording import Thinning
 from lhdmap.smoothing.smoother import corrected
 from lhdmap.trajectory import Trajectory
 
 ROLES_READ = ("front", "rear", "points", "inclinometer", "joints", "tachometer", "wheel_odometry", "tf_static")
+_BESIDE_FROM_S = 60.0  # a process takes most of a second to start
 Progress = Callable[[Iterable[tuple[str, Message]], float], Iterable[tuple[str, Message]]]
 
 
@@ -48,6 +47,7 @@ class BuildRequest:
     """What is to be built: logs, the folder to make, settings, topics by role, the machine, how to show progress.
 
     `poses`: given poses for the cloud and the final trajectory (`given.given_rows`); empty: the odometry's.
+    `helper`: whether a second process may look for the pile, record and report; what comes out is the same.
     """
 
     logs: Sequence[Path]
@@ -57,6 +57,7 @@ class BuildRequest:
     machine: Machine | None = None
     progress: Progress | None = None
     poses: str = ""
+    helper: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,23 +80,24 @@ def build_map(request: BuildRequest) -> BuildResult:
     given = given_rows(request.poses, request.logs, request.topics) if request.poses else None
     with LogSource(list(request.logs), request.topics) as source, MapFolderWriter(request.target) as folder:
         hashes, pool = _hash_in_background(request.logs)
-        pool.submit(charts.load)
-        with (
-            pool,
-            RecordingWriter(folder.path / "recording.rrd", request.target.name, source.start_ns or 0) as recording,
-        ):
+        with pool, _inspector(request, source, folder.path) as inspector:
             primary: Literal["front", "points"] = "front" if "front" in source.roles else "points"
             pipeline = MappingPipeline(
-                request.settings, machine_of(source, request.machine), _sweep_sink(recording), primary
+                request.settings,
+                machine_of(source, request.machine),
+                _sweep_sink(inspector),
+                primary,
+                pile=PileBeside(inspector),
             )
             interrupted = _run(pipeline, source, request.progress)
             outcome = _Outcome(request, source, pipeline, started, given)
-            _write(folder, outcome, recording)
+            _write(folder, outcome, inspector)
+            beside_mib = _beside_mib(inspector)
         if interrupted:  # what was finished is kept under the partial name
             raise KeyboardInterrupt
         info = MapInfo(request.logs, settings_table(request.settings), outcome.summary, outcome.warnings)
         final = folder.complete(info, {path: future.result() for path, future in hashes.items()})
-    summary = outcome.summary | {"map": str(final)} | _cost(started, outcome.duration_s)
+    summary = outcome.summary | {"map": str(final)} | _cost(started, outcome.duration_s, beside_mib)
     return BuildResult(final, summary, outcome.warnings, outcome.final)
 
 
@@ -209,24 +211,34 @@ def integrate_again(request: BuildRequest, pipeline: MappingPipeline, rows: Rows
     return sweeps.cloud()
 
 
-def _write(folder: MapFolderWriter, outcome: _Outcome, recording: RecordingWriter) -> None:
+def _write(folder: MapFolderWriter, outcome: _Outcome, inspector: Inspector) -> None:
+    inspector.tell(Inspection.write, outcome.report(), outcome.pipeline.machine or Machine(bodies={}))
     folder.write_trajectory(outcome.final)
     folder.write_odometry(outcome.odometry)
     folder.write_diagnostics(outcome.pipeline.records.diagnostics())
     write_cloud(folder.path / "cloud.ply", outcome.cloud)
     if outcome.pile is not None:
         folder.write_json("pile.json", outcome.pile.to_json())
-    data = outcome.report()
-    record_run(recording, data, outcome.pipeline.machine or Machine(bodies={}))
-    if outcome.pile is not None:
-        add_pile(recording, outcome.pile)
-    write_report(data, folder.path / "report.html")
 
 
-def _sweep_sink(recording: RecordingWriter) -> Callable[[str, int, Any], None]:
+def _inspector(request: BuildRequest, source: LogSource, folder: Path) -> Inspector:
+    """Return where the inspection happens: beside this process where that is wanted and pays."""
+    beside = request.helper and source.duration_s >= _BESIDE_FROM_S and (os.cpu_count() or 1) > 1
+    make: Callable[..., Inspector] = Beside if beside else Here
+    return make(Inspection, folder, request.target.name, source.start_ns or 0, request.settings)
+
+
+def _beside_mib(inspector: Inspector) -> float:
+    """Return the memory that a process beside this one took, once it has written all."""
+    return inspector.ask(Inspection.peak_memory_mib) if isinstance(inspector, Beside) else 0.0
+
+
+def _sweep_sink(inspector: Inspector) -> Callable[[str, int, Any], None]:
+    thinning = Thinning()
+
     def take(role: str, stamp_ns: int, points_map: Any) -> None:
-        if recording.wants_scan(stamp_ns, role):
-            recording.add_scan(stamp_ns, points_map.copy(), role)
+        if thinning.take(stamp_ns, role):
+            inspector.tell(Inspection.record, stamp_ns, points_map.copy(), role)
 
     return take
 
@@ -265,8 +277,7 @@ def _remarks(pipeline: MappingPipeline) -> list[str]:
     return remarks
 
 
-def _cost(started: float, duration_s: float) -> dict[str, float]:
+def _cost(started: float, duration_s: float, beside_mib: float = 0.0) -> dict[str, float]:
     wall_s = max(time.monotonic() - started, 1e-6)
-    unit = 1024.0**2 if sys.platform == "darwin" else 1024.0
-    peak = process_resource.getrusage(process_resource.RUSAGE_SELF).ru_maxrss / unit
+    peak = peak_memory_mib() + beside_mib
     return {"wall_s": wall_s, "realtime_factor": duration_s / wall_s, "peak_memory_mib": peak}

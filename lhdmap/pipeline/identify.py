@@ -22,7 +22,7 @@ from lhdmap.pile.result import PileReport, Snapshot
 from lhdmap.pipeline.given import given_rows
 from lhdmap.pipeline.mapping import MappingPipeline, own_boxes
 from lhdmap.pipeline.mounts import Mounts, level_sensor, machine_of
-from lhdmap.pipeline.pile import pile_stage, scan_hits
+from lhdmap.pipeline.pile import PileWatch, PlacedScan
 from lhdmap.pipeline.track import FinalTrack, Rows
 
 _ROLES = ("tf_static", "front", "rear", "points", "inclinometer", "joints", "tachometer", "wheel_odometry")
@@ -97,9 +97,7 @@ def identify_along(
 ) -> PileReport:
     """Run the pile stage alone, on poses that are known: given ones, or those of a map whose loops were closed."""
     track, mounts = FinalTrack(rows), Mounts(machine)
-    stage, boxes = pile_stage(settings, _GIVEN_POSES), own_boxes(machine, settings.integration.body_margin_m)
-    if stage is None:
-        return PileReport(None, None, method=settings.pile.method)
+    watch, boxes = PileWatch(settings, _GIVEN_POSES), own_boxes(machine, settings.integration.body_margin_m)
     with LogSource(list(logs), topics) as source:
         for _, message in source.messages([role for role in ("tf_static", "front") if role in source.roles]):
             if isinstance(message, Mount):
@@ -113,8 +111,8 @@ def identify_along(
                 pose = np.array([*T[:3, 3], heading])
                 T_level_sensor = level_sensor(mounts.of(message.frame_id, "front"), roll, pitch)
                 velocity = _velocity(track, time_ns)
-                stage.update(scan_hits(message, T_level_sensor, velocity, boxes, pose))
-    return stage.report()
+                watch.update(PlacedScan(message, T_level_sensor, velocity, boxes, pose))
+    return watch.report()
 
 
 def _velocity(track: FinalTrack, time_ns: int) -> FloatArray:

@@ -38,7 +38,7 @@ from lhdmap.odometry.start import ScanInput, starting_velocity
 from lhdmap.odometry.steps import OdometryStep, WheelStep
 from lhdmap.pipeline.mounts import Mounts, level_sensor
 from lhdmap.pipeline.path import FinalPath
-from lhdmap.pipeline.pile import pile_stage, scan_hits
+from lhdmap.pipeline.pile import PileSink, PileWatch, PlacedScan
 from lhdmap.pipeline.rear import RearScans
 from lhdmap.pipeline.records import ScanRecords
 from lhdmap.pipeline.sweeps import ScanSink, SweepIntegration
@@ -59,7 +59,8 @@ _QUEUE_SCANS = 2000  # a sensor that stops must not hold back scans without boun
 class MappingPipeline:
     """Takes messages by role in time order; `finish` ends the stream. Trajectory and cloud are there at any time.
 
-    `primary`: the sensor that the odometry runs on, the front scanner or a 3D scanner; `cloud`: whether sweeps are integrated.
+    `primary`: the sensor that the odometry runs on, the front scanner or a 3D scanner; `cloud`: whether sweeps are integrated;
+    `pile`: what looks for the pile, if not the stage of the settings here.
     """
 
     def __init__(
@@ -70,6 +71,7 @@ class MappingPipeline:
         primary: Literal["front", "points"] = "front",
         *,
         cloud: bool = True,
+        pile: PileSink | None = None,
     ) -> None:
         self.settings = settings
         self.machine = machine
@@ -85,7 +87,8 @@ class MappingPipeline:
         self.path = FinalPath(self.track)
         self.records = ScanRecords()
         self.smoother = Smoother(settings.smoothing)
-        self.pile = pile_stage(settings) if primary == "front" else None
+        looked_for = primary == "front" and settings.pile.method != "off"
+        self.pile: PileSink | None = (pile or PileWatch(settings)) if looked_for else None
         self._cloud = cloud
         self.rear = RearScans(self.mounts, self.wheels, machine or _DEFAULT_MACHINE)
         self.has_inclinometer = False
@@ -232,7 +235,7 @@ class MappingPipeline:
         if self.pile is not None and self.has_inclinometer:
             x, y, heading = step.T_odom_base
             pose = np.array([x, y, self.track.height_m, heading])
-            self.pile.update(scan_hits(scan, self._placement(scan, time_ns), step.velocity, self._boxes, pose))
+            self.pile.update(PlacedScan(scan, self._placement(scan, time_ns), step.velocity, self._boxes, pose))
 
     def _hold(self, role: str, time_ns: int, sweep: LaserScan | PointCloud) -> None:
         if self._cloud:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import NamedTuple, Protocol
 
 import numba as nb
 
@@ -11,24 +12,58 @@ from lhdmap.messages import FloatArray, LaserScan
 from lhdmap.odometry.scan_points import planar_points
 from lhdmap.pile.face import Registration
 from lhdmap.pile.figure9_stage import Figure9Stage
+from lhdmap.pile.result import PileReport
 from lhdmap.pile.stage import PileStage, ScanHits
 
 
-def scan_hits(
-    scan: LaserScan, T_level_sensor: FloatArray, velocity: FloatArray, boxes_m: FloatArray, pose: FloatArray
-) -> ScanHits:
-    """Return a scan as hits in the map.
+class PlacedScan(NamedTuple):
+    """A front scan and where it was taken.
 
-    Args:
-        scan: the scan.
-        T_level_sensor: pose (4, 4) of the sensor in the level frame of `base_link`.
-        velocity: forward, lateral, turning speed (3,), which undoes the sweep.
-        boxes_m: own bodies (K, 6) in the level frame.
-        pose: x, y, z (m), heading (rad) of `base_link` in the map, shape (4,).
+    `T_level_sensor` (4, 4): sensor in the level frame of `base_link`; `velocity` (3,): forward, lateral, turning speed, which
+    undoes the sweep; `boxes_m` (K, 6): own bodies in the level frame; `pose` (4,): x, y, z (m), heading (rad) of `base_link`
+    in the map.
     """
-    points = planar_points(scan, T_level_sensor, velocity, boxes_m=boxes_m)
-    _place(points, pose)
-    return ScanHits(scan.stamp_ns, points, pose)
+
+    scan: LaserScan
+    T_level_sensor: FloatArray
+    velocity: FloatArray
+    boxes_m: FloatArray
+    pose: FloatArray
+
+    def hits(self) -> ScanHits:
+        """Return the scan as hits in the map."""
+        points = planar_points(self.scan, self.T_level_sensor, self.velocity, boxes_m=self.boxes_m)
+        _place(points, self.pose)
+        return ScanHits(self.scan.stamp_ns, points, self.pose)
+
+
+class PileSink(Protocol):
+    """What looks for the pile: in this process (`PileWatch`), or in one beside it."""
+
+    def update(self, scan: PlacedScan) -> None:
+        """Take one scan."""
+        ...
+
+    def report(self) -> PileReport:
+        """Return what is said of the pile so far."""
+        ...
+
+
+class PileWatch:
+    """The stage of `pile.method` on placed scans; `registration`: how far poses may be wrong, if not as set."""
+
+    def __init__(self, settings: Settings, registration: Registration | None = None) -> None:
+        self._method = settings.pile.method
+        self._stage = _stage(settings, registration)
+
+    def update(self, scan: PlacedScan) -> None:
+        """Take one scan."""
+        if self._stage is not None:
+            self._stage.update(scan.hits())
+
+    def report(self) -> PileReport:
+        """Return what is said of the pile so far."""
+        return PileReport(None, None, method=self._method) if self._stage is None else self._stage.report()
 
 
 @nb.njit(cache=True, nogil=True)
@@ -41,8 +76,7 @@ def _place(points, pose):  # type: ignore[no-untyped-def]
         points[i, 2] += pose[2]
 
 
-def pile_stage(settings: Settings, registration: Registration | None = None) -> PileStage | Figure9Stage | None:
-    """Return the stage of `pile.method`, None for `off`; `registration`: how far poses may be wrong, if not as set."""
+def _stage(settings: Settings, registration: Registration | None) -> PileStage | Figure9Stage | None:
     match settings.pile.method:
         case "off":
             return None

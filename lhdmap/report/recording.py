@@ -46,6 +46,25 @@ class RecordingSettings:
     point_size_px: float = setting(1.5, unit="px", minimum=0.1, maximum=20.0, doc="Size of a cloud point on screen.")
 
 
+class Thinning:
+    """Which scans go into a recording: of each name one in `interval_s`."""
+
+    def __init__(self, interval_s: float = RecordingSettings().scan_interval_s) -> None:
+        self._interval_ns = round(interval_s * 1e9)
+        self._next_ns: dict[str, int] = {}
+
+    def wants(self, stamp_ns: int, name: str) -> bool:
+        """Return whether a scan of this stamp is due."""
+        return stamp_ns >= self._next_ns.get(name, stamp_ns)
+
+    def take(self, stamp_ns: int, name: str) -> bool:
+        """Return whether a scan of this stamp is due; if so, it is taken for recorded."""
+        due = self.wants(stamp_ns, name)
+        if due:
+            self._next_ns[name] = stamp_ns + self._interval_ns
+        return due
+
+
 class RecordingWriter:
     """Writes one `.rrd` file. Scans and texts may come while the run goes on, the rest comes when it is known."""
 
@@ -53,7 +72,7 @@ class RecordingWriter:
         """Open the file in the background; `start_ns` is the stamp that counts as time zero."""
         self._settings = settings or RecordingSettings()
         self._start_ns = self._end_ns = start_ns
-        self._next_scan_ns: dict[str, int] = {}
+        self._thinning = Thinning(self._settings.scan_interval_s)
         self._floor: tuple[Stamps, FloatArray] | None = None
         self._bounds: FloatArray | None = None
         self._drawn: set[str] = set()
@@ -82,13 +101,12 @@ class RecordingWriter:
 
     def wants_scan(self, stamp_ns: int, name: str = "front") -> bool:
         """Return whether a scan of this stamp would be recorded, so that its points need not be made in vain."""
-        return stamp_ns >= self._next_scan_ns.get(name, stamp_ns)
+        return self._thinning.wants(stamp_ns, name)
 
     def add_scan(self, stamp_ns: int, points_map: FloatArray, name: str = "front") -> None:
         """Record the points (N, 3) of one scan in map, unless the last one was recorded just before; they are kept."""
-        if not self.wants_scan(stamp_ns, name):
+        if not self._thinning.take(stamp_ns, name):
             return
-        self._next_scan_ns[name] = stamp_ns + round(self._settings.scan_interval_s * 1e9)
         self._scans.append((stamp_ns, points_map, name))
         if self._opened.done():
             self._log_scans()

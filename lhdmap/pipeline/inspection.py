@@ -1,0 +1,85 @@
+"""What looks at a run and changes nothing in it: the pile's stage, the Rerun recording, the report."""
+
+from __future__ import annotations
+
+import resource as process_resource
+import sys
+import threading
+from pathlib import Path
+
+from lhdmap.config import Settings
+from lhdmap.machine import Machine
+from lhdmap.messages import FloatArray
+from lhdmap.pile.result import PileReport
+from lhdmap.pipeline.beside import Beside, Here
+from lhdmap.pipeline.pile import PileWatch, PlacedScan
+from lhdmap.report import charts
+from lhdmap.report.data import ReportData
+from lhdmap.report.page import write_report
+from lhdmap.report.pile_recording import add_pile
+from lhdmap.report.recording import RecordingWriter, record_run
+
+
+class Inspection:
+    """Takes placed scans while the run goes on, and writes recording and report once it is over."""
+
+    def __init__(self, folder: Path, title: str, start_ns: int, settings: Settings) -> None:
+        self._folder = folder
+        self._pile = PileWatch(settings)
+        self._recording = RecordingWriter(folder / "recording.rrd", title, start_ns)
+        self._written = False
+        threading.Thread(target=charts.load, name="charts").start()
+
+    def look(self, scan: PlacedScan) -> None:
+        """Show the pile's stage a scan."""
+        self._pile.update(scan)
+
+    def pile(self) -> PileReport:
+        """Return what the stage says of the pile."""
+        return self._pile.report()
+
+    def record(self, stamp_ns: int, points_map: FloatArray, name: str) -> None:
+        """Record an integrated sweep, points (N, 3) in map."""
+        self._recording.add_scan(stamp_ns, points_map, name)
+
+    def write(self, data: ReportData, machine: Machine) -> None:
+        """Complete the recording and write the report."""
+        record_run(self._recording, data, machine)
+        if data.pile is not None:
+            add_pile(self._recording, data.pile)
+        self._recording.close()
+        self._written = True
+        write_report(data, self._folder / "report.html")
+
+    def peak_memory_mib(self) -> float:
+        """Return the most memory that the process has had in RAM, MiB."""
+        return peak_memory_mib()
+
+    def close(self) -> None:
+        """Close the recording; what was recorded before an interruption is kept."""
+        if not self._written:
+            self._recording.close()
+
+
+Inspector = Here[Inspection] | Beside[Inspection]
+
+
+class PileBeside:
+    """The pile's stage of an inspection, as the mapping pipeline takes it."""
+
+    def __init__(self, inspector: Inspector) -> None:
+        self._inspector = inspector
+
+    def update(self, scan: PlacedScan) -> None:
+        """Show it a scan."""
+        self._inspector.tell(Inspection.look, scan)
+
+    def report(self) -> PileReport:
+        """Return what it says of the pile."""
+        return self._inspector.ask(Inspection.pile)
+
+
+def peak_memory_mib() -> float:
+    """Return the most memory that this process has had in RAM, MiB."""
+    unit = 1024.0**2 if sys.platform == "darwin" else 1024.0
+    return process_resource.getrusage(process_resource.RUSAGE_SELF).ru_maxrss / unit
