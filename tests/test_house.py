@@ -113,6 +113,8 @@ def test_nothing_in_the_library_prints_or_exits() -> None:
         if path.parent != PACKAGE / "cli":
             calls = [node.func for node in ast.walk(ast.parse(path.read_text())) if isinstance(node, ast.Call)]
             said = {ast.unparse(call) for call in calls} & {"print", "exit", "sys.exit", "quit", "os._exit"}
+            if path.name == "beside.py":  # ends the process that it started itself
+                said -= {"os._exit"}
             assert not said or path.name == "__main__.py", f"{path} calls {said}"
 
 
