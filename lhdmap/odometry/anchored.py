@@ -9,10 +9,10 @@ import numpy as np
 from lhdmap.geometry import se2
 from lhdmap.messages import FloatArray
 from lhdmap.odometry.flow_reference import FlowReference, compare, scanner_pyramid
+from lhdmap.odometry.jump import jump, weakened
 from lhdmap.odometry.matching import Hits, Match, MatchModel, Prior, match
 from lhdmap.odometry.motion import Motion
 from lhdmap.odometry.rear_view import NO_POINTS, NOTHING_BEHIND, Behind, JointOffset
-from lhdmap.odometry.search import search
 from lhdmap.odometry.settings import AnchorSettings, OdometrySettings, RangeFlowSettings, SearchSettings
 from lhdmap.odometry.slant import NO_RISE, slants
 from lhdmap.odometry.steps import BY_DEFINITION, Matched, marginal_information
@@ -23,7 +23,6 @@ _YOUNG_SCANS = 4
 _LOST_BEFORE_RESTART = 5
 _FEWEST_HITS = 10
 _HEADING_AXIS = np.diag([0.0, 0.0, 1.0])
-_JUMP_PRIOR = 0.01
 # Scans that are flagged after a pose that the motion did not foretell: a jump, or someone beside the machine.
 _DOUBT_SCANS = 25
 _DOUBTFUL_SUPPORT = 0.58  # walls alone give 0.8 and more: less may be a crowd that moves along
@@ -34,9 +33,6 @@ _NOISE_GAIN = 0.05
 _NOISE_SCALES = (0.8, 6.0)
 _FRONT_STEP = 3  # one in three hits of the front scanner: as exact with the rear one's, and faster
 _FEWEST_AGREEING = 15  # hits
-# A jump must bring that much more support, and more where wheels speak against it: the logarithm of the odds (Student's t, for
-# wheels that slip or lag) over the nats that support is worth. Measured: crowds win by chance with more, slip stays with less.
-_GAIN, _NATS_PER_SUPPORT, _WHEELS_FREEDOM = 0.02, 22.0, 4.0
 _FORETOLD_M, _FORETOLD_RAD = 0.2, math.radians(6.0)
 _FLAT_M = 0.02  # a scan whose heights differ by less is planar
 
@@ -141,49 +137,22 @@ class AnchoredMatcher:
             predicted += np.linalg.solve(information, error)
         prior = Prior(predicted, information)
         result = match(self._map, hits, prior, predicted, self._model)
-        return self._freed(hits, result, prior) if self._trusted(result) else self._searched(hits, result, prior)
-
-    def _searched(self, hits: Hits, result: Match, prior: Prior) -> Match:
-        """Return the best match from all around the prediction, where that is better enough than the one near it."""
-        points = hits.points[: hits.front]
-        thin = points[:: max(len(points) // self._wide.beams, 1)]
-        cell_m, step_rad, seen = self._wide.cell_m, math.radians(self._wide.step_deg), np.concatenate(self._recent)
-        starts = search(seen, thin, prior.pose, prior.information, self._reach(), cell_m, step_rad)
-        # A jump contradicts the prior by definition: it must not hold the match back, so it is weakened here.
-        for start in starts[(np.abs(starts) < 1e29).all(axis=1)]:
-            found = match(self._map, hits, _weak(prior), start, self._model)
-            dissent = self._dissent(found, prior) - self._dissent(result, prior)
-            if found.support > result.support + _GAIN + dissent / _NATS_PER_SUPPORT:
-                result, self._doubt, self._jumped = found, _DOUBT_SCANS, True
-        return result
-
-    def _dissent(self, result: Match, prior: Prior) -> float:
-        """Return how much (nats) the wheels speak against a pose: with slip and lag, large errors are likelier than normal."""
-        if not self._motion.measured:
-            return 0.0
-        error = result.pose - prior.pose
-        error[2] = se2.wrap(error[2])
-        return 0.5 * _WHEELS_FREEDOM * math.log1p(float(error @ prior.information @ error) / _WHEELS_FREEDOM)
+        if self._trusted(result):
+            return self._freed(hits, result, prior)
+        seen = np.concatenate(self._recent)
+        found = jump(self._map, seen, hits, result, prior, self._motion, self._wide, self._model)
+        if found is None:
+            return result
+        self._doubt, self._jumped = _DOUBT_SCANS, True
+        return found
 
     def _freed(self, hits: Hits, result: Match, prior: Prior) -> Match:
         """Match again with a weak prior where the scan contradicts it: motion that no model of the past foretells."""
         error = result.pose - prior.pose
         if error @ prior.information @ error < _SURPRISE**2:
             return result
-        again = match(self._map, hits, _weak(prior), result.pose, self._model)
+        again = match(self._map, hits, weakened(prior), result.pose, self._model)
         return again if again.support >= result.support else result
-
-    def _reach(self) -> FloatArray:
-        """Return how far to search: three sigmas of the prediction within the settings' limits, metres and radians.
-
-        After a gap the wheels' pose may be an old one: all that the settings allow is searched.
-        """
-        sigma = np.sqrt(np.diag(self._motion.P)[:3])
-        widest = self._wide.reach_m, math.radians(self._wide.turn_deg)
-        if self._motion.after_gap:
-            return np.array(widest)
-        shift = min(max(3.0 * float(sigma[:2].max()), 0.3), widest[0])
-        return np.array([shift, min(max(3.0 * float(sigma[2]), math.radians(20.0)), widest[1])])
 
     def _trusted(self, result: Match) -> bool:
         """Return whether most of the hits that the map covers agree with it."""
@@ -256,7 +225,3 @@ class AnchoredMatcher:
         insert_all(self._map, hits, self._anchor.hit_limit)
         self._recent = [*self._recent[1 - _RECENT_SCANS :], hits]
         self._inserted = self._motion.pose
-
-
-def _weak(prior: Prior) -> Prior:
-    return Prior(prior.pose, _JUMP_PRIOR * prior.information)

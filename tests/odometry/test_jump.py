@@ -1,0 +1,111 @@
+"""Jumps: what the motion did not foretell is found all around; a pose that wheels speak against must be far better."""
+
+from __future__ import annotations
+
+import math
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from lhdmap.geometry import se2
+from lhdmap.messages import FloatArray
+from lhdmap.odometry.jump import jump
+from lhdmap.odometry.matching import Hits, Match, MatchModel, Prior, match
+from lhdmap.odometry.motion import FORWARD, TURNING, Motion
+from lhdmap.odometry.settings import OdometrySettings, SearchSettings
+from lhdmap.odometry.surface_map import SurfaceMap, empty_map, insert_all
+
+MODEL = MatchModel(0.012, 3.0, 2.0, 0.05, 6)
+TRUE = np.array([0.4, -0.2, 0.1])
+SURE = np.diag([0.02**-2, 0.02**-2, math.radians(0.5) ** -2])
+
+
+def room(start: FloatArray, length_m: float = 9.0) -> FloatArray:
+    """Return what a scanner sees at `start` (3,) of a bare hall with a niche, in its own frame, (N, 3)."""
+    corners = [(-4, -3), (length_m - 4, -3), (length_m - 4, 4), (1, 4), (1, 5.5), (-1, 5.5), (-1, 4), (-4, 4), (-4, -3)]
+    lines = [np.linspace(a, b, 90, endpoint=False) for a, b in pairwise(corners)]
+    points = np.vstack(lines).astype(float)
+    c, s = math.cos(start[2]), math.sin(start[2])
+    local = (points - start[:2]) @ np.array([[c, -s], [s, c]])
+    return np.column_stack([local, np.zeros(len(local))])
+
+
+@pytest.fixture(scope="module")
+def walls() -> SurfaceMap:
+    """The hall, seen from around the middle with the scanner's noise."""
+    map_, rng = empty_map(0.025, 1024), np.random.default_rng(1)
+    for _ in range(20):
+        pose = np.array([*rng.uniform(-0.3, 0.3, 2), rng.uniform(-0.1, 0.1)])
+        noisy = room(pose)
+        noisy[:, :2] += rng.normal(0.0, 0.008, (len(noisy), 2))
+        insert_all(map_, se2.transform(pose, noisy), 50.0)
+    return map_
+
+
+def found_from(walls: SurfaceMap, predicted: FloatArray, motion: Motion) -> tuple[Match, Match | None]:
+    """Return the match near a prediction, and the jump from there."""
+    hits, prior = Hits(room(TRUE), len(room(TRUE)), layered=False), Prior(predicted, SURE)
+    near = match(walls, hits, prior, predicted, MODEL)
+    return near, jump(walls, room(np.zeros(3)), hits, near, prior, motion, SearchSettings(), MODEL)
+
+
+def test_a_kidnapped_machine_is_found(walls: SurfaceMap) -> None:
+    near, found = found_from(walls, TRUE + np.array([0.25, -0.2, math.radians(15.0)]), Motion(OdometrySettings()))
+    assert near.support < 0.4
+    assert found is not None
+    assert np.hypot(*(found.pose - TRUE)[:2]) < 0.01
+    assert abs(found.pose[2] - TRUE[2]) < math.radians(0.2)
+
+
+def test_a_pose_that_fits_is_left_alone(walls: SurfaceMap) -> None:
+    near, found = found_from(walls, TRUE + np.array([0.01, 0.01, 0.0]), Motion(OdometrySettings()))
+    assert near.support > 0.9
+    assert found is None
+
+
+def wheeled(gap_s: float = 0.02) -> Motion:
+    """Return a motion whose last step wheels have measured."""
+    motion = Motion(OdometrySettings(), np.zeros(3))
+    motion.predict(gap_s)
+    motion.fuse_speed(FORWARD, 0.0, 0.01, scaled=False)
+    motion.fuse_speed(TURNING, 0.0, 0.01, scaled=False)
+    assert motion.measured
+    return motion
+
+
+def test_wheels_that_disagree_want_more_support(walls: SurfaceMap) -> None:
+    """The better place wins against wheels where its support is far better, not where it is a little better: a crowd's chance."""
+    predicted = TRUE + np.array([0.25, -0.2, math.radians(15.0)])
+    hits, prior = Hits(room(TRUE), len(room(TRUE)), layered=False), Prior(predicted, SURE)
+    away = match(walls, hits, prior, predicted, MODEL)
+    seen, wide = room(np.zeros(3)), SearchSettings()
+    assert jump(walls, seen, hits, away, prior, wheeled(), wide, MODEL) is not None
+    close = away._replace(support=0.75)  # as if a crowd hid what is wrong there
+    free = jump(walls, seen, hits, close, prior, Motion(OdometrySettings()), wide, MODEL)
+    assert free is not None
+    assert free.support > close.support
+    assert jump(walls, seen, hits, close, prior, wheeled(), wide, MODEL) is None
+
+
+@pytest.mark.parametrize(("gap_s", "found"), [(0.02, False), (2.0, True)])
+def test_after_a_gap_all_that_the_settings_allow_is_searched(walls: SurfaceMap, gap_s: float, found: bool) -> None:
+    """Sure of its pose, the filter searches 0.3 m; wheels that hung through a gap are 1.4 m off and as sure."""
+    motion = Motion(OdometrySettings(), np.zeros(3))
+    motion.predict(gap_s)
+    motion.P[:3, :3] = np.linalg.inv(SURE)
+    _, result = found_from(walls, TRUE + np.array([1.4, 0.0, 0.0]), motion)
+    near = result is not None and np.hypot(*(result.pose - TRUE)[:2]) < 0.02
+    assert near == found
+
+
+def test_a_velocity_that_is_distrusted_is_hardly_known() -> None:
+    """Else the speed that a jump gives would carry the next pose away, and the scans could not take it back."""
+    motion = wheeled()
+    motion.distrust_velocity(np.array([1.5, 0.0, 0.2]))
+    assert motion.velocity.tolist() == [1.5, 0.0, 0.2]
+    motion.predict(0.1)
+    sigma_m = math.sqrt(motion.P[0, 0])
+    assert 0.2 < sigma_m < 0.5
+    pose = motion.pose
+    motion.correct(pose - np.array([0.15, 0.0, 0.0]), np.diag([1e4, 1e4, 1e6]))
+    assert motion.velocity[0] == pytest.approx(0.0, abs=0.1)
