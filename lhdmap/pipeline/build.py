@@ -223,9 +223,14 @@ def _write(folder: MapFolderWriter, outcome: _Outcome, inspector: Inspector) -> 
 
 def _inspector(request: BuildRequest, source: LogSource, folder: Path) -> Inspector:
     """Return where the inspection happens: beside this process where that is wanted and pays."""
-    beside = request.helper and source.duration_s >= _BESIDE_FROM_S and (os.cpu_count() or 1) > 1
+    beside = request.helper and source.duration_s >= _BESIDE_FROM_S and _cores() > 1
     make: Callable[..., Inspector] = Beside if beside else Here
     return make(Inspection, folder, request.target.name, source.start_ns or 0, request.settings)
+
+
+def _cores() -> int:
+    """Return how many cores this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 def _beside_mib(inspector: Inspector) -> float:

@@ -108,7 +108,7 @@ def test_a_map_made_with_a_helper_is_the_same(
     built: BuildResult, untold: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(build, "_BESIDE_FROM_S", 0.0)
-    monkeypatch.setattr(os, "cpu_count", lambda: 2)
+    monkeypatch.setattr(build, "_cores", lambda: 2)
     found = build_map(BuildRequest([untold], tmp_path / "map", helper=True))
     assert {path.name for path in found.folder.iterdir()} == {path.name for path in built.folder.iterdir()}
     for name in ("trajectory.tum", "cloud.ply", "pile.json"):
