@@ -17,7 +17,7 @@ from lhdmap.simulation.pile_facts import PileTruth, fit_face
 from lhdmap.simulation.pile_rocks import cylinder, extent, rock
 from lhdmap.simulation.pile_scenes import scene
 from lhdmap.simulation.pile_sections import VARIANTS, MountingSettings, PileSettings
-from lhdmap.simulation.pile_truth import off_walls, pile_truth
+from lhdmap.simulation.pile_truth import off_walls, pile_truth, plane_over
 from lhdmap.simulation.raycast import Surface
 from lhdmap.simulation.scenario import DriftScenario, scenario_from, scenario_toml
 from lhdmap.simulation.sections import DriftSettings, DriveSettings
@@ -50,6 +50,29 @@ def test_a_clean_pile_has_the_width_and_inclination_it_was_made_with(seed: int) 
     truth = clean_truth(seed=seed)
     assert truth.inclination_deg == pytest.approx(-45.0, abs=0.05)
     assert truth.width_m == pytest.approx(4.0, abs=0.01)
+
+
+@pytest.mark.parametrize("heights_m", [(0.2, 1.6), (0.2, 0.8), (0.9, 1.5)])
+def test_a_plane_slopes_alike_over_all_heights(heights_m: tuple[float, float]) -> None:
+    world = clean_world()
+    found = plane_over(world, pile_truth(world), heights_m)
+    assert found is not None
+    assert found.inclination_deg == pytest.approx(-45.0, abs=0.05)
+
+
+@pytest.mark.parametrize(("heights_m", "slope_deg"), [((0.2, 0.9), 35.0), ((1.1, 1.6), 60.0)])
+def test_a_bent_face_slopes_as_it_was_made_below_and_above_the_bend(
+    heights_m: tuple[float, float], slope_deg: float
+) -> None:
+    world = clean_world(slope_deg=35.0, upper_slope_deg=60.0, bend_m=1.0)
+    found = plane_over(world, pile_truth(world), heights_m)
+    assert found is not None
+    assert found.inclination_deg == pytest.approx(-slope_deg, abs=1.0)
+
+
+def test_no_face_at_heights_where_there_is_none() -> None:
+    world = clean_world()
+    assert plane_over(world, pile_truth(world), (-3.0, -2.5)) is None
 
 
 @pytest.mark.parametrize("slope_deg", [15.0, 35.0, 55.0, 75.0, 90.0, 110.0])
