@@ -80,13 +80,18 @@ class Beside(Generic[T]):
         theirs_out.close()
         self._told: list[bytes] = []
         self._bytes = 0
+        self._alive = True
         self._lock = threading.Lock()
         self._batches: queue.Queue[list[bytes] | None] = queue.Queue(_MOST_BATCHES)
         self._writer = threading.Thread(target=self._write, name="beside", daemon=True)
         self._writer.start()
 
     def tell(self, method: Callable[Concatenate[T, P], object], *args: P.args, **kwargs: P.kwargs) -> None:
-        """Have a method called, in order, without waiting for it; a process that has died is told of by the next `ask`."""
+        """Have a method called, in order, without waiting for it.
+
+        Raises:
+            LhdmapError: the process has died; that may be noticed a little later.
+        """
         self._send(False, method, args, kwargs)
 
     def ask(self, method: Callable[Concatenate[T, P], R], *args: P.args, **kwargs: P.kwargs) -> R:
@@ -121,6 +126,8 @@ class Beside(Generic[T]):
         self._answers.close()
 
     def _send(self, wanted: bool, method: Callable[..., object], args: tuple[Any, ...], kwargs: dict[str, Any]) -> None:
+        if not self._alive:
+            raise self._died()
         order = pickle.dumps((wanted, method.__name__, args, kwargs), pickle.HIGHEST_PROTOCOL)
         with self._lock:
             self._told.append(order)
@@ -134,13 +141,12 @@ class Beside(Generic[T]):
 
     def _write(self) -> None:
         """Write what was told, in a thread: a process that starts, or thinks, must not hold up the teller."""
-        alive = True
         while (batch := self._batches.get()) is not None:
-            if alive:
-                try:
+            try:
+                if self._alive:
                     self._pipe.send(batch)
-                except OSError:
-                    alive = False  # the next answer that is waited for will not come, which tells
+            except OSError:  # a broken pipe must not look like that of standard output
+                self._alive = False
         self._pipe.close()
 
     def _died(self) -> LhdmapError:

@@ -91,10 +91,14 @@ def test_an_object_that_cannot_be_made(tmp_path: Path) -> None:
 def test_a_process_that_is_killed_is_told_of(tmp_path: Path) -> None:
     with Beside(Notebook, tmp_path / "kept") as notebook:
         os.kill(notebook.ask(Notebook.process), signal.SIGKILL)
-        for _ in range(200):  # more than the pipe and the queue hold: nothing may wait for the dead
-            notebook.tell(Notebook.add, 1, bytes(200_000))
-        with pytest.raises(LhdmapError, match="--one-process"):
+
+        def go_on() -> None:
+            for _ in range(200):  # more than the pipe and the queue hold: nothing may wait for the dead
+                notebook.tell(Notebook.add, 1, bytes(200_000))
             notebook.ask(Notebook.numbers)
+
+        with pytest.raises(LhdmapError, match="--one-process"):
+            go_on()
 
 
 def test_ctrl_c_is_left_to_the_side_that_tells(tmp_path: Path) -> None:
