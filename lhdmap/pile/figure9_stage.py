@@ -1,4 +1,8 @@
-"""Fig. 9 as a stage, beside `PileStage`: the cloud grows scan by scan, and the loop ends by the paper's conditions."""
+"""Fig. 9 as a stage, beside `PileStage`: the cloud grows scan by scan, and the loop ends by the paper's conditions.
+
+The paper's drives begin 50 m before the pile. Of longer ones, what is farther from the machine than `reach_m` is let go, so
+that an estimate costs the same however long the drive.
+"""
 
 from __future__ import annotations
 
@@ -14,7 +18,7 @@ from lhdmap.pile.result import PileReport, Snapshot
 from lhdmap.pile.settings import PileSettings
 from lhdmap.pile.stage import ScanHits
 
-_CELL_M = 0.1  # finer than the method's own voxels: bounds the memory by the map
+_CELL_M = 0.1  # finer than the method's own voxels
 _SCANS_BETWEEN = 25
 
 
@@ -35,9 +39,9 @@ class Figure9Stage:
         if self._ended:
             return None
         self._fresh.append(scan.points_map)
-        if len(self._fresh) >= _SCANS_BETWEEN:
-            self._merge()
         position = scan.T_map_base[:3]
+        if len(self._fresh) >= _SCANS_BETWEEN:
+            self._merge(position)
         if self._position is not None and np.hypot(*(position - self._position)[:2]) < self._settings.update_m:
             return None
         self._position = position
@@ -49,7 +53,7 @@ class Figure9Stage:
         return PileReport(self._decision, self._decision or last, tuple(self._history), self._settings.method)
 
     def _estimate(self, scan: ScanHits) -> Snapshot:
-        self._merge()
+        self._merge(scan.T_map_base[:3])
         x, y, z, heading = (float(value) for value in scan.T_map_base)
         T_map_base = se3.from_rpy(0.0, 0.0, heading, (x, y, z))
         estimate = figure9(self._points, T_map_base, self._constants)
@@ -63,8 +67,9 @@ class Figure9Stage:
             self._decision = snapshot
         return snapshot
 
-    def _merge(self) -> None:
-        """Keep one point a cell."""
+    def _merge(self, position: FloatArray) -> None:
+        """Keep one point a cell, near the machine's position (3,)."""
         points = np.concatenate([self._points, *self._fresh])
+        points = points[np.hypot(*(points - position)[:, :2].T) < self._settings.reach_m]
         _, first = np.unique(np.floor(points / _CELL_M).astype(np.int64), axis=0, return_index=True)
         self._points, self._fresh = points[np.sort(first)], []

@@ -20,6 +20,11 @@ from typing import Any, Concatenate, Generic, ParamSpec, Protocol, Self, TypeVar
 
 from lhdmap.errors import LhdmapError
 
+
+class HelperDied(LhdmapError):
+    """The process beside this one has ended by itself: killed, or out of memory."""
+
+
 P = ParamSpec("P")
 R = TypeVar("R")
 _BATCH_BYTES, _MOST_BATCHES = 100_000, 100  # switching threads for each order would cost more than the order
@@ -64,7 +69,8 @@ class Here(Generic[T]):
 class Beside(Generic[T]):
     """The object in a new process, which sees nothing of this one but the arguments; all of them are pickled.
 
-    An error of a call that was only told comes out of the next `ask`; calls in between are left out. Several threads may tell.
+    An error of a call that was only told, and the death of the process, come out of the next `ask`; calls in between are
+    left out. Several threads may tell.
     The main module is imported anew there (`multiprocessing`, spawn): a script needs its `if __name__ == "__main__"`.
     """
 
@@ -87,18 +93,15 @@ class Beside(Generic[T]):
         self._writer.start()
 
     def tell(self, method: Callable[Concatenate[T, P], object], *args: P.args, **kwargs: P.kwargs) -> None:
-        """Have a method called, in order, without waiting for it.
-
-        Raises:
-            LhdmapError: the process has died; that may be noticed a little later.
-        """
+        """Have a method called, in order, without waiting for it."""
         self._send(False, method, args, kwargs)
 
     def ask(self, method: Callable[Concatenate[T, P], R], *args: P.args, **kwargs: P.kwargs) -> R:
         """Have a method called and return what it returns.
 
         Raises:
-            LhdmapError: the process has died; or whatever this call, or one before it, raised there.
+            HelperDied: the process has ended.
+            Exception: whatever this call, or one before it, raised there.
         """
         self._send(True, method, args, kwargs)
         try:
@@ -127,7 +130,7 @@ class Beside(Generic[T]):
 
     def _send(self, wanted: bool, method: Callable[..., object], args: tuple[Any, ...], kwargs: dict[str, Any]) -> None:
         if not self._alive:
-            raise self._died()
+            return
         order = pickle.dumps((wanted, method.__name__, args, kwargs), pickle.HIGHEST_PROTOCOL)
         with self._lock:
             self._told.append(order)
@@ -149,9 +152,9 @@ class Beside(Generic[T]):
                 self._alive = False
         self._pipe.close()
 
-    def _died(self) -> LhdmapError:
+    def _died(self) -> HelperDied:
         self._process.join(_PATIENCE_S)
-        return LhdmapError(
+        return HelperDied(
             f"the helper process ended (exit code {self._process.exitcode}): too little memory? "
             "--one-process does without it"
         )
@@ -182,5 +185,16 @@ def _tried(call: Callable[..., Any], *args: Any, **kwargs: Any) -> tuple[Any, Ex
     try:
         return call(*args, **kwargs), None
     except Exception as error:  # noqa: BLE001  # is raised again in the other process
-        error.add_note(traceback.format_exc())
-        return None, error
+        return None, _portable(error, traceback.format_exc())
+
+
+def _portable(error: Exception, origin: str) -> Exception:
+    """Return the error as it can be sent, with where it came from: some are pickled in part, or not at all."""
+    error.add_note(origin)
+    try:
+        pickle.loads(pickle.dumps(error))  # noqa: S301  # just made
+    except Exception:  # noqa: BLE001  # whatever the reason: it cannot travel
+        told = RuntimeError(f"{type(error).__name__}: {error}")
+        told.add_note(origin)
+        return told
+    return error

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -21,7 +22,7 @@ from lhdmap.machine import Machine
 from lhdmap.mapfolder import MapFolderWriter, MapInfo
 from lhdmap.messages import Joints, LaserScan, Message, PointCloud
 from lhdmap.pile.result import PileReport
-from lhdmap.pipeline.beside import Beside, Here
+from lhdmap.pipeline.beside import Beside, HelperDied, Here
 from lhdmap.pipeline.given import given_rows
 from lhdmap.pipeline.identify import identify_along
 from lhdmap.pipeline.inspection import Inspection, Inspector, PileBeside, peak_memory_mib
@@ -91,8 +92,7 @@ def build_map(request: BuildRequest) -> BuildResult:
             )
             interrupted = _run(pipeline, source, request.progress)
             outcome = _Outcome(request, source, pipeline, started, given)
-            _write(folder, outcome, inspector)
-            beside_mib = _beside_mib(inspector)
+            beside_mib = _write(folder, outcome, inspector)
         if interrupted:  # what was finished is kept under the partial name
             raise KeyboardInterrupt
         info = MapInfo(request.logs, settings_table(request.settings), outcome.summary, outcome.warnings)
@@ -163,7 +163,8 @@ class _Outcome:
         if stage is None or not self.pipeline.has_inclinometer:
             return None
         if not moved:
-            return self.pipeline.path.moved(stage.report())
+            with contextlib.suppress(HelperDied):  # looked for anew below, and told of when the report is written
+                return self.pipeline.path.moved(stage.report())
         machine = self.pipeline.machine
         return identify_along(rows, request.logs, request.settings, machine, request.topics)
 
@@ -211,31 +212,39 @@ def integrate_again(request: BuildRequest, pipeline: MappingPipeline, rows: Rows
     return sweeps.cloud()
 
 
-def _write(folder: MapFolderWriter, outcome: _Outcome, inspector: Inspector) -> None:
-    inspector.tell(Inspection.write, outcome.report(), outcome.pipeline.machine or Machine(bodies={}))
+def _write(folder: MapFolderWriter, outcome: _Outcome, inspector: Inspector) -> float:
+    """Write all files of the map but `map.json`; return the memory that a process beside this one took, MiB."""
+    shown = outcome.report(), outcome.pipeline.machine or Machine(bodies={})
+    inspector.tell(Inspection.write, *shown)
     folder.write_trajectory(outcome.final)
     folder.write_odometry(outcome.odometry)
     folder.write_diagnostics(outcome.pipeline.records.diagnostics())
     write_cloud(folder.path / "cloud.ply", outcome.cloud)
     if outcome.pile is not None:
         folder.write_json("pile.json", outcome.pile.to_json())
+    try:
+        peak_mib = inspector.ask(Inspection.peak_memory_mib)
+    except HelperDied as error:
+        outcome.warnings.append(f"{error}; the recording has no scans in it")
+        with _inspection(Here, outcome.request, outcome.source, folder.path) as here:
+            here.ask(Inspection.write, *shown)
+        return 0.0
+    return peak_mib if isinstance(inspector, Beside) else 0.0
 
 
 def _inspector(request: BuildRequest, source: LogSource, folder: Path) -> Inspector:
     """Return where the inspection happens: beside this process where that is wanted and pays."""
     beside = request.helper and source.duration_s >= _BESIDE_FROM_S and _cores() > 1
-    make: Callable[..., Inspector] = Beside if beside else Here
+    return _inspection(Beside if beside else Here, request, source, folder)
+
+
+def _inspection(make: Callable[..., Inspector], request: BuildRequest, source: LogSource, folder: Path) -> Inspector:
     return make(Inspection, folder, request.target.name, source.start_ns or 0, request.settings)
 
 
 def _cores() -> int:
     """Return how many cores this process may use."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-
-
-def _beside_mib(inspector: Inspector) -> float:
-    """Return the memory that a process beside this one took, once it has written all."""
-    return inspector.ask(Inspection.peak_memory_mib) if isinstance(inspector, Beside) else 0.0
 
 
 def _sweep_sink(inspector: Inspector) -> Callable[[str, int, Any], None]:

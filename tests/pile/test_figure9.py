@@ -11,6 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from lhdmap.geometry.se3 import from_rpy
 from lhdmap.messages import FloatArray
+from lhdmap.pile import figure9_stage
 from lhdmap.pile.figure9 import (
     distance_to_center_m,
     drift_heading_rad,
@@ -22,7 +23,9 @@ from lhdmap.pile.figure9 import (
 from lhdmap.pile.figure9_fit import largest_cluster, plane_inclination_deg, voxelised
 from lhdmap.pile.figure9_settings import Figure9Constants, RepairedConstants
 from lhdmap.pile.result import PileEstimate
+from lhdmap.pile.settings import PileSettings
 from lhdmap.pile.slope_status import status_of, status_probabilities
+from lhdmap.pile.stage import ScanHits
 from lhdmap.settings import load_section
 
 from tests.pile.piled_drift import TOE_M, PiledDrift
@@ -208,6 +211,25 @@ def test_loop_ends_at_100_points_as_printed_and_at_15_m_when_it_waits() -> None:
     assert [loop_ends(of(n), near, PRINTED) for n in (0, 1, 99, 100)] == [False, True, True, True]
     assert [loop_ends(of(n), far, REPAIRED) for n in (0, 1, 99, 100)] == [False, False, False, False]
     assert [loop_ends(of(n), near, REPAIRED) for n in (0, 1, 99, 100)] == [False, True, True, True]
+
+
+def test_a_stage_judges_what_is_near_the_machine_however_long_the_drive(monkeypatch: pytest.MonkeyPatch) -> None:
+    judged: list[FloatArray] = []
+
+    def watched(points: FloatArray, *_: object) -> PileEstimate:
+        judged.append(points)
+        return PileEstimate()
+
+    monkeypatch.setattr(figure9_stage, "figure9", watched)
+    stage = figure9_stage.Figure9Stage(PileSettings(reach_m=20.0), PRINTED)
+    section = np.stack(np.meshgrid(np.arange(0.0, 12.0, 0.3), [-2.0, 2.0], [0.5, 1.0]), -1).reshape(-1, 3)
+    for number in range(400):
+        place = np.array([0.5 * number, 0.0, 0.0, 0.0])
+        stage.update(ScanHits(number, section + place[:3], place))
+        assert np.abs(judged[-1][:, 0] - place[0]).max() < 20.0
+    assert len(judged) == 400
+    assert max(map(len, judged[200:])) < 1.02 * max(map(len, judged[:200]))
+    assert judged[-1][:, 0].min() < place[0] - 19.0
 
 
 def test_status_by_thresholds() -> None:
