@@ -18,6 +18,9 @@ _MOST_TURN = 0.35
 _STOPE_M = 0.35  # a wall at the face stands so much farther out than before: a stope's, the drift ends at its mouth
 _BEFORE_M = (4.5, 11.5)  # where the drift before a stope is looked for
 _NEAREST_BINS = 8
+_FLOOR_HITS = 12
+_AWAY_M = 1.4  # from the toe
+_ROCK_M = 0.5  # above the path: its grade goes on for up to 25 m, and may change
 
 
 class Frame2(NamedTuple):
@@ -122,21 +125,28 @@ def _line(x, y):  # type: ignore[no-untyped-def]
 
 
 @nb.njit(cache=True, nogil=True)
-def floor_before(points, toe_x_m, half_m):  # type: ignore[no-untyped-def]
-    """Return z of the floor in the metres before a toe, from hits (N, 3+) in the end frame; NaN where it was not seen."""
-    z = np.empty(points.shape[0])
+def floor_before(points, toe_x_m, half_m, path_z_m):  # type: ignore[no-untyped-def]
+    """Return z of the floor in the metres before a toe, from hits (N, 3+) in the end frame; NaN where it was not seen.
+
+    Rocks of the face lie before its toe as well, but not farther away, and higher than where the machine's path would lead.
+    """
+    x, z = np.empty(points.shape[0]), np.empty(points.shape[0])
     before = 0
     for i in range(points.shape[0]):
-        x = points[i, 0]
-        if x > toe_x_m - 5.0 and x < toe_x_m - 0.4 and abs(points[i, 1]) < half_m - 0.6:
-            z[before] = points[i, 2]
+        along = points[i, 0] - toe_x_m
+        if along > -5.0 and along < -0.4 and abs(points[i, 1]) < half_m - 0.6:
+            x[before], z[before] = along, points[i, 2]
             before += 1
-    if before < 12:
+    if before < _FLOOR_HITS:
         return math.nan
-    high = quantile(z, before, 0.2) + 0.25
-    flat = 0
+    high = quantile(z[:before].copy(), before, 0.2) + 0.25
+    flat, away = 0, 0
     for i in range(before):
         if z[i] < high:
             z[flat] = z[i]
             flat += 1
-    return quantile(z, flat, 0.5) if flat >= 12 else math.nan
+            away += x[i] < -_AWAY_M
+    if flat < _FLOOR_HITS:
+        return math.nan
+    floor = quantile(z, flat, 0.5)
+    return floor if away >= _FLOOR_HITS or floor < path_z_m + _ROCK_M else math.nan

@@ -185,9 +185,10 @@ def _on_face(points, model, sides, path, used):  # type: ignore[no-untyped-def]
     if count < _FEWEST_HITS:
         return math.nan, False, 0
     toe_x = model[0] + model[2] * path[0]
-    floor = floor_before(points, toe_x, 0.5 * (sides[0] - sides[1]))
+    path_z = path[0] + path[1] * toe_x
+    floor = floor_before(points, toe_x, 0.5 * (sides[0] - sides[1]), path_z)
     seen = not math.isnan(floor)
-    floor = min(floor if seen else path[0] + path[1] * toe_x, quantile(low, count, 0.01))
+    floor = min(floor if seen else path_z, quantile(low, count, 0.01))
     # downhill the scan meets the face high up: what lies above the defined heights then tells more than their upper edge alone
     top = max(floor + HIGH_M, quantile(low, count, 0.05) + _LEAST_SPAN_M)
     hits = 0

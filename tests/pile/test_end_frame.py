@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from lhdmap.messages import FloatArray
 from lhdmap.pile.corridor import BIN_M, Corridor
-from lhdmap.pile.end_frame import end_of
+from lhdmap.pile.end_frame import end_of, floor_before
 
 FACE_M = 16.0
 
@@ -36,3 +36,26 @@ def test_stope_ends_the_drift_at_its_mouth(slope: float) -> None:
     assert end is not None
     assert end.half_m == pytest.approx(1.8, abs=0.1)
     assert end.middle_m == pytest.approx(slope * FACE_M, abs=0.2)
+
+
+def _hits(from_x_m: float, to_x_m: float, z_m: float) -> FloatArray:
+    x, y = np.meshgrid(np.linspace(from_x_m, to_x_m, 20), np.linspace(-1.5, 1.5, 10))
+    return np.column_stack([x.ravel(), y.ravel(), np.full(x.size, z_m) + 0.02 * np.sin(7.0 * x.ravel())])
+
+
+def test_floor_before_a_toe_is_where_its_hits_lie() -> None:
+    floor = floor_before(_hits(2.0, 9.0, 0.7), 10.0, 2.0, 0.0)
+    assert floor == pytest.approx(0.7, abs=0.03)
+
+
+def test_floor_seen_just_before_the_toe_is_one_where_the_path_leads() -> None:
+    assert floor_before(_hits(8.8, 9.6, 0.2), 10.0, 2.0, 0.0) == pytest.approx(0.2, abs=0.03)
+
+
+def test_rocks_of_the_face_before_its_toe_are_no_floor() -> None:
+    """Seen from above, only the upper face is hit: its rocks lie before the plane's toe, a metre above the path's floor."""
+    assert math.isnan(floor_before(_hits(8.8, 9.6, 1.0), 10.0, 2.0, 0.0))
+
+
+def test_floor_is_not_known_where_nothing_lies_before_the_toe() -> None:
+    assert math.isnan(floor_before(_hits(11.0, 13.0, 1.0), 10.0, 2.0, 0.0))
