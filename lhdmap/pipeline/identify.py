@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -96,8 +96,22 @@ def identify_along(
     topics: Mapping[str, str] | None = None,
 ) -> PileReport:
     """Run the pile stage alone, on poses that are known: given ones, or those of a map whose loops were closed."""
+    watch = PileWatch(settings, _GIVEN_POSES)
+    for scan in placed_along(rows, logs, settings, machine, topics):
+        watch.update(scan)
+    return watch.report()
+
+
+def placed_along(
+    rows: Rows,
+    logs: Sequence[Path],
+    settings: Settings,
+    machine: Machine | None,
+    topics: Mapping[str, str] | None = None,
+) -> Iterator[PlacedScan]:
+    """Yield the front scans with where they were taken, on poses that are known; scans without a pose are left out."""
     track, mounts = FinalTrack(rows), Mounts(machine)
-    watch, boxes = PileWatch(settings, _GIVEN_POSES), own_boxes(machine, settings.integration.body_margin_m)
+    boxes = own_boxes(machine, settings.integration.body_margin_m)
     with LogSource(list(logs), topics) as source:
         for _, message in source.messages([role for role in ("tf_static", "front") if role in source.roles]):
             if isinstance(message, Mount):
@@ -110,9 +124,7 @@ def identify_along(
                 roll, pitch, heading = se3.to_rpy(T)
                 pose = np.array([*T[:3, 3], heading])
                 T_level_sensor = level_sensor(mounts.of(message.frame_id, "front"), roll, pitch)
-                velocity = _velocity(track, time_ns)
-                watch.update(PlacedScan(message, T_level_sensor, velocity, boxes, pose))
-    return watch.report()
+                yield PlacedScan(message, T_level_sensor, _velocity(track, time_ns), boxes, pose)
 
 
 def _velocity(track: FinalTrack, time_ns: int) -> FloatArray:
