@@ -50,6 +50,12 @@ class Motion:
         return self.state[3:6].copy()
 
     @property
+    def way_forward_m(self) -> float:
+        """Forward part of the step just predicted, wheels fused so far included."""
+        heading = self.state[2] - 0.5 * self._way[2]
+        return float(math.cos(heading) * self._way[0] + math.sin(heading) * self._way[1])
+
+    @property
     def measured(self) -> bool:
         """Whether wheels measured both travel and turn of the step just predicted, and agree with the motion before."""
         return {FORWARD, TURNING} <= self._measured

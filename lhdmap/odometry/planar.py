@@ -19,6 +19,7 @@ from lhdmap.odometry.settings import AnchorSettings, OdometrySettings, RangeFlow
 from lhdmap.odometry.slant import NO_RISE
 from lhdmap.odometry.stale import StaleWheels
 from lhdmap.odometry.steps import Matched, OdometryStep, WheelStep, body_information, inflated, marginal_information
+from lhdmap.odometry.wheel_turn import WheelTurn
 
 _FIRST_SCANS = 10
 _SHORTEST_STEP_S = 1e-3
@@ -75,6 +76,7 @@ class PlanarOdometry:
         self._rate = AdaptiveRate(self._settings)
         self._wheels_used = False
         self.stale = StaleWheels()
+        self.wheel_turn = WheelTurn(self._settings.wheel_scale_std, self._settings.wheel_curvature_std)
         self.points = np.zeros((0, 3))  # hits of the last processed scan, level base frame, heights in odom
 
     def update(
@@ -94,8 +96,11 @@ class PlanarOdometry:
         self.points = points
         mount = _planar_mount(T_level_sensor)
         if isinstance(self._matcher, FlowMatcher):
-            return self._step(scan, self._matcher.step(points, mount))
-        return self._step(scan, self._matcher.step(points, mount, self._behind(view, floor_m), view.rise))
+            matched = self._matcher.step(points, mount)
+        else:
+            matched = self._matcher.step(points, mount, self._behind(view, floor_m), view.rise)
+        self._learn_turn(matched)
+        return self._step(scan, matched)
 
     def _behind(self, view: View, floor_m: float) -> Behind:
         """Return the rear scanner's hits; at rest they add nothing."""
@@ -125,13 +130,27 @@ class PlanarOdometry:
         """Tell the motion model the wheels' mean speeds; slipping wheels contradict it and stay out."""
         self._wheels_used = False
         if wheels is None or dt_s < _SHORTEST_STEP_S or not self.stale.believes(wheels, self._motion.velocity, dt_s):
+            self.wheel_turn.missed()
             return
         s = self._settings
         sigma_mps = math.hypot(wheels.forward_sigma_m / dt_s, s.wheel_noise_mps)
         self._wheels_used = self._motion.fuse_speed(FORWARD, wheels.forward_m / dt_s, sigma_mps, scaled=True)
-        if wheels.turn_rad is not None:
-            sigma_rps = math.hypot(wheels.turn_sigma_rad / dt_s, s.wheel_turn_noise_rps)
-            self._motion.fuse_speed(TURNING, wheels.turn_rad / dt_s, sigma_rps, scaled=False)
+        if wheels.turn_rad is None:
+            return
+        noise_rad = math.hypot(wheels.turn_sigma_rad, s.wheel_turn_noise_rps * dt_s)
+        turn_rad, off_rad = self.wheel_turn.corrected(wheels.turn_rad, self._motion.way_forward_m)
+        self._motion.fuse_speed(TURNING, turn_rad / dt_s, math.hypot(noise_rad, off_rad) / dt_s, scaled=False)
+        if self._wheels_used:
+            self.wheel_turn.measured(wheels.turn_rad, noise_rad)
+        else:
+            self.wheel_turn.missed()
+
+    def _learn_turn(self, matched: Matched) -> None:
+        """Have the wheels' turn compared with the walls', where these were seen well."""
+        if matched.lost or matched.doubtful:
+            self.wheel_turn.missed()
+        else:
+            self.wheel_turn.matched(self._motion.pose)
 
     def _step(self, scan: LaserScan, matched: Matched | None) -> OdometryStep:
         pose, velocity = self._motion.pose, self._motion.velocity

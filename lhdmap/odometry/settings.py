@@ -91,6 +91,19 @@ class OdometrySettings:
     wheel_turn_noise_rps: float = setting(
         0.05, unit="rad/s", doc="Noise of the wheels' turning rate.", minimum=0.001, source="lhdmap"
     )
+    wheel_scale_std: float = setting(
+        0.05,
+        minimum=0.0,
+        doc="How far the scale of the wheels' turn may be off, standard deviation; learned as the machine drives. 0: right.",
+        source="lhdmap: 0.93 to 1.03 in logs",
+    )
+    wheel_curvature_std: float = setting(
+        0.05,
+        unit="rad/m",
+        minimum=0.0,
+        doc="How far wheels may turn while the machine drives straight, standard deviation; learned. 0: not at all.",
+        source="lhdmap: 0.001 to 0.063 in logs",
+    )
     min_height_m: float = setting(
         0.35,
         unit="m",
