@@ -113,7 +113,9 @@ class AnchoredMatcher:
         doubtful = self._doubt > 0 or result.support < _DOUBTFUL_SUPPORT
         self._doubt = max(self._doubt - 1, 0)
         residual_m = result.residual_sigmas * self._noise_m
-        return Matched(result.information, residual_m, result.support, lost=False, doubtful=doubtful)
+        return Matched(
+            result.information, residual_m, result.support, lost=False, doubtful=doubtful, jumped=self._jumped
+        )
 
     def _hits(self, points: FloatArray, seen: Behind, rise: FloatArray) -> Hits:
         """Return what is matched: a level scanner sees the same curve of the walls again by itself."""

@@ -12,8 +12,8 @@ from lhdmap.odometry.settings import OdometrySettings
 
 FORWARD, LATERAL, TURNING = 3, 4, 5
 _GATE_SIGMAS = 4.0
-# Wheels that turn faster than the machine moves slip, for seconds; wheels that say anything else for longer than a moment
-# are right, and the match has run away along a direction that the walls do not fix.
+# Where walls do not hold the motion: wheels that turn faster than the machine moves slip, for seconds; wheels that say anything
+# else for longer than a moment are right, and the match has run away.
 _SLIP_S, _DISSENT_S = 3.0, 0.5
 _SHORTEST_STEP_S, _LONGEST_STEP_S = 1e-3, 1.0
 _STARTING_VARIANCE = np.diag([0.2**2, 0.05**2, 0.05**2])  # of a starting velocity from a dry run
@@ -35,6 +35,7 @@ class Motion:
         self._dissent_s = self._step_s = 0.0
         self._way, self._joint = np.zeros(3), np.zeros((10, 10))
         self._measured: set[int] = set()
+        self.held = False  # whether walls hold it in all directions, as the last scan says
         if velocity is not None:
             self.state[3:6] = velocity
             self.P[3:6, 3:6] = _STARTING_VARIANCE
@@ -103,7 +104,7 @@ class Motion:
             return True
         speed = float(self.state[FORWARD])
         slips = measured * speed > 0.0 and abs(measured) > abs(speed)
-        if self._dissent_s < (_SLIP_S if slips else _DISSENT_S):
+        if self.held or self._dissent_s < (_SLIP_S if slips else _DISSENT_S):
             return False
         self._override(direction, measured, sigma)
         self.P[:, :] = self._joint[:7, :7]

@@ -12,18 +12,17 @@ from lhdmap.messages import FloatArray, LaserScan
 from lhdmap.odometry.anchored import AnchoredMatcher
 from lhdmap.odometry.clock import ScanClock
 from lhdmap.odometry.flow_matcher import FlowMatcher
-from lhdmap.odometry.motion import FORWARD, TURNING, Motion
+from lhdmap.odometry.motion import Motion
 from lhdmap.odometry.rear_view import NO_POINTS, NOTHING_BEHIND, Behind, RearView, behind
 from lhdmap.odometry.scan_points import NO_BOXES, half_sweep_ns, planar_points
 from lhdmap.odometry.settings import AnchorSettings, OdometrySettings, RangeFlowSettings, SearchSettings
 from lhdmap.odometry.slant import NO_RISE
-from lhdmap.odometry.stale import StaleWheels
 from lhdmap.odometry.steps import Matched, OdometryStep, WheelStep, body_information, inflated, marginal_information
-from lhdmap.odometry.wheel_turn import WheelTurn
+from lhdmap.odometry.wheel_fusion import WheelFusion
 
 _FIRST_SCANS = 10
-_SHORTEST_STEP_S = 1e-3
 _SLOWEST_REAR_MPS = 0.1
+_WALLS_ALONE = 0.6  # support below which a crowd may be what the scan is held by
 
 
 class View(NamedTuple):
@@ -75,8 +74,7 @@ class PlanarOdometry:
         self._turn = 0
         self._rate = AdaptiveRate(self._settings)
         self._wheels_used = False
-        self.stale = StaleWheels()
-        self.wheel_turn = WheelTurn(self._settings.wheel_scale_std, self._settings.wheel_curvature_std)
+        self.wheels = WheelFusion(self._settings, self._motion)
         self.points = np.zeros((0, 3))  # hits of the last processed scan, level base frame, heights in odom
 
     def update(
@@ -85,7 +83,7 @@ class PlanarOdometry:
         """Process one scan; `T_level_sensor` (4, 4): mount and attitude, or what tells it where the scan is processed."""
         dt_s = self._clock.step(scan.stamp_ns)
         self._motion.predict(dt_s)
-        self._fuse(wheels, dt_s)
+        self._wheels_used = self.wheels.fuse(wheels, dt_s)
         if not self._rate.due(dt_s, self._motion.velocity) and not self._clock.bunched:
             return self._step(scan, None)
         if not isinstance(T_level_sensor, np.ndarray):
@@ -99,8 +97,13 @@ class PlanarOdometry:
             matched = self._matcher.step(points, mount)
         else:
             matched = self._matcher.step(points, mount, self._behind(view, floor_m), view.rise)
-        self._learn_turn(matched)
+        held = matched.support > _WALLS_ALONE and not self._weak(self._information(matched))
+        self.wheels.learn(self._motion.pose, matched, held=held and not matched.lost)
         return self._step(scan, matched)
+
+    def _information(self, matched: Matched) -> FloatArray:
+        """Return what the scan tells along, across and of the heading, shape (3,), in the body's axes."""
+        return marginal_information(body_information(matched.information, self._motion.state[2]))
 
     def _behind(self, view: View, floor_m: float) -> Behind:
         """Return the rear scanner's hits; at rest they add nothing."""
@@ -126,32 +129,6 @@ class PlanarOdometry:
         """What the motion model believes of the stamps."""
         return self._clock
 
-    def _fuse(self, wheels: WheelStep | None, dt_s: float) -> None:
-        """Tell the motion model the wheels' mean speeds; slipping wheels contradict it and stay out."""
-        self._wheels_used = False
-        if wheels is None or dt_s < _SHORTEST_STEP_S or not self.stale.believes(wheels, self._motion.velocity, dt_s):
-            self.wheel_turn.missed()
-            return
-        s = self._settings
-        sigma_mps = math.hypot(wheels.forward_sigma_m / dt_s, s.wheel_noise_mps)
-        self._wheels_used = self._motion.fuse_speed(FORWARD, wheels.forward_m / dt_s, sigma_mps, scaled=True)
-        if wheels.turn_rad is None:
-            return
-        noise_rad = math.hypot(wheels.turn_sigma_rad, s.wheel_turn_noise_rps * dt_s)
-        turn_rad, off_rad = self.wheel_turn.corrected(wheels.turn_rad, self._motion.way_forward_m)
-        self._motion.fuse_speed(TURNING, turn_rad / dt_s, math.hypot(noise_rad, off_rad) / dt_s, scaled=False)
-        if self._wheels_used:
-            self.wheel_turn.measured(wheels.turn_rad, noise_rad)
-        else:
-            self.wheel_turn.missed()
-
-    def _learn_turn(self, matched: Matched) -> None:
-        """Have the wheels' turn compared with the walls', where these were seen well."""
-        if matched.lost or matched.doubtful:
-            self.wheel_turn.missed()
-        else:
-            self.wheel_turn.matched(self._motion.pose)
-
     def _step(self, scan: LaserScan, matched: Matched | None) -> OdometryStep:
         pose, velocity = self._motion.pose, self._motion.velocity
         stamp_ns, time_ns = scan.stamp_ns, scan.stamp_ns + half_sweep_ns(scan)
@@ -160,7 +137,7 @@ class PlanarOdometry:
             return OdometryStep(
                 stamp_ns, time_ns, pose, covariance, velocity, np.zeros(3), math.nan, math.nan, False, "", False, False
             )
-        information = marginal_information(body_information(matched.information, pose[2]))
+        information = self._information(matched)
         weak = self._weak(information) or matched.lost or matched.doubtful
         substitute = ("wheels" if self._wheels_used else "motion") if weak else ""
         if weak:

@@ -29,7 +29,8 @@ class Matched(NamedTuple):
     """What a matcher says of one scan.
 
     `information` (3, 3) of the scan alone in `odom` axes, residual, share of hits that agree, whether the scan could not be
-    placed (the pose is then the prediction), and whether it was placed where the motion did not foretell it.
+    placed (the pose is then the prediction), whether it was placed where the motion did not foretell it, now or a moment ago, and
+    whether just now.
     """
 
     information: FloatArray
@@ -37,6 +38,7 @@ class Matched(NamedTuple):
     support: float
     lost: bool
     doubtful: bool = False
+    jumped: bool = False
 
 
 class OdometryStep(NamedTuple):

@@ -136,11 +136,8 @@ class MappingPipeline:
     @property
     def warnings(self) -> list[str]:
         """What the stages found odd, in words."""
-        stale = self.odometry.stale.steps if self.odometry is not None else 0
-        repeated = (
-            [f"wheel odometry: poses are repeated while the machine moves; {stale} steps left out"] if stale else []
-        )
-        return [*self.mounts.warnings, *self.attitude.warnings.texts(), *self.wheels.warnings.texts(), *repeated]
+        fused = self.odometry.wheels.warnings() if self.odometry is not None else []
+        return [*self.mounts.warnings, *self.attitude.warnings.texts(), *self.wheels.warnings.texts(), *fused]
 
     def _take_inclination(self, message: Inclination) -> None:
         if not self.has_inclinometer:

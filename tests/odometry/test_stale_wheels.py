@@ -66,4 +66,4 @@ def test_a_drive_with_wheels_that_hang() -> None:
     assert not any(one.lost for one in found)
     assert np.hypot(off[:, 0], off[:, 1]).max() < 0.05
     assert np.abs(off[:, 2]).max() < math.radians(0.5)
-    assert odometry.stale.steps == 15
+    assert odometry.wheels.stale.steps == 15

@@ -14,6 +14,7 @@ from lhdmap.messages import FloatArray
 from lhdmap.odometry.planar import PlanarOdometry
 from lhdmap.odometry.settings import OdometrySettings
 from lhdmap.odometry.steps import WheelStep
+from lhdmap.odometry.stretch import Compared, Stretch
 from lhdmap.odometry.wheel_turn import WheelTurn
 
 from tests.odometry.planar_drives import LEVEL, RATE_HZ, drive
@@ -29,12 +30,14 @@ def _turns(count: int, seed: int = 0) -> FloatArray:
 
 
 def _driven(turn: WheelTurn, true_rad: FloatArray, wheels_rad: FloatArray) -> WheelTurn:
-    pose = np.zeros(3)
-    turn.matched(pose)
+    pose, stretch = np.zeros(3), Stretch()
+    stretch.matched(pose)
     for true, wheels in zip(true_rad, wheels_rad, strict=True):
         pose = se2.compose(pose, np.array([STEP_M, 0.0, true]))
-        turn.measured(float(wheels), SIGMA_RAD)
-        turn.matched(pose)
+        stretch.measured(STEP_M, float(wheels), SIGMA_RAD)
+        compared = stretch.matched(pose)
+        if compared is not None:
+            turn.learn(compared)
     return turn
 
 
@@ -64,22 +67,30 @@ def test_what_is_known_to_be_right_is_left() -> None:
     assert turn.corrected(0.2, 1.0) == (0.2, 0.0)
 
 
-def test_a_stretch_that_was_not_seen_whole_teaches_nothing() -> None:
-    turn = WheelTurn(0.05, 0.05)
-    pose = np.zeros(3)
-    for _ in range(200):
-        turn.matched(pose)
-        turn.missed()  # the wheels slipped
-        turn.measured(0.3, SIGMA_RAD)
-        pose = se2.compose(pose, np.array([0.5, 0.0, 0.0]))
-    assert turn.state.tolist() == [1.0, 0.0]
+def test_a_stretch_that_was_not_seen_whole_is_not_compared() -> None:
+    stretch, pose = Stretch(), np.zeros(3)
+    for _ in range(20):
+        assert stretch.matched(pose) is None
+        stretch.missed()  # the wheels slipped
+        stretch.measured(0.9, 0.3, SIGMA_RAD)
+        pose = se2.compose(pose, np.array([0.9, 0.0, 0.0]))
+
+
+def test_a_stretch_is_what_was_driven_in_it() -> None:
+    stretch = Stretch()
+    stretch.matched(np.array([3.0, 1.0, 0.5]))
+    stretch.measured(0.6, 0.1, 0.02)
+    middle = se2.compose(np.array([3.0, 1.0, 0.5]), np.array([0.7, 0.0, 0.2]))
+    assert stretch.matched(middle) is None
+    stretch.measured(-0.5, 0.1, 0.02)
+    compared = stretch.matched(se2.compose(middle, np.array([-0.4, 0.0, 0.3])))
+    assert compared == pytest.approx((0.1, 0.2, 8e-4, 0.3, 0.5, 1.1))
 
 
 def test_a_leap_teaches_nothing() -> None:
     turn = _driven(WheelTurn(0.05, 0.05), _turns(1000), _turns(1000))
     before = turn.state.copy()
-    turn.measured(2.0, SIGMA_RAD)
-    turn.matched(np.array([5.0, 0.0, 0.0]))
+    turn.learn(Compared(5.0, 2.0, SIGMA_RAD**2, 5.0, 0.0, 5.0))
     assert turn.state == pytest.approx(before, abs=1e-9)
 
 
