@@ -16,7 +16,7 @@ from lhdmap.logs.formats import open_log
 from lhdmap.logs.inventory import Inventory, take_inventory
 from lhdmap.logs.scan_health import ScanWatch
 from lhdmap.logs.stamp_health import StampWatch
-from lhdmap.logs.topics import SCAN, assign_topics, is_ground_truth, missing_scanner
+from lhdmap.logs.topics import SCAN, is_ground_truth, missing_scanner, roles_and_doubt
 from lhdmap.logs.value_health import ValueWatch
 from lhdmap.messages import LaserScan, Message, Record
 
@@ -89,12 +89,10 @@ def _examined(reader: LogReader, overrides: Mapping[str, str], progress: Progres
 
 
 def _roles(reader: LogReader, overrides: Mapping[str, str]) -> tuple[dict[str, str], list[Finding]]:
-    try:
-        return assign_topics(reader.topics(), overrides), []
-    except InputError as error:
-        if overrides:
-            raise
-        return {}, [Finding(Severity.PROBLEM, "", str(error), "give that option to the other commands too")]
+    roles, doubt = roles_and_doubt(reader.topics(), overrides)
+    if doubt and overrides:
+        raise InputError(doubt)
+    return roles, [Finding(Severity.PROBLEM, "", doubt, "give that option to the other commands too")] if doubt else []
 
 
 def _topic_findings(reader: LogReader, watches: _Watches) -> list[Finding]:
@@ -119,6 +117,10 @@ def _missing(reader: LogReader, roles: Mapping[str, str], watches: _Watches) -> 
     scanners = [name for name, info in topics.items() if info.type_name in (SCAN, "sensor_msgs/msg/PointCloud2")]
     if not scanners:
         found.append(Finding(Severity.FATAL, "", str(missing_scanner(topics)), "record the scanner's topic"))
+    elif scanners == [roles.get("rear")]:
+        found.append(
+            Finding(Severity.PROBLEM, "", str(missing_scanner(topics, roles["rear"])), "or record the front one")
+        )
     elif not any(name in watches.stamps for name in scanners):
         text = "no scan in the log: its scanner topics hold no whole message"
         found.append(Finding(Severity.FATAL, "", text, "record it again"))

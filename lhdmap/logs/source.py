@@ -42,7 +42,7 @@ class LogSource:
             self._readers = [stack.enter_context(open_log(path)) for path in self.paths]
             self.roles = self._assigned()
             if "front" not in self.roles and "points" not in self.roles:
-                raise InputError(f"{self._names()}: {missing_scanner(self.topics())}")
+                raise InputError(f"{self._names()}: {missing_scanner(self.topics(), self.roles.get('rear'))}")
             for reader in self._readers:
                 reader.truth_topics = frozenset({self.roles.get("ground_truth", "")})
             self._stack = stack.pop_all()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 
 from lhdmap.errors import InputError, UsageError
@@ -33,8 +34,8 @@ ROLES: dict[str, tuple[str, str]] = {
 # Roles that a topic of the right type takes whatever its name, if it is the only one.
 _BY_TYPE = ("points", "inclinometer", "joints", "tachometer", "command", "wheel_odometry")
 # Words in the names of scanner topics; the last ones are CARMEN's.
-_FRONT_WORDS = ("front", "flaser", "robotlaser1", "rawlaser1")
-_REAR_WORDS = ("rear", "back", "rlaser", "robotlaser2", "rawlaser2")
+_FRONT_WORDS = re.compile(r"front|forward|(?<![a-z])(fwd|fore)(?![a-z])|flaser|robotlaser1|rawlaser1")
+_REAR_WORDS = re.compile(r"rear|back|(?<![a-z])aft(?![a-z])|rlaser|robotlaser2|rawlaser2")
 
 
 def is_ground_truth(topic: str) -> bool:
@@ -50,6 +51,16 @@ def assign_topics(topics: Mapping[str, TopicInfo], overrides: Mapping[str, str] 
         InputError: two topics could be the front scanner, or an override names a topic that the log lacks.
         UsageError: an override names an unknown role.
     """
+    chosen, doubt = roles_and_doubt(topics, overrides)
+    if doubt:
+        raise InputError(doubt)
+    return chosen
+
+
+def roles_and_doubt(
+    topics: Mapping[str, TopicInfo], overrides: Mapping[str, str] | None = None
+) -> tuple[dict[str, str], str]:
+    """Return the roles as `assign_topics`, and why none is the front scanner where several could be (else empty)."""
     chosen = _overridden(topics, overrides or {})
     free = {name: info for name, info in topics.items() if name not in chosen.values()}
     for role, (name, kind) in ROLES.items():
@@ -58,10 +69,10 @@ def assign_topics(topics: Mapping[str, TopicInfo], overrides: Mapping[str, str] 
     truths = {name: info for name, info in free.items() if is_ground_truth(name)}
     _assign_by_type("ground_truth", chosen, truths)
     free = {name: info for name, info in free.items() if name not in truths}
-    _assign_scanners(chosen, free)
+    doubt = _assign_scanners(chosen, free)
     for role in _BY_TYPE:
         _assign_by_type(role, chosen, free)
-    return chosen
+    return chosen, doubt
 
 
 def _overridden(topics: Mapping[str, TopicInfo], overrides: Mapping[str, str]) -> dict[str, str]:
@@ -73,23 +84,22 @@ def _overridden(topics: Mapping[str, TopicInfo], overrides: Mapping[str, str]) -
     return dict(overrides)
 
 
-def _assign_scanners(chosen: dict[str, str], free: dict[str, TopicInfo]) -> None:
+def _assign_scanners(chosen: dict[str, str], free: dict[str, TopicInfo]) -> str:
+    """Assign rear and front scanner; return the doubt about the front one, if any."""
     scans = [name for name, info in free.items() if info.type_name == SCAN and info.count != 0]
-    rear = [name for name in scans if any(word in name.lower() for word in _REAR_WORDS)]
+    rear = [name for name in scans if _REAR_WORDS.search(name.lower())]
     if "rear" not in chosen and len(rear) == 1 and (len(scans) > 1 or "front" in chosen):
         chosen["rear"] = rear[0]
     if "front" in chosen:
-        return
+        return ""
     scans = [name for name in scans if name != chosen.get("rear")]
-    named = [name for name in scans if any(word in name.lower() for word in _FRONT_WORDS)]
-    candidates = named or scans
+    candidates = [name for name in scans if _FRONT_WORDS.search(name.lower())] or scans
     if len(candidates) == 1:
         chosen["front"] = candidates[0]
     elif candidates:
         listed, first = ", ".join(sorted(candidates)), min(candidates)
-        raise InputError(
-            f"{len(candidates)} topics could be the front scanner: {listed}; name it: --topic front={first}"
-        )
+        return f"{len(candidates)} topics could be the front scanner: {listed}; name it: --topic front={first}"
+    return ""
 
 
 def _assign_by_type(role: str, chosen: dict[str, str], free: Mapping[str, TopicInfo]) -> None:
@@ -100,7 +110,11 @@ def _assign_by_type(role: str, chosen: dict[str, str], free: Mapping[str, TopicI
         chosen[role] = same[0]
 
 
-def missing_scanner(topics: Mapping[str, TopicInfo]) -> InputError:
-    """Return the error for a log without any scanner topic."""
+def missing_scanner(topics: Mapping[str, TopicInfo], rear: str | None = None) -> InputError:
+    """Return the error for a log without a scanner to drive by; `rear`: the topic of the rear one, where there is one."""
+    if rear is not None:
+        return InputError(
+            f"no front scanner in the log, {rear} is the rear one; to drive by it, name it: --topic front={rear}"
+        )
     listed = ", ".join(f"{info.name} ({info.type_name})" for info in topics.values()) or "no topic at all"
     return InputError(f"no scanner in the log: it has {listed}; a {SCAN} or {CLOUD} topic is needed")

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 from lhdmap.errors import InputError, UsageError
 from lhdmap.logs.base import TopicInfo
-from lhdmap.logs.topics import ROLES, assign_topics, is_ground_truth
+from lhdmap.logs.topics import ROLES, assign_topics, is_ground_truth, missing_scanner, roles_and_doubt
 
 SCAN, ODOMETRY, IMU = "sensor_msgs/msg/LaserScan", "nav_msgs/msg/Odometry", "sensor_msgs/msg/Imu"
 
@@ -31,6 +31,8 @@ def test_a_contract_name_with_another_type_is_not_taken() -> None:
         (["front_scan", "rear_scan"], "/front_scan", "/rear_scan"),
         (["base_scan", "scan_back"], "/base_scan", "/scan_back"),
         (["FLASER", "RLASER"], "/FLASER", "/RLASER"),
+        (["sick_tim_fwd/scan", "sick_tim_aft/scan"], "/sick_tim_fwd/scan", "/sick_tim_aft/scan"),
+        (["laser/fore", "draft_scan"], "/laser/fore", None),
         (["rear_scan"], "/rear_scan", None),  # the only one is the front scanner, whatever it is called
     ],
 )
@@ -43,6 +45,19 @@ def test_doubt_is_an_error_that_lists_candidates_and_option() -> None:
     with pytest.raises(InputError, match=r"/left_scan, /right_scan.*--topic front=/left_scan"):
         assign_topics(_log(left_scan=SCAN, right_scan=SCAN))
     assert assign_topics(_log(left_scan=SCAN, right_scan=SCAN), {"front": "/right_scan"})["front"] == "/right_scan"
+
+
+def test_doubt_about_the_scanner_leaves_the_other_roles_known() -> None:
+    roles, doubt = roles_and_doubt(_log(left_scan=SCAN, right_scan=SCAN, imu=IMU))
+    assert roles == {"inclinometer": "/imu"}
+    assert "/left_scan, /right_scan" in doubt
+
+
+def test_a_rear_scanner_alone_is_told_how_to_drive_by() -> None:
+    topics = {"/lidar/rear/scan": TopicInfo("/lidar/rear/scan", SCAN, 9)}
+    roles, doubt = roles_and_doubt(topics)
+    assert (roles, doubt) == ({"rear": "/lidar/rear/scan"}, "")
+    assert "--topic front=/lidar/rear/scan" in str(missing_scanner(topics, roles["rear"]))
 
 
 def test_empty_scanner_topics_raise_no_doubt() -> None:
