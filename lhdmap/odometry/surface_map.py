@@ -25,6 +25,7 @@ LINE = 8  # numbers of a line: see `fit_line`
 KERNEL_SIGMA_CELLS = 2.0
 LAYERS = 8
 LAYER_M = 0.12
+_LAYERS_PER_M = 1.0 / LAYER_M  # one expression for all: a height between two layers falls into one
 _HEIGHT_SIGMA_M = 0.06
 _HEIGHT_PER_CELL = 1.5  # ... and at least so many cells: measured, a third less heading drift of a tilted scanner
 _FINE_M = 0.05
@@ -81,8 +82,8 @@ def _level(cell_m: float, cells: int) -> Level:
 
 @nb.njit(cache=True, nogil=True, inline="always")
 def _tag(ix: int, iy: int, iz: int, shift: int) -> int:
-    """Return a tag, never 0, that tells the tile of cell (ix, iy, iz) from those that share its place in the window."""
-    return (((ix >> shift) & 0x7FF) << 20 | ((iy >> shift) & 0xFFF) << 8 | ((iz >> 3) & 0xFF)) + 1
+    """Return a tag, never 0, that tells the tile of cell (ix, iy, iz) from those that share its place in the window; 31 bits."""
+    return (((ix >> shift) & 0x3FF) << 20 | ((iy >> shift) & 0xFFF) << 8 | ((iz >> 3) & 0xFF)) + 1
 
 
 @nb.njit(cache=True, nogil=True, inline="always")
@@ -120,7 +121,7 @@ def insert(level: Level, points_m: FloatArray, count_limit: float) -> None:
     shift = int(round(math.log2(level.size)))
     inverse = 1.0 / level.cell_m
     for i in range(points_m.shape[0]):
-        fx, fy, fz = points_m[i, 0] * inverse, points_m[i, 1] * inverse, points_m[i, 2] * (1.0 / LAYER_M)
+        fx, fy, fz = points_m[i, 0] * inverse, points_m[i, 1] * inverse, points_m[i, 2] * _LAYERS_PER_M
         if not (abs(fx) < 1e8 and abs(fy) < 1e8 and abs(fz) < 1e6):
             continue
         ix, iy, iz = int(math.floor(fx)), int(math.floor(fy)), int(math.floor(fz))
@@ -162,12 +163,12 @@ _lowest_bit: Any = intrinsic(_trailing_zeros)  # the place of the lowest bit tha
 @nb.njit(cache=True, nogil=True, inline="always")
 def _neighbours(level: Level, z: float, layered: bool) -> tuple[int, int]:
     """Return the first and the last layer to look at: coarse cells serve distant walls, seen at many heights."""
-    own = int(math.floor(z / LAYER_M))
+    own = int(math.floor(z * _LAYERS_PER_M))
     if not layered:
         return own, own
     if level.cell_m > _FINE_M:
         return own - 1, own + 1
-    return (own - 1, own) if z / LAYER_M - own < 0.5 else (own, own + 1)
+    return (own - 1, own) if z * _LAYERS_PER_M - own < 0.5 else (own, own + 1)
 
 
 @nb.njit(cache=True, nogil=True, inline="always")

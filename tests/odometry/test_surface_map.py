@@ -37,15 +37,20 @@ def mapped(*walls: FloatArray) -> SurfaceMap:
     st.floats(-100.0, 100.0),
     st.floats(-math.pi, math.pi),
     st.floats(-0.02, 0.02),
+    st.floats(-100.0, 100.0),
 )
-@example(0.0, 0.0, 2.359375, 0.0)
-def test_a_straight_wall_is_found_as_it_is(x: float, y: float, angle: float, beside: float) -> None:
+@example(0.0, 0.0, 2.359375, 0.0, 0.01)
+@example(
+    -1.0, -1.0, 0.0, 0.0, -0.5
+)  # a decline with everything behind and beside the start: once no wall was found there
+@example(0.0, 0.0, 0.0, 0.0, 11 * LAYER_M)  # between two layers
+def test_a_straight_wall_is_found_as_it_is(x: float, y: float, angle: float, beside: float, height: float) -> None:
     """A wall along the diagonal of the cells fills the fewest: 3.7 effective ones."""
-    map_ = mapped(wall((x, y), angle))
+    map_ = mapped(wall((x, y), angle, height))
     line = np.zeros(LINE)
     normal = np.array([-math.sin(angle), math.cos(angle)])
     at = np.array([x, y]) + beside * normal
-    assert fit_line(map_.fine, (at[0], at[1], 0.01), False, 3.5, ROOM, line)
+    assert fit_line(map_.fine, (at[0], at[1], height), False, 3.5, ROOM, line)
     assert abs(abs(line[2:4] @ normal) - 1.0) < 1e-4
     assert (at - line[:2]) @ line[2:4] == pytest.approx(math.copysign(beside, line[2:4] @ normal * beside), abs=5e-4)
     assert line[4] < 1e-5
