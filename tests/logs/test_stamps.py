@@ -43,6 +43,39 @@ def test_where_the_log_time_runs_backwards_too_the_stamp_is_kept() -> None:
     assert "kept, in file order" in line
 
 
+SECOND = 10**9
+
+
+def test_a_stamp_that_leaps_ahead_becomes_the_log_time_and_the_next_are_as_ever() -> None:
+    pairs = [(k * SECOND, k * SECOND + 5) for k in range(1, 7)]
+    pairs[2] = (3603 * SECOND, pairs[2][1])
+    got, keeper = _decided(pairs)
+    assert got == [k * SECOND for k in range(1, 7)]
+    assert keeper.warnings() == ["/scan: 1 stamps leap ahead; the log time is used for them instead"]
+
+
+def test_a_clock_that_was_set_is_believed_once_it_is_confirmed() -> None:
+    pairs = [(k * SECOND + (3600 * SECOND if k > 2 else 0), k * SECOND) for k in range(1, 9)]
+    got, _ = _decided(pairs)
+    assert got == [k * SECOND for k in range(1, 6)] + [(k + 3600) * SECOND for k in range(6, 9)]
+
+
+def test_a_pause_of_the_recording_is_no_leap() -> None:
+    got, keeper = _decided([(SECOND, SECOND), (7200 * SECOND, 7200 * SECOND)])
+    assert got == [SECOND, 7200 * SECOND]
+    assert keeper.warnings() == []
+
+
+def test_a_log_recorded_anew_keeps_the_clock_of_its_stamps() -> None:
+    """One stamp a millisecond back, and the rest of the topic went to the day of the copy."""
+    day = 86_400 * SECOND
+    pairs = [(k * SECOND, k * SECOND + day) for k in range(1, 7)]
+    pairs[2] = (2 * SECOND - 1_000_000, pairs[2][1])
+    got, keeper = _decided(pairs)
+    assert got == [k * SECOND for k in range(1, 7)]
+    assert "1 stamps run backwards" in keeper.warnings()[0]
+
+
 def test_equal_stamps_are_kept_and_counted() -> None:
     got, keeper = _decided([(10, 10), (10, 11), (12, 12)])
     assert got == [10, 10, 12]
