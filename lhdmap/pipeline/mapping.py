@@ -54,6 +54,7 @@ _WARM_SCANS, _FEWEST_WARM_SCANS, _WARM_NS = 50, 6, 1_500_000_000
 _TILTED = 0.01  # rise of the scan plane ahead (m/m)
 _PATIENCE_SCANS = 3  # after a pause of the whole log, wheels may come within as many scans before they count as silent
 _QUEUE_SCANS = 2000  # a sensor that stops must not hold back scans without bound
+_EARLY = 10_000  # inclinations that wait for their mount at most
 
 
 class MappingPipeline:
@@ -97,6 +98,7 @@ class MappingPipeline:
         self._scan_ns = (self._clock_ns, self._clock_ns)  # of the newest scan: its stamp, and that made rising
         self._disordered = False
         self._attitude_of: tuple[int, tuple[float, float]] = (-(2**63), (0.0, 0.0))
+        self._early: deque[Inclination] = deque(maxlen=_EARLY)  # until the first scan is processed
         self._waiting: deque[tuple[LaserScan | PointCloud, int]] = deque()
         self._boxes = own_boxes(machine, settings.integration.body_margin_m)
 
@@ -122,6 +124,7 @@ class MappingPipeline:
                 self._process_ready()
             case Mount():
                 self.mounts.update(message)
+                self._mount_inclinometer()
             case _:
                 pass
 
@@ -137,15 +140,27 @@ class MappingPipeline:
     def warnings(self) -> list[str]:
         """What the stages found odd, in words."""
         fused = self.odometry.wheels.warnings() if self.odometry is not None else []
-        return [*self.mounts.warnings, *self.attitude.warnings.texts(), *self.wheels.warnings.texts(), *fused]
+        return [*self.mounts.warnings, *self.attitude.texts(), *self.wheels.warnings.texts(), *fused]
 
     def _take_inclination(self, message: Inclination) -> None:
-        if not self.has_inclinometer:
-            self.has_inclinometer = True
-            if self.mounts.known(message.frame_id):
-                R_base_sensor = self.mounts.of(message.frame_id, "inclinometer").T_parent_child[:3, :3]
-                self.attitude = AttitudeFilter(self.settings.attitude, R_base_sensor)
-        self.attitude.update(message)
+        first, self.has_inclinometer = not self.has_inclinometer, True
+        if self._time_ns < 0:
+            self._early.append(message)
+        if first:
+            self._mount_inclinometer()
+        else:
+            self.attitude.update(message)
+
+    def _mount_inclinometer(self) -> None:
+        """Begin the attitude, with the inclinometer's mount if it is known; once more where that comes late."""
+        if not self._early:
+            return
+        frame, R_base_sensor = self._early[0].frame_id, None
+        if self.mounts.known(frame):
+            R_base_sensor = self.mounts.of(frame, "inclinometer").T_parent_child[:3, :3]
+        self.attitude = AttitudeFilter(self.settings.attitude, R_base_sensor)
+        for message in self._early:
+            self.attitude.update(message)
 
     def _process_ready(self) -> None:
         """Process the scans whose attitude and wheel motion later messages will not change."""
@@ -217,6 +232,7 @@ class MappingPipeline:
         time_ns = max(stamp_ns + half_sweep_ns(scan), self._time_ns + 1)
         step = self.odometry.update(*self._input(scan, self._time_ns, time_ns))
         self._time_ns = time_ns
+        self._early.clear()
         self.records.add_scan(scan.stamp_ns, stamp_ns)
         self._hold("front", stamp_ns, scan)
         if step.processed:
@@ -272,10 +288,10 @@ class MappingPipeline:
         return self.rear.near(time_ns, *self._attitude_at(time_ns))
 
     def _attitude_at(self, time_ns: int) -> tuple[float, float]:
-        """Return roll and pitch; a log without inclinometer, or a gap of it, counts as level."""
+        """Return roll and pitch; a log without inclinometer counts as level."""
         if self._attitude_of[0] != time_ns:  # a scan asks twice, and the filter fits anew each time
-            found = self.attitude.attitude_at(time_ns) if self.has_inclinometer else None
-            self._attitude_of = (time_ns, (0.0, 0.0) if found is None else (found.roll_rad, found.pitch_rad))
+            known = self.attitude.roll_pitch_at(time_ns) if self.has_inclinometer else (0.0, 0.0)
+            self._attitude_of = (time_ns, known)
         return self._attitude_of[1]
 
     def _wheel_step(self, before_ns: int, time_ns: int) -> WheelStep | None:

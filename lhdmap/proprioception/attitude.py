@@ -92,15 +92,17 @@ class AttitudeFilter:
         self._finished = False
         self._asked: tuple[int, int] = (0, -1)
         self._answer: Attitude | None = None
+        self._held, self._silent_s = (0.0, 0.0), 0.0
+        self._held_ns: int | None = None
 
     def update(self, message: Inclination) -> None:
         """Take one message; values that cannot be are left out, with a warning."""
         roll, pitch = message.roll_rad, message.pitch_rad
+        if self._R_sensor_base is not None and math.isfinite(roll) and math.isfinite(pitch):
+            roll, pitch, _ = se3.to_rpy(se3.from_rpy(roll, pitch, 0.0)[:3, :3] @ self._R_sensor_base)
         if abs(roll) > LARGEST_TILT_RAD or abs(pitch) > LARGEST_TILT_RAD:
             self.warnings.add("inclinometer: a tilt of more than 60 degrees; left out")
             return
-        if self._R_sensor_base is not None and math.isfinite(roll) and math.isfinite(pitch):
-            roll, pitch, _ = se3.to_rpy(se3.from_rpy(roll, pitch, 0.0)[:3, :3] @ self._R_sensor_base)
         self._watch_frozen(message.stamp_ns, roll, pitch)
         if self._is_outlier(message.stamp_ns, roll, pitch):
             return
@@ -131,6 +133,21 @@ class AttitudeFilter:
         if asked != self._asked:  # the stages ask for the same moment one after the other
             self._answer, self._asked = self._attitude(stamp_ns), asked
         return self._answer
+
+    def roll_pitch_at(self, stamp_ns: int) -> tuple[float, float]:
+        """Return roll and pitch at a time, radians; where nothing is known the last ones, with a warning. Times rise."""
+        found = self.attitude_at(stamp_ns)
+        if found is not None:
+            self._held = found.roll_rad, found.pitch_rad
+            self._held_ns = stamp_ns
+        elif self._held_ns is not None:
+            self._silent_s = max(self._silent_s, (stamp_ns - self._held_ns) * 1e-9)
+        return self._held
+
+    def texts(self) -> list[str]:
+        """Return what was odd, in words."""
+        silent = f"inclinometer: silent for {self._silent_s:.1f} s and more; the attitude before is kept there"
+        return [*self.warnings.texts(), *([silent] if self._silent_s > 0.0 else [])]
 
     def _attitude(self, stamp_ns: int) -> Attitude | None:
         values, factor = self._fit(np.array([stamp_ns], dtype=np.int64))

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import pytest
+from lhdmap.config import Settings
 from lhdmap.geometry import se3
 from lhdmap.machine import Machine
-from lhdmap.messages import Mount
+from lhdmap.messages import Inclination, Mount
+from lhdmap.pipeline.mapping import MappingPipeline
 from lhdmap.pipeline.mounts import Mounts, level_sensor
 
 T_BASE_MAST = se3.from_rpy(0.0, 0.0, 0.3, (1.0, 0.2, 0.5))
@@ -69,3 +73,17 @@ def test_level_frame_has_the_attitude_and_no_heading() -> None:
     T = level_sensor(mount, 0.0, np.radians(10.0))
     assert T[:3, 3] == pytest.approx([2.0 * np.sin(np.radians(10.0)), 0.0, 2.0 * np.cos(np.radians(10.0))])
     assert T[2, 0] < 0.0  # it looks down
+
+
+@pytest.mark.parametrize("first", [True, False])
+def test_the_inclinometer_s_mount_may_come_after_its_first_messages(first: bool) -> None:
+    """Its rotation was then ignored for the whole drive, without a word."""
+    pipeline = MappingPipeline(Settings(), cloud=False)
+    backwards = Mount(0, "base_link", "imu", se3.from_rpy(0.0, 0.0, math.pi))
+    if first:
+        pipeline.update("tf_static", backwards)
+    for k in range(200):
+        pipeline.update("inclinometer", Inclination(k * 10_000_000, "imu", 0.02, 0.05, None, None))
+        if not first and k == 5:
+            pipeline.update("tf_static", backwards)
+    assert pipeline.attitude.roll_pitch_at(10**9) == pytest.approx((-0.02, -0.05), abs=1e-9)

@@ -196,9 +196,21 @@ def test_a_frozen_sensor_is_reported() -> None:
     assert any("frozen" in text for text in attitude.warnings.texts())
 
 
+def test_a_gap_keeps_the_attitude_before_and_says_so() -> None:
+    """Level was taken instead: on a decline of 8 % a gap of 6 s cost half a metre of height."""
+    attitude = AttitudeFilter(AttitudeSettings())
+    for t in [*np.arange(0.0, 2.0, 0.02), *np.arange(6.0, 8.0, 0.02)]:
+        attitude.update(inclination(t, 0.01, 0.08))
+    for t in np.arange(1.0, 7.0, 0.1):
+        assert attitude.roll_pitch_at(ns(t)) == pytest.approx((0.01, 0.08), abs=1e-9)
+    (text,) = attitude.texts()
+    assert "silent for" in text
+
+
+@pytest.mark.parametrize("roll_deg", [0.0, 180.0, 90.0])
 @pytest.mark.parametrize("yaw_deg", [0.0, 90.0, 180.0, 30.0])
-def test_the_mounting_of_the_inclinometer_is_undone(yaw_deg: float) -> None:
-    T_base_sensor = se3.from_rpy(0.0, 0.0, math.radians(yaw_deg))
+def test_the_mounting_of_the_inclinometer_is_undone(yaw_deg: float, roll_deg: float) -> None:
+    T_base_sensor = se3.from_rpy(math.radians(roll_deg), 0.0, math.radians(yaw_deg))
     attitude = AttitudeFilter(AttitudeSettings(), T_base_sensor[:3, :3])
     R_map_sensor = se3.from_rpy(0.03, -0.08, 1.1)[:3, :3] @ T_base_sensor[:3, :3]
     roll, pitch, _ = se3.to_rpy(R_map_sensor)
