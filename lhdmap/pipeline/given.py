@@ -15,6 +15,7 @@ from lhdmap.pipeline.track import Rows
 from lhdmap.trajectory import Trajectory, read_tum
 
 GROUND_TRUTH = "ground-truth"
+_FARTHEST_M = 50_000.0  # the cloud is of 32-bit floats
 
 
 def given_rows(poses: str, logs: Sequence[Path], topics: Mapping[str, str]) -> Rows:
@@ -24,6 +25,12 @@ def given_rows(poses: str, logs: Sequence[Path], topics: Mapping[str, str]) -> R
         InputError: the file is not usable, or the log has no ground truth.
     """
     trajectory = _ground_truth(logs, topics) if poses == GROUND_TRUTH else read_tum(Path(poses))
+    farthest_m = float(np.abs(trajectory.positions_m).max(initial=0.0))
+    if farthest_m > _FARTHEST_M:
+        raise InputError(
+            f"{poses}: positions up to {farthest_m:.0f} m from their origin; map coordinates keep millimetres up to "
+            f"{_FARTHEST_M / 1e3:.0f} km: subtract an offset (of the mine's grid) first"
+        )
     order = np.argsort(trajectory.stamps_ns, kind="stable")
     stamps = trajectory.stamps_ns[order]
     once = np.concatenate([[True], np.diff(stamps) > 0])

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections import deque
+from collections import Counter, deque
 from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import replace
@@ -23,6 +23,8 @@ from lhdmap.proprioception.wheels import WheelOdometry
 
 ScanSink = Callable[[str, int, FloatArray], None]
 _BATCH_POINTS = 40_000  # sweeps are handed over together: switching between threads costs more than a small sweep
+_MOST_HELD = 6000  # sweeps of a scanner that wait for poses: two minutes at 50 Hz, after which none will come
+_BEYOND_NS = 200_000_000  # after the last pose the motion is carried on for as long
 _MOST_PENDING = 24  # batches handed over and not yet done: bounds the memory; realigned poses come many metres at once
 
 
@@ -46,12 +48,18 @@ class SweepIntegration:
         self._held: dict[str, deque[_Sweep]] = {}
         self._batch: list[_Sweep] = []
         self._points = 0
+        self._without_pose: Counter[str] = Counter()
+        self._without_angle = 0
         self._worker = ThreadPoolExecutor(max_workers=1, thread_name_prefix="integration")
         self._pending: deque[Future[None]] = deque()
 
     def hold(self, role: str, time_ns: int, message: LaserScan | PointCloud) -> None:
         """Keep a sweep until the track has passed it; `time_ns` is its stamp made rising."""
-        self._held.setdefault(role, deque()).append(_sweep(role, time_ns, message))
+        held = self._held.setdefault(role, deque())
+        if len(held) < _MOST_HELD:
+            held.append(_sweep(role, time_ns, message))
+        else:
+            self._without_pose[role] += 1
 
     def advance(self, track: Track, wheels: WheelOdometry) -> None:
         """Hand over the sweeps that end before the newest pose."""
@@ -63,16 +71,22 @@ class SweepIntegration:
                 self._add(held.popleft(), track, wheels)
 
     def finish(self, track: Track, wheels: WheelOdometry) -> None:
-        """Integrate all that is held, its motion carried on after the last pose, and wait for the worker."""
-        for held in self._held.values():
-            while held and len(track):
+        """Integrate what is held, its motion carried on for a moment after the last pose, and wait for the worker."""
+        last_ns = track.last_ns
+        for role, held in self._held.items():
+            while held and last_ns is not None and held[0].start_ns <= last_ns + _BEYOND_NS:
                 self._add(held.popleft(), track, wheels)
+            self._without_pose[role] += len(held)
+            held.clear()
         self.wait(track, wheels)
 
     def add_final(
         self, role: str, time_ns: int, message: LaserScan | PointCloud, track: FinalTrack, wheels: WheelOdometry
     ) -> None:
-        """Integrate a sweep soon: the path is known to its end."""
+        """Integrate a sweep soon: the path is known to its end; one without a pose is left out."""
+        if not track.covers(time_ns):
+            self._without_pose[role] += 1
+            return
         self._add(_sweep(role, time_ns, message), track, wheels)
 
     def wait(self, track: Track | FinalTrack, wheels: WheelOdometry) -> None:
@@ -81,6 +95,27 @@ class SweepIntegration:
         while self._pending:
             self._pending.popleft().result()
         self._worker.shutdown()
+
+    @property
+    def warnings(self) -> list[str]:
+        """What was left out, in words."""
+        refused, grid = self.integrator.totals.refused_sweeps, self.integrator.grid
+        told = [
+            f"integration: {count} sweeps of {role} at times without a pose of the machine left out"
+            for role, count in self._without_pose.items()
+            if count
+        ]
+        if self._without_angle:
+            told.append(
+                f"integration: {self._without_angle} sweeps of the rear body left out: no angle of the joint is known there"
+            )
+        if refused:
+            told.append(f"integration: {refused} sweeps without a finite pose left out")
+        if grid.refused:
+            told.append(
+                f"integration: {grid.refused} points left out: not finite, or over a million voxels from the map's origin"
+            )
+        return told
 
     def cloud(self) -> Cloud:
         """Return the cloud with normals and curvature; after `finish`."""
@@ -101,11 +136,20 @@ class SweepIntegration:
         if not batch:
             return
         ends = np.array([(sweep.start_ns, sweep.end_ns) for sweep in batch], dtype=np.int64)
-        T, angles = track.matrices_at(ends.ravel()), np.nan_to_num(wheels.articulations_at(ends.ravel()))
-        poses = BatchPoses(T.reshape(-1, 2, 4, 4), angles.reshape(-1, 2))
+        angles = wheels.articulations_at(ends.ravel()).reshape(-1, 2)
+        known = np.isfinite(angles).all(axis=1) | np.array([not self._turns(sweep) for sweep in batch])
+        self._without_angle += int(np.count_nonzero(~known))
+        batch, ends = [sweep for sweep, placed in zip(batch, known, strict=True) if placed], ends[known]
+        if not batch:
+            return
+        poses = BatchPoses(track.matrices_at(ends.ravel()).reshape(-1, 2, 4, 4), np.nan_to_num(angles[known]))
         self._pending.append(self._worker.submit(self._integrate, batch, poses))
         while len(self._pending) > _MOST_PENDING:
             self._pending.popleft().result()
+
+    def _turns(self, sweep: _Sweep) -> bool:
+        """Return whether the scanner is on the rear body: where that is, the joint's angle tells."""
+        return self._mounts.of(sweep.message.frame_id, sweep.role).parent_frame == "rear_link"
 
     def _integrate(self, batch: list[_Sweep], poses: BatchPoses) -> None:
         done = self.integrator.update_all([sweep.message for sweep in batch], poses)

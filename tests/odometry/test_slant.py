@@ -15,8 +15,8 @@ from lhdmap.geometry.se3 import from_rpy
 from lhdmap.logs.source import LogSource
 from lhdmap.messages import FloatArray
 from lhdmap.odometry.slant import rise_of, slants
-from lhdmap.pipeline.build import ROLES_READ
 from lhdmap.pipeline.mapping import MappingPipeline
+from lhdmap.pipeline.outcome import ROLES_READ
 from lhdmap.pipeline.track import resample
 from lhdmap.simulation.drive import simulate_drift
 from lhdmap.simulation.scenario import DriftScenario

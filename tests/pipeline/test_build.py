@@ -12,8 +12,9 @@ from lhdmap.evaluation.trajectory import evaluate_trajectory
 from lhdmap.integration.cloud_io import read_cloud
 from lhdmap.logs.source import LogSource
 from lhdmap.logs.writer import LogWriter
-from lhdmap.messages import LaserScan
+from lhdmap.messages import LaserScan, Mount
 from lhdmap.pipeline.build import BuildRequest, BuildResult, build_map
+from lhdmap.pipeline.outcome import ROLES_READ
 from lhdmap.provenance import sha256_of
 from lhdmap.simulation.drive import SimulatedDrive
 from lhdmap.trajectory import read_tum
@@ -107,14 +108,37 @@ def test_bad_streams_make_a_map(untold: Path, tmp_path: Path, change: str) -> No
     assert any("inclinometer" in text for text in found.warnings)
 
 
-def test_a_log_whose_scans_are_all_blind(untold: Path, tmp_path: Path) -> None:
+def test_a_log_whose_scans_are_all_blind_is_refused_as_by_doctor(untold: Path, tmp_path: Path) -> None:
     with LogSource([untold]) as source, LogWriter(tmp_path / "blind.mcap") as writer:
         for _, scan in source.messages(["front"]):
             assert isinstance(scan, LaserScan)
             writer.write("/lidar/front/scan", scan._replace(ranges_m=np.full_like(scan.ranges_m, np.inf)))
-    found = build_map(BuildRequest([tmp_path / "blind.mcap"], tmp_path / "map"))
-    assert np.isfinite(found.trajectory.positions_m).all()
-    assert found.summary["degenerate_share"] == 1.0
+    with pytest.raises(InputError, match=r"blind\.mcap: its scans hold no hit"):
+        build_map(BuildRequest([tmp_path / "blind.mcap"], tmp_path / "map"))
+
+
+def test_a_front_scanner_that_dies_ends_the_map_there(untold: Path, tmp_path: Path) -> None:
+    """The rear scanner went on: all its sweeps were put at the last pose that was known."""
+    with LogSource([untold]) as source, LogWriter(tmp_path / "dies.mcap") as writer:
+        start = source.start_ns or 0
+        for role, message in source.messages([role for role in ROLES_READ if role in source.roles]):
+            if role != "front" or message.stamp_ns < start + 2 * 10**9:
+                writer.write(source.roles[role], [message] if isinstance(message, Mount) else message)
+    found = build_map(BuildRequest([tmp_path / "dies.mcap"], tmp_path / "map"))
+    (warning,) = (text for text in found.warnings if "rear" in text)
+    assert "without a pose" in warning
+    assert len(found.trajectory.stamps_ns) < 60
+    assert found.summary["duration_s"] > 4.0
+
+
+def test_sweeps_of_the_rear_body_need_the_angle_of_the_joint(untold: Path, tmp_path: Path) -> None:
+    """A straight machine was assumed: in the bend the rear scanner's walls stood in the drift."""
+    with LogSource([untold]) as source, LogWriter(tmp_path / "stiff.mcap") as writer:
+        for role, message in source.messages([role for role in ROLES_READ if role in source.roles]):
+            if role != "joints":
+                writer.write(source.roles[role], [message] if isinstance(message, Mount) else message)
+    found = build_map(BuildRequest([tmp_path / "stiff.mcap"], tmp_path / "map"))
+    assert any("no angle of the joint" in text for text in found.warnings)
 
 
 def test_a_log_without_scans_is_refused(untold: Path, tmp_path: Path) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
 import numpy as np
@@ -10,7 +11,10 @@ from lhdmap.errors import InputError
 from lhdmap.geometry import se3
 from lhdmap.logs.writer import LogWriter
 from lhdmap.messages import LaserScan
+from lhdmap.pipeline.build import BuildRequest, build_map
 from lhdmap.pipeline.given import GROUND_TRUTH, given_rows
+from lhdmap.provenance import sha256_of
+from lhdmap.simulation.drive import SimulatedDrive
 from lhdmap.trajectory import Trajectory, write_tum
 
 START_NS = 1_700_000_000_123_456_789
@@ -37,3 +41,34 @@ def test_a_log_without_truth_says_so(tmp_path: Path) -> None:
         writer.write("/scan", LaserScan(START_NS, "laser", -1.0, 0.1, 0.0, 0.1, 50.0, np.full(21, 5.0, np.float32)))
     with pytest.raises(InputError, match="no ground-truth topic"):
         given_rows(GROUND_TRUTH, [log], {})
+
+
+def _moved(drive: SimulatedDrive, path: Path, by_ns: int = 0, by_m: float = 0.0, keep: slice = slice(None)) -> str:
+    truth = drive.truth
+    places = truth.positions_m[keep] + by_m
+    write_tum(path, Trajectory(truth.stamps_ns[keep] + by_ns, places, truth.quaternions_xyzw[keep]))
+    return str(path)
+
+
+def test_poses_of_another_time_are_refused(drive: SimulatedDrive, tmp_path: Path) -> None:
+    poses = _moved(drive, tmp_path / "late.tum", by_ns=3600 * 10**9)
+    with pytest.raises(InputError, match=r"none has a pose"):
+        build_map(BuildRequest([drive.log], tmp_path / "map", poses=poses))
+    assert (tmp_path / "map.partial" / "odometry.tum").exists()  # what was finished is kept
+
+
+def test_poses_in_a_mine_s_grid_are_refused(drive: SimulatedDrive, tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="subtract an offset"):
+        given_rows(_moved(drive, tmp_path / "utm.tum", by_m=453_000.0), [], {})
+
+
+def test_holes_between_poses_are_told_and_the_map_says_what_it_was_made_of(
+    drive: SimulatedDrive, tmp_path: Path
+) -> None:
+    poses = _moved(drive, tmp_path / "ends.tum", keep=slice(None, None, len(drive.truth.stamps_ns) - 1))
+    found = build_map(BuildRequest([drive.log], tmp_path / "map", poses=poses))
+    assert any("1 hole(s)" in text for text in found.warnings)
+    info = json.loads((found.folder / "map.json").read_text(encoding="utf-8"))
+    assert info["options"]["request"]["poses"] == poses
+    assert info["options"]["request"]["poses_file"]["sha256"] == sha256_of(Path(poses))
+    assert "given poses" in info["frames"]["map"]

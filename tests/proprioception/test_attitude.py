@@ -203,8 +203,7 @@ def test_a_gap_keeps_the_attitude_before_and_says_so() -> None:
         attitude.update(inclination(t, 0.01, 0.08))
     for t in np.arange(1.0, 7.0, 0.1):
         assert attitude.roll_pitch_at(ns(t)) == pytest.approx((0.01, 0.08), abs=1e-9)
-    (text,) = attitude.texts()
-    assert "silent for" in text
+    assert any("silent for" in text for text in attitude.texts())
 
 
 @pytest.mark.parametrize("roll_deg", [0.0, 180.0, 90.0])

@@ -21,8 +21,8 @@ from lhdmap.geometry import se3
 from lhdmap.logs.source import LogSource
 from lhdmap.machine import Machine
 from lhdmap.messages import FloatArray
-from lhdmap.pipeline.build import ROLES_READ, BuildRequest, integrate_again
 from lhdmap.pipeline.mapping import MappingPipeline
+from lhdmap.pipeline.outcome import ROLES_READ, Inputs, integrate_again
 from lhdmap.pipeline.track import Rows, resample, trajectory_of
 from lhdmap.simulation.drive import SimulatedDrive, simulate_drift
 from lhdmap.simulation.scenario import DriftScenario
@@ -65,8 +65,8 @@ def measure(seed: int, distance_m: float) -> dict[str, FloatArray]:
         times = np.array(pipeline.records.times_ns, dtype=np.int64)
         own = trajectory_of(resample(pipeline.path.final.rows(), times), times)
         cloud = pipeline.sweeps.cloud()
-        request = BuildRequest([drive.log], Path(folder) / "map")
-        exact = integrate_again(request, pipeline, rows_of(drive.truth))
+        inputs = Inputs([drive.log], Settings(), {}, "", posed=True)
+        exact = integrate_again(inputs, pipeline, rows_of(drive.truth)).cloud()
         moved = in_truth_frame(own.positions_m, own, drive.truth)
         return {
             "exact": distances_to_mesh(exact.points_m.astype(float), drive.mesh_file),

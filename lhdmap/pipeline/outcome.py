@@ -1,0 +1,217 @@
+"""What a run comes to: the ways that were driven, then cloud, pile, figures and warnings, for all files of the map folder."""
+
+from __future__ import annotations
+
+import contextlib
+import time
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from lhdmap.config import Settings, settings_toml
+from lhdmap.errors import InputError
+from lhdmap.integration.cloud import Cloud
+from lhdmap.logs.source import LogSource
+from lhdmap.machine import Machine
+from lhdmap.messages import Joints, LaserScan, PointCloud
+from lhdmap.pile.result import PileReport
+from lhdmap.pipeline.beside import HelperDied
+from lhdmap.pipeline.identify import identify_along
+from lhdmap.pipeline.inspection import peak_memory_mib
+from lhdmap.pipeline.mapping import MappingPipeline
+from lhdmap.pipeline.sweeps import SweepIntegration
+from lhdmap.pipeline.track import FinalTrack, Rows, resample, trajectory_of
+from lhdmap.proprioception.wheels import WheelOdometry
+from lhdmap.report.data import ReportData, Summary, TopicRow
+from lhdmap.smoothing.smoother import corrected
+from lhdmap.trajectory import Trajectory
+
+ROLES_READ = ("front", "rear", "points", "inclinometer", "joints", "tachometer", "wheel_odometry", "tf_static")
+_HOLE_S, _HOLE_M = 1.0, 2.0
+
+
+class Inputs(NamedTuple):
+    """What a map is made of: logs, settings, topics by role, title of the map, and whether poses were given."""
+
+    logs: Sequence[Path]
+    settings: Settings
+    topics: Mapping[str, str]
+    title: str
+    posed: bool
+
+
+class Ways(NamedTuple):
+    """The way by odometry alone and the final one, at the scans; the final `rows`, whether they `moved`, closed loops."""
+
+    odometry: Trajectory
+    final: Trajectory
+    rows: Rows
+    moved: bool
+    closures: int
+
+
+def odometry_of(pipeline: MappingPipeline) -> Trajectory:
+    """Return the way by odometry alone."""
+    stamps, times = _moments(pipeline)
+    return trajectory_of(resample(pipeline.track.rows(), times), stamps)
+
+
+def ways_of(pipeline: MappingPipeline, given: Rows | None) -> Ways:
+    """Close loops and return both ways; with `given` poses these are final.
+
+    Raises:
+        InputError: no scan was taken at a time of the given poses.
+    """
+    stamps, times = _moments(pipeline)
+    rows = pipeline.path.final.rows() if given is None else given
+    correction = None if given is not None else pipeline.smoother.correction(pipeline.path.correction())
+    if given is not None and not any(map(FinalTrack(given).covers, times.tolist())):
+        raise InputError(
+            f"the given poses are of {given.times_ns[0] / 1e9:.3f} to {given.times_ns[-1] / 1e9:.3f} s, "
+            f"the scans of {times[0] / 1e9:.3f} to {times[-1] / 1e9:.3f} s: none has a pose"
+        )
+    if correction is not None:
+        rows = Rows(rows.times_ns, corrected(rows.poses, rows.times_ns, correction))
+    final = trajectory_of(resample(rows, times), stamps)
+    moved = given is not None or correction is not None
+    return Ways(odometry_of(pipeline), final, rows, moved, 0 if correction is None else correction.closures)
+
+
+class Outcome:
+    """Cloud, pile, figures and warnings of a run.
+
+    Raises:
+        InputError: the scans hold no hit at all.
+    """
+
+    def __init__(
+        self, inputs: Inputs, source: LogSource, pipeline: MappingPipeline, ways: Ways, started: float
+    ) -> None:
+        self.pipeline, self.ways = pipeline, ways
+        self._inputs, self._source = inputs, source
+        rows = ways.rows
+        sweeps = integrate_again(inputs, pipeline, rows) if ways.moved else pipeline.sweeps
+        self.cloud: Cloud = sweeps.cloud()
+        distance_m = float(np.linalg.norm(np.diff(rows.poses[:, :3], axis=0), axis=1).sum())
+        if not len(self.cloud.points_m) and distance_m == 0.0:
+            raise InputError(f"{source.paths[0]}: its scans hold no hit; lhdmap doctor tells what is wrong")
+        self.pile = self._pile()
+        self.warnings = [*source.warnings, *source.damage, *pipeline.warnings, *sweeps.warnings, *_remarks(pipeline)]
+        self.warnings += _holes(rows) if inputs.posed else []
+        stamps, records = ways.odometry.stamps_ns, pipeline.records
+        self.duration_s = source.duration_s or float(stamps[-1] - stamps[0]) * 1e-9
+        self.summary: dict[str, Any] = {
+            "scans": len(stamps),
+            "scans_processed": records.processed,
+            "duration_s": self.duration_s,
+            "distance_m": distance_m,
+            **cost(started, self.duration_s),
+            "degenerate_share": records.degenerate_share,
+            "lost_stretches": records.lost_stretches,
+            "closures": ways.closures,
+            "pile": self.pile.to_json()["status"] if self.pile is not None else None,
+        }
+
+    def _pile(self) -> PileReport | None:
+        """Return what is said of the pile, on the final poses; None where none was looked for."""
+        stage, inputs = self.pipeline.pile, self._inputs
+        if stage is None or not self.pipeline.has_inclinometer:
+            return None
+        if not self.ways.moved:
+            with contextlib.suppress(HelperDied):  # looked for anew below, and told of when the report is written
+                return self.pipeline.path.moved(stage.report())
+        return identify_along(self.ways.rows, inputs.logs, inputs.settings, self.pipeline.machine, inputs.topics)
+
+    def report(self) -> ReportData:
+        """Return the data of the HTML page and of the recording."""
+        records, inputs = self.pipeline.records, self._inputs
+        return ReportData(
+            title=inputs.title,
+            summary=Summary(**{key: value for key, value in self.summary.items() if key != "pile"}),
+            topics=_topic_rows(self._source),
+            trajectory=self.ways.final,
+            odometry=self.ways.odometry,
+            cloud=self.cloud,
+            diagnostics=records.diagnostics(),
+            odometry_speed=records.speed(),
+            tachometer_speed=records.tachometer(),
+            articulation=records.articulation(),
+            has_inclinometer=self.pipeline.has_inclinometer,
+            pile=self.pile,
+            warnings=self.warnings,
+            settings_text=settings_toml(inputs.settings),
+            provenance={"log": ", ".join(path.name for path in inputs.logs)},
+        )
+
+
+def integrate_again(inputs: Inputs, pipeline: MappingPipeline, rows: Rows) -> SweepIntegration:
+    """Read the scans once more and integrate them at their final poses: closed loops have moved them, or they are given.
+
+    Sweeps before the first pose or after the last are left out.
+    """
+    sweeps = SweepIntegration(inputs.settings, pipeline.machine, pipeline.mounts, None)
+    wheels = WheelOdometry(inputs.settings.wheels, pipeline.machine or Machine())
+    track, times = FinalTrack(rows), iter(pipeline.records.times_ns)
+    with LogSource(list(inputs.logs), inputs.topics) as source:
+        for role, message in source.messages(
+            [role for role in ("front", "rear", "points", "joints") if role in source.roles]
+        ):
+            if isinstance(message, Joints):
+                wheels.update(message)
+            elif isinstance(message, (LaserScan, PointCloud)):
+                time_ns = next(times, message.stamp_ns) if role == "front" else message.stamp_ns
+                sweeps.add_final(role, time_ns, message, track, wheels)
+    sweeps.wait(track, wheels)
+    return sweeps
+
+
+def cost(started: float, duration_s: float, beside_mib: float = 0.0) -> dict[str, float]:
+    """Return what a run that `started` at a monotonic time has cost so far."""
+    wall_s = max(time.monotonic() - started, 1e-6)
+    peak = peak_memory_mib() + beside_mib
+    return {"wall_s": wall_s, "realtime_factor": duration_s / wall_s, "peak_memory_mib": peak}
+
+
+def _moments(pipeline: MappingPipeline) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.int64]]:
+    """Return the stamps of the front scans and the times of their poses, shape (N,)."""
+    records = pipeline.records
+    return np.array(records.stamps_ns, dtype=np.int64), np.array(records.times_ns, dtype=np.int64)
+
+
+def _topic_rows(source: LogSource) -> list[TopicRow]:
+    used = {topic: role for role, topic in source.roles.items()}
+    rows = []
+    for inventory in source.inventory():
+        for topic in inventory.topics.values():
+            role = used.get(topic.name)
+            remark = f"used as {role}" if role in ROLES_READ else "not an input"
+            rows.append(TopicRow(topic.name, topic.type_name, topic.count, topic.rate_hz, remark))
+    return rows
+
+
+def _remarks(pipeline: MappingPipeline) -> list[str]:
+    """Return warnings about the run as a whole."""
+    remarks = []
+    lost = pipeline.records.lost_stretches
+    if lost:
+        remarks.append(f"odometry: {lost} stretch(es) where the scan did not fit; the pose there is the motion model's")
+    share = pipeline.records.degenerate_share
+    if share > 0.2:
+        remarks.append(f"odometry: in {100 * share:.0f} % of the scans a direction is weakly observed (smooth walls?)")
+    if not pipeline.has_inclinometer and pipeline.clouds is None:
+        remarks.append("no inclinometer in the log: the drive is treated as planar, heights are not observed")
+    return remarks
+
+
+def _holes(rows: Rows) -> list[str]:
+    """Return a warning about stretches between given poses that are too long to be straight."""
+    dt_s, step_m = np.diff(rows.times_ns) * 1e-9, np.linalg.norm(np.diff(rows.poses[:, :3], axis=0), axis=1)
+    holes = (dt_s > _HOLE_S) & (step_m > _HOLE_M)
+    if not holes.any():
+        return []
+    longest = int(np.argmax(np.where(holes, step_m, 0.0)))
+    text = f"the longest of {step_m[longest]:.1f} m and {dt_s[longest]:.1f} s"
+    return [f"given poses: {np.count_nonzero(holes)} hole(s), {text}: the way in it was taken for straight"]
