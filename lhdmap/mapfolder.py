@@ -20,7 +20,7 @@ import numpy as np
 import numpy.typing as npt
 
 from lhdmap import __version__
-from lhdmap.errors import InputError
+from lhdmap.errors import InputError, UsageError
 from lhdmap.messages import FloatArray
 from lhdmap.provenance import file_entry, sha256_of, source_entry
 from lhdmap.trajectory import Trajectory, read_tum, write_tum
@@ -71,8 +71,11 @@ class MapFolderWriter:
         """Make the partial folder for `target`, or for `target-2`, `target-3`, … where that name is taken.
 
         Raises:
+            UsageError: the target is no name of a folder to make.
             InputError: the folder cannot be made.
         """
+        if target.name in ("", ".."):
+            raise UsageError(f"-o {target}: the name of a folder to make was wanted")
         self._target = target
         self.path = self._make()
         self.completed: Path | None = None

@@ -57,11 +57,21 @@ def run(arguments: argparse.Namespace, console: Console) -> int:
 
 
 def _run_cloud(arguments: argparse.Namespace, console: Console) -> int:
+    from lhdmap.errors import UsageError
+    from lhdmap.mapfolder import MapFolderWriter, MapInfo
     from lhdmap.pile.heap import run_cloud
     from lhdmap.pile.result import estimate_json
 
+    given = [f"--{name}" for name in ("config", "set", "topic", "poses", "machine") if getattr(arguments, name)]
+    if given:
+        raise UsageError(f"{arguments.input}: {', '.join(given)} concern logs; a cloud takes --up and -o")
     estimate, more = run_cloud(arguments.input, arguments.up)
     values = estimate_json(estimate) | more
+    if arguments.output is not None:
+        with MapFolderWriter(Path(arguments.output)) as folder:
+            folder.write_json("pile.json", values)
+            path = folder.complete(MapInfo([arguments.input], {"up": arguments.up}, warnings=estimate.warnings))
+        values |= {"folder": str(path)}
     for text in estimate.warnings:
         console.warn(text)
     console.result(values, _cloud_text(values))

@@ -6,6 +6,7 @@ import math
 from collections import Counter
 
 import numpy as np
+import numpy.typing as npt
 
 from lhdmap.logs.finding import Finding, Severity
 from lhdmap.messages import Float32Array, LaserScan
@@ -65,13 +66,13 @@ class ScanWatch:
 
     def _count_beams(self, scan: LaserScan) -> None:
         ranges = scan.ranges_m
-        valid = int(np.count_nonzero((ranges >= scan.range_min_m) & (ranges <= scan.range_max_m)))
+        valid = int(np.count_nonzero(_valid(ranges, scan)))
         self._beams += len(ranges)
         self._valid += valid
         self._dead += valid == 0
         self._nan += int(np.count_nonzero(np.isnan(ranges)))
         self._negative += int(np.count_nonzero(ranges < 0))
-        near_top = (ranges >= 0.995 * scan.range_max_m) & (ranges <= scan.range_max_m)
+        near_top = _valid(ranges, scan) & (ranges >= 0.995 * scan.range_max_m)
         self._top += int(np.count_nonzero(near_top))
 
     def _compare(self, scan: LaserScan) -> None:
@@ -133,7 +134,7 @@ class ScanWatch:
         if len(table) < 20 or size == 0:
             return []
         scan = self._samples[0]
-        valid = np.isfinite(table) & (table >= scan.range_min_m) & (table <= scan.range_max_m)
+        valid = _valid(table, scan)
         often = valid.mean(axis=0) >= _OWN_BODY_SHARE
         low, high = np.quantile(np.where(valid, table, 0.0), (0.1, 0.9), axis=0)
         spread = high - low
@@ -147,6 +148,11 @@ class ScanWatch:
         text = f"{len(constant)} beams never change ({sector}, {np.median(table[:, constant]):.2f} m): own body"
         advice = "the self-filter must cover them: check the machine's outline and the mount"
         return [Finding(Severity.REMARK, self.topic, text, advice)]
+
+
+def _valid(ranges: npt.NDArray[np.float32], scan: LaserScan) -> npt.NDArray[np.bool_]:
+    """Return which ranges are hits: within the limits, and not the zero that some drivers give for no return."""
+    return np.isfinite(ranges) & (ranges > 0.0) & (ranges >= scan.range_min_m) & (ranges <= scan.range_max_m)
 
 
 def _stated_end(topic: str, scan: LaserScan, stated_rad: float | None) -> list[Finding]:

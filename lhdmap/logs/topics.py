@@ -81,6 +81,9 @@ def _overridden(topics: Mapping[str, TopicInfo], overrides: Mapping[str, str]) -
             raise UsageError(f"--topic {role}={topic}: unknown role '{role}'{nearest(role, ROLES)}")
         if topic not in topics:
             raise InputError(f"--topic {role}={topic}: the log has no such topic{nearest(topic, topics)}")
+        found, wanted = topics[topic].type_name, ROLES[role][1]
+        if wanted in (SCAN, CLOUD) and found != wanted:
+            raise InputError(f"--topic {role}={topic}: {wanted} was wanted, that topic is {found}")
     return dict(overrides)
 
 

@@ -57,7 +57,7 @@ def _points(ranges, sweep, limits, T, velocity, boxes, every, out):  # type: ign
     count = 0
     for i in range(every[0], ranges.size, every[1]):
         r = ranges[i]
-        if not (limits[0] <= r <= limits[1]) or r == np.inf:
+        if not (limits[0] <= r <= limits[1]) or r == np.inf or r <= 0.0:
             continue
         a = angle_min + i * increment
         x_s, y_s = r * math.cos(a), r * math.sin(a)

@@ -53,6 +53,10 @@ def identify(
         body = machine_of(source, machine)
         told = (*source.warnings, *source.damage)
         if "front" not in source.roles:
+            if poses:
+                raise UsageError(
+                    "--poses: in the log of a 3D scanner the pile is looked for in the map of its own odometry"
+                )
             return _warned(_in_cloud(source, settings, body), told)
         if poses:
             rows = given_rows(poses, [log], topics or {})

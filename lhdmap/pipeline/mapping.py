@@ -41,6 +41,7 @@ from lhdmap.pipeline.path import FinalPath
 from lhdmap.pipeline.pile import PileSink, PileWatch, PlacedScan
 from lhdmap.pipeline.rear import RearScans
 from lhdmap.pipeline.records import ScanRecords
+from lhdmap.pipeline.sweep_times import SweepTimes
 from lhdmap.pipeline.sweeps import ScanSink, SweepIntegration
 from lhdmap.pipeline.track import Track
 from lhdmap.proprioception.attitude import AttitudeFilter
@@ -98,12 +99,15 @@ class MappingPipeline:
         self._scan_ns = (self._clock_ns, self._clock_ns)  # of the newest scan: its stamp, and that made rising
         self._disordered = False
         self._attitude_of: tuple[int, tuple[float, float]] = (-(2**63), (0.0, 0.0))
+        self._sweep_times = SweepTimes()
         self._early: deque[Inclination] = deque(maxlen=_EARLY)  # until the first scan is processed
         self._waiting: deque[tuple[LaserScan | PointCloud, int]] = deque()
         self._boxes = own_boxes(machine, settings.integration.body_margin_m)
 
     def update(self, role: str, message: Message) -> None:
         """Take one message of the log."""
+        if isinstance(message, LaserScan):
+            message = self._sweep_times.checked(role, message)
         match message:
             case LaserScan() | PointCloud() if role == self._primary:
                 self._disordered |= message.stamp_ns < self._newest_ns
@@ -140,7 +144,13 @@ class MappingPipeline:
     def warnings(self) -> list[str]:
         """What the stages found odd, in words."""
         fused = self.odometry.wheels.warnings() if self.odometry is not None else []
-        return [*self.mounts.warnings, *self.attitude.texts(), *self.wheels.warnings.texts(), *fused]
+        return [
+            *self.mounts.warnings,
+            *self.attitude.texts(),
+            *self.wheels.warnings.texts(),
+            *fused,
+            *self._sweep_times.warnings,
+        ]
 
     def _take_inclination(self, message: Inclination) -> None:
         first, self.has_inclinometer = not self.has_inclinometer, True

@@ -87,3 +87,8 @@ def test_overrides_must_name_what_is_there() -> None:
         assign_topics(_log(scan=SCAN), {"front": "/scans"})
     with pytest.raises(UsageError, match=r"unknown role 'frnt'; did you mean 'front'"):
         assign_topics(_log(scan=SCAN), {"frnt": "/scan"})
+
+
+def test_an_option_that_names_a_topic_of_another_type_is_refused() -> None:
+    with pytest.raises(InputError, match="LaserScan was wanted"):
+        assign_topics(_log(scan=SCAN, imu=IMU), {"front": "/imu"})
