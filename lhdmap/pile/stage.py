@@ -74,7 +74,10 @@ class PileStage:
         wait_m = self._settings.update_m * (_IDLE if self._idle else 1.0)
         if abs(self._travelled_m - self._estimated_m) < wait_m:
             return None
+        backs_out = self._travelled_m < self._estimated_m
         self._estimated_m = self._travelled_m
+        if backs_out and self._decision is not None:
+            return None  # nothing new is seen of the pile, and what was leaves the window
         return self._estimate(scan)
 
     def report(self) -> PileReport:

@@ -311,7 +311,9 @@ class MappingPipeline:
             return None
         forward_sigma, turn_sigma = math.sqrt(motion.covariance[0, 0]), math.sqrt(motion.covariance[2, 2])
         turn = None if motion.source == "tachometer" else float(motion.delta[2])
-        return WheelStep(float(motion.delta[0]), forward_sigma, turn, turn_sigma)
+        half = 0.5 * float(motion.delta[2])  # the way's direction is the heading's in the middle of the step
+        forward_m = math.cos(half) * float(motion.delta[0]) + math.sin(half) * float(motion.delta[1])
+        return WheelStep(forward_m, forward_sigma, turn, turn_sigma)
 
     def _record(self, stamp_ns: int, time_ns: int, step: OdometryStep | CloudStep) -> None:
         wheel_mps = self.wheels.speed_at(time_ns)

@@ -8,7 +8,7 @@ from lhdmap.geometry import se3
 from lhdmap.integration.self_filter import BODY_FRAMES
 from lhdmap.logs.source import LogSource
 from lhdmap.machine import Machine
-from lhdmap.messages import FloatArray, Mount
+from lhdmap.messages import FloatArray, Joints, Mount
 
 _BY_ROLE = {"front": "lidar_front", "rear": "lidar_rear", "inclinometer": "inclinometer", "points": "lidar_points"}
 
@@ -66,12 +66,22 @@ class Mounts:
 
 
 def machine_of(source: LogSource, given: Machine | None) -> Machine | None:
-    """Return the machine given, else the default loader where the log is one's (it has the joints of an LHD), else none."""
+    """Return the machine given, else the default loader where the log is one's (it has the joint of an LHD), else none."""
     if given is not None:
         return given
-    if "joints" in source.roles or ("rear" in source.roles and "tf_static" in source.roles):
+    if ("rear" in source.roles and "tf_static" in source.roles) or _bends(source):
         return Machine()
     return None
+
+
+def _bends(source: LogSource) -> bool:
+    """Return whether the log's joints are those of an articulated machine: wheels of a robot are joints, too."""
+    topic = source.roles.get("joints")
+    if topic is None:
+        return False
+    with LogSource(source.paths, {"joints": topic}) as other:  # what `source` counts of its messages stays as it is
+        first = next((message for _, message in other.messages(["joints"])), None)
+    return isinstance(first, Joints) and "articulation" in first.positions_rad
 
 
 def level_sensor(mount: Mount, roll_rad: float, pitch_rad: float) -> FloatArray:

@@ -23,6 +23,7 @@ from lhdmap.smoothing.settings import SmoothingSettings
 
 _SUBMAP_KEYS = 5  # keys on either side of the earlier one that make up its surroundings
 _SEARCH_BEAMS = 120
+_LEVEL_M, _CLIMB_DRIFT = 1.0, 0.02  # a degree of bias in pitch: levels of a mine are farther apart than that
 _CELL_M = 0.04
 _MODEL = MatchModel(noise_m=0.02, cutoff_sigmas=3.0, min_cells=3.0, coarse_noise=0.05, rounds=8)
 _STARTS = 3
@@ -40,24 +41,26 @@ class Closure(NamedTuple):
 
 def find_closures(keys: list[KeyScan], settings: SmoothingSettings) -> list[Closure]:
     """Return the closures that neighbours confirm. The cost grows with the revisits, not with the square of the drive."""
-    poses = np.array([key.pose for key in keys])
+    places = np.array([(*key.pose, float(key.points[:, 2].mean())) for key in keys]).reshape(-1, 4)
     travelled = np.array([key.travelled_m for key in keys])
     found: list[Closure] = []
     for current in range(len(keys)):
-        closure = _close(keys, poses, travelled, current, settings)
+        closure = _close(keys, places, travelled, current, settings)
         if closure is not None:
             found.append(closure)
     return _confirmed(found, keys, settings)
 
 
 def _close(
-    keys: list[KeyScan], poses: FloatArray, travelled: FloatArray, current: int, settings: SmoothingSettings
+    keys: list[KeyScan], places: FloatArray, travelled: FloatArray, current: int, settings: SmoothingSettings
 ) -> Closure | None:
-    """Try the earlier key nearest to this one."""
+    """Try the earlier key nearest to this one on its level; `places` (N, 4): poses and heights of the keys' hits."""
     early = int(np.searchsorted(travelled, travelled[current] - settings.apart_m))
     if early == 0:
         return None
-    distances = np.hypot(*(poses[:early, :2] - poses[current, :2]).T)
+    distances = np.hypot(*(places[:early, :2] - places[current, :2]).T)
+    above_m = np.abs(places[:early, 3] - places[current, 3])
+    distances[above_m > _LEVEL_M + _CLIMB_DRIFT * (travelled[current] - travelled[:early])] = np.inf
     candidate = int(distances.argmin())
     reach_m = min(
         settings.reach_m + settings.drift * (travelled[current] - travelled[candidate]), settings.reach_limit_m
@@ -65,7 +68,7 @@ def _close(
     if distances[candidate] > reach_m:
         return None
     surroundings = _surroundings(keys, candidate, early)
-    predicted = se2.between(poses[candidate], poses[current])
+    predicted = se2.between(places[candidate, :3], places[current, :3])
     result = _match(keys[current], surroundings, predicted, reach_m)
     if result.support < settings.min_support:
         return None

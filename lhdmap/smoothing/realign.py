@@ -24,6 +24,7 @@ from lhdmap.smoothing.window import Node, Window, solved
 
 _SOLVE_SHARE = 0.3  # of the lag between two solutions
 _REST_SHARE = 0.2  # of the lag in time between nodes at rest
+_MOST_FINAL = 300  # of a machine that stands
 _ANCHOR_M = 18.0  # of final poses that the others are tied to: as far as the rear scanner looks back
 _MOST_HITS = 400  # of a scan
 _FRONT_STEP = 6  # of the front hits so many are looked up once: the rear ones tell more
@@ -127,7 +128,9 @@ class Realigner:
         T_map_odom = se2.compose(self._poses[self._final], se2.inverse(node.pose))
         self.moves.append((node.time_ns, T_map_odom))
         self._final += 1
-        while self._final > 1 and node.travelled_m - self._nodes[0].travelled_m > _ANCHOR_M:
+        while self._final > 1 and (
+            node.travelled_m - self._nodes[0].travelled_m > _ANCHOR_M or self._final > _MOST_FINAL
+        ):
             self._nodes.popleft()
             self._poses.popleft()
             self._final -= 1

@@ -269,6 +269,22 @@ def test_what_is_not_seen_any_more_is_forgotten() -> None:
     assert (table["status"], table["identified"]) == ("none", False)
 
 
+def test_a_pile_that_was_decided_stays_when_the_machine_backs_out() -> None:
+    """Beyond the window's 45 m nothing of it was left: status none, not identified."""
+    drift = CastDrift(45.0)
+    scans = list(drift.scans(to_m=28.0))
+    stage = PileStage(PileSettings(reach_m=20.0), EXACT)
+    for scan in scans:
+        stage.update(scan)
+    before = stage.report()
+    for k, scan in enumerate(reversed(scans)):
+        stage.update(scan._replace(stamp_ns=scans[-1].stamp_ns + k))
+    after = stage.report()
+    assert before.decision is not None
+    assert after.decision is before.decision
+    assert last_of(after).estimate.width_m == last_of(before).estimate.width_m
+
+
 @pytest.mark.parametrize("fall", [0.04, 0.08, 0.12])
 def test_floor_that_falls_away_is_no_overhang(fall: float) -> None:
     """The scanner paints the far floor line by line, the farther the lower: that is a plane, and no face."""

@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 import math
+from pathlib import Path
 
 import numpy as np
 import pytest
 from lhdmap.config import Settings
 from lhdmap.geometry import se3
+from lhdmap.logs.source import LogSource
+from lhdmap.logs.writer import LogWriter
 from lhdmap.machine import Machine
-from lhdmap.messages import Inclination, Mount
+from lhdmap.messages import Inclination, Joints, LaserScan, Mount
 from lhdmap.pipeline.mapping import MappingPipeline
-from lhdmap.pipeline.mounts import Mounts, level_sensor
+from lhdmap.pipeline.mounts import Mounts, level_sensor, machine_of
 
 T_BASE_MAST = se3.from_rpy(0.0, 0.0, 0.3, (1.0, 0.2, 0.5))
 T_MAST_SCANNER = se3.from_rpy(0.02, -0.05, -0.1, (0.1, 0.0, 1.5))
@@ -87,3 +90,13 @@ def test_the_inclinometer_s_mount_may_come_after_its_first_messages(first: bool)
         if not first and k == 5:
             pipeline.update("tf_static", backwards)
     assert pipeline.attitude.roll_pitch_at(10**9) == pytest.approx((-0.02, -0.05), abs=1e-9)
+
+
+@pytest.mark.parametrize(("joint", "is_loader"), [("articulation", True), ("wheel_left_joint", False)])
+def test_only_an_articulated_machine_is_taken_for_a_loader(joint: str, is_loader: bool, tmp_path: Path) -> None:
+    """A robot's wheels are joints, too: its near walls were left out as the loader's own body."""
+    with LogWriter(tmp_path / "log.mcap") as writer:
+        writer.write("/scan", LaserScan(10**9, "laser", -1.0, 0.1, 0.0, 0.1, 50.0, np.full(21, 5.0, np.float32)))
+        writer.write("/joint_states", Joints(10**9, {joint: 0.1}, {}))
+    with LogSource([tmp_path / "log.mcap"]) as source:
+        assert (machine_of(source, None) is not None) == is_loader

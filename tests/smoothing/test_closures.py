@@ -49,6 +49,19 @@ def test_the_graph_shrinks_the_error(twice_round: tuple[FloatArray, list[KeyScan
     assert np.hypot(*(after[:, :2] - true[:, :2]).T).mean() < np.hypot(*(before[:, :2] - true[:, :2]).T).mean()
 
 
+@pytest.mark.parametrize(("deeper_m", "closes"), [(1.5, True), (12.0, False)])
+def test_a_level_below_is_another_place(
+    twice_round: tuple[FloatArray, list[KeyScan]], deeper_m: float, closes: bool
+) -> None:
+    """A mine's levels are alike in plan; heights that differ by no more than an inclinometer drifts are one level."""
+    _, keys = twice_round
+    lower = [
+        key._replace(points=key.points - np.array([0.0, 0.0, deeper_m if k >= 60 else 0.0], np.float32))
+        for k, key in enumerate(keys)
+    ]
+    assert bool(find_closures(lower, SETTINGS)) == closes
+
+
 def test_a_straight_smooth_drift_is_never_closed() -> None:
     world, true = straight(40, 0.0005)
     assert find_closures(keys_of(world, true, drifted(true, 1.01, 0.0)), SETTINGS) == []

@@ -108,6 +108,15 @@ def test_at_rest_the_path_goes_on() -> None:
     assert realigner.moves[-1][0] >= (119 - 1.3 * SETTINGS.lag_s) * 1e9
 
 
+def test_a_machine_that_stands_for_hours_takes_no_more_memory() -> None:
+    """Final poses went by travel alone: the matrix of a solution was quadratic in the time at rest."""
+    realigner, (_, scan) = Realigner(SETTINGS), drive(0.0)[0]
+    for k in range(1000):
+        realigner.update(scan._replace(time_ns=k * int(0.21e9 * SETTINGS.lag_s)))
+    assert len(realigner.moves) > 900
+    assert len(realigner._nodes) < 400
+
+
 def test_the_final_path_has_all_poses_once_and_keeps_heights() -> None:
     track = Track()
     path = FinalPath(track)
