@@ -22,6 +22,7 @@ from lhdmap.proprioception.local_fit import fit_at
 from lhdmap.proprioception.samples import SampleBuffer, Warnings
 from lhdmap.settings import setting
 
+_SILENT_S = 1.0  # not worth a word below
 LARGEST_TILT_RAD = math.radians(60.0)
 JUMP_RUN = 10  # so many samples in a row at a new level are no outliers but the level
 THIRD_DIFFERENCE = math.sqrt(20.0)  # its standard deviation for white noise of one
@@ -146,8 +147,8 @@ class AttitudeFilter:
 
     def texts(self) -> list[str]:
         """Return what was odd, in words."""
-        silent = f"inclinometer: silent for {self._silent_s:.1f} s and more; the attitude before is kept there"
-        return [*self.warnings.texts(), *([silent] if self._silent_s > 0.0 else [])]
+        silent = f"inclinometer: silent for {self._silent_s:.1f} s and more; the attitude before was kept there"
+        return [*self.warnings.texts(), *([silent] if self._silent_s > _SILENT_S else [])]
 
     def _attitude(self, stamp_ns: int) -> Attitude | None:
         values, factor = self._fit(np.array([stamp_ns], dtype=np.int64))
