@@ -9,7 +9,7 @@ import numpy as np
 from lhdmap.geometry import se2
 from lhdmap.messages import FloatArray
 from lhdmap.odometry.flow_reference import FlowReference, compare, scanner_pyramid
-from lhdmap.odometry.jump import jump, weakened
+from lhdmap.odometry.jump import NOTHING_OWED, jump, left_by, weakened
 from lhdmap.odometry.matching import Hits, Match, MatchModel, Prior, match
 from lhdmap.odometry.motion import Motion
 from lhdmap.odometry.rear_view import NO_POINTS, NOTHING_BEHIND, Behind, JointOffset
@@ -25,6 +25,7 @@ _FEWEST_HITS = 10
 _HEADING_AXIS = np.diag([0.0, 0.0, 1.0])
 # Scans that are flagged after a pose that the motion did not foretell: a jump, or someone beside the machine.
 _DOUBT_SCANS = 25
+_OWED_KEPT = 0.96  # of what jumps were off the motion, from scan to scan
 _DOUBTFUL_SUPPORT = 0.58  # walls alone give 0.8 and more: less may be a crowd that moves along
 _SPINNING_RPS = 2.0  # no machine turns so fast: after a jump to such a speed the one before it stands
 _SURPRISE = 3.5  # sigmas from the prediction
@@ -69,6 +70,7 @@ class AnchoredMatcher:
         self._noise_scale = 1.0
         self._doubt = 0
         self._jumped = False
+        self._owed = NOTHING_OWED
         self._joint = JointOffset()
         self._turn = 0
         self.behind = NO_POINTS  # the rear hits of the last scan, shape (N, 3), level base frame
@@ -112,6 +114,7 @@ class AnchoredMatcher:
         self._grow(points)
         doubtful = self._doubt > 0 or result.support < _DOUBTFUL_SUPPORT
         self._doubt = max(self._doubt - 1, 0)
+        self._owed = _OWED_KEPT * self._owed if self._doubt else NOTHING_OWED
         residual_m = result.residual_sigmas * self._noise_m
         return Matched(
             result.information, residual_m, result.support, lost=False, doubtful=doubtful, jumped=self._jumped
@@ -142,10 +145,11 @@ class AnchoredMatcher:
         if self._trusted(result):
             return self._freed(hits, result, prior)
         seen = np.concatenate(self._recent)
-        found = jump(self._map, seen, hits, result, prior, self._motion, self._wide, self._model)
+        found = jump(self._map, seen, hits, result, prior, self._motion, self._wide, self._model, self._owed)
         if found is None:
             return result
         self._doubt, self._jumped = _DOUBT_SCANS, True
+        self._owed = self._owed + left_by(found, prior)
         return found
 
     def _freed(self, hits: Hits, result: Match, prior: Prior) -> Match:

@@ -17,6 +17,7 @@ from lhdmap.odometry.surface_map import SurfaceMap
 _JUMP_PRIOR = 0.01
 # A jump must bring that much more support, and more where wheels speak against it: the logarithm of the odds (Student's t, for
 # wheels that slip or lag) over the nats that support is worth. Measured: crowds win by chance with more, slip stays with less.
+NOTHING_OWED = np.zeros(3)
 _GAIN, _NATS_PER_SUPPORT, _WHEELS_FREEDOM = 0.02, 22.0, 4.0
 
 
@@ -29,6 +30,7 @@ def jump(
     motion: Motion,
     s: SearchSettings,
     model: MatchModel,
+    owed: FloatArray = NOTHING_OWED,
 ) -> Match | None:
     """Return the best match from all around the prediction, None where none is better enough than the one near it.
 
@@ -41,6 +43,7 @@ def jump(
         motion: tells how far to search, and whether wheels have measured.
         s: limits and steps of the search.
         model: of the match.
+        owed: by how much jumps a moment ago left the motion (3,): wheels speak against staying there, and for the way back.
     """
     points = hits.points[: hits.front]
     thin = points[:: max(len(points) // s.beams, 1)]
@@ -49,10 +52,17 @@ def jump(
     # A jump contradicts the prior by definition: it must not hold the match back, so it is weakened here.
     for start in starts[(np.abs(starts) < 1e29).all(axis=1)]:
         found = match(wall_map, hits, weakened(prior), start, model)
-        dissent = _dissent(found, prior, motion) - _dissent(best, prior, motion)
+        dissent = _dissent(found, prior, motion, owed) - _dissent(best, prior, motion, owed)
         if found.support > best.support + _GAIN + dissent / _NATS_PER_SUPPORT:
             best = found
     return None if best is near else best
+
+
+def left_by(result: Match, prior: Prior) -> FloatArray:
+    """Return by how much a match is off the motion, shape (3,)."""
+    error: FloatArray = result.pose - prior.pose
+    error[2] = se2.wrap(error[2])
+    return error
 
 
 def weakened(prior: Prior) -> Prior:
@@ -60,12 +70,11 @@ def weakened(prior: Prior) -> Prior:
     return Prior(prior.pose, _JUMP_PRIOR * prior.information)
 
 
-def _dissent(result: Match, prior: Prior, motion: Motion) -> float:
+def _dissent(result: Match, prior: Prior, motion: Motion, owed: FloatArray) -> float:
     """Return how much (nats) the wheels speak against a pose: with slip and lag, large errors are likelier than normal."""
     if not motion.measured:
         return 0.0
-    error = result.pose - prior.pose
-    error[2] = se2.wrap(error[2])
+    error = left_by(result, prior) + owed
     return 0.5 * _WHEELS_FREEDOM * math.log1p(float(error @ prior.information @ error) / _WHEELS_FREEDOM)
 
 

@@ -87,6 +87,18 @@ def test_wheels_that_disagree_want_more_support(walls: SurfaceMap) -> None:
     assert jump(walls, seen, hits, close, prior, wheeled(), wide, MODEL) is None
 
 
+def test_a_jump_back_to_where_the_wheels_lead_is_cheap(walls: SurfaceMap) -> None:
+    """A crowd wins four times by 6 degrees: each step judged alone, wheels spoke against the way back as they had before."""
+    predicted = TRUE + np.array([0.03, 0.0, math.radians(3.0)])
+    hits, prior = Hits(room(TRUE), len(room(TRUE)), layered=False), Prior(predicted, SURE)
+    close = match(walls, hits, prior, predicted, MODEL)._replace(pose=predicted, support=0.82)
+    seen, wide, back = room(np.zeros(3)), SearchSettings(), TRUE - predicted
+    assert jump(walls, seen, hits, close, prior, wheeled(), wide, MODEL) is None
+    found = jump(walls, seen, hits, close, prior, wheeled(), wide, MODEL, owed=-back)
+    assert found is not None
+    assert np.hypot(*(found.pose - TRUE)[:2]) < 0.01
+
+
 @pytest.mark.parametrize(("gap_s", "found"), [(0.02, False), (2.0, True)])
 def test_after_a_gap_all_that_the_settings_allow_is_searched(walls: SurfaceMap, gap_s: float, found: bool) -> None:
     """Sure of its pose, the filter searches 0.3 m; wheels that hung through a gap are 1.4 m off and as sure."""
