@@ -80,6 +80,8 @@ class WheelFusion:
     def warnings(self) -> list[str]:
         """Return what a user should know of the wheels."""
         stale = self.stale.steps
-        told = [f"wheel odometry: poses are repeated while the machine moves; {stale} steps left out"] if stale else []
+        told = (
+            [f"wheels: they stand while the machine moves (repeated values?); {stale} steps left out"] if stale else []
+        )
         against = self.trust.warning()
         return told if against is None else [*told, against]

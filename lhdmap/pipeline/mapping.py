@@ -152,6 +152,11 @@ class MappingPipeline:
             *self._sweep_times.warnings,
         ]
 
+    @property
+    def drives_by_rear_body(self) -> bool:
+        """Whether the scanner that the odometry uses sits on the rear body."""
+        return self.mounts.on_rear_body(self._primary)
+
     def _take_inclination(self, message: Inclination) -> None:
         first, self.has_inclinometer = not self.has_inclinometer, True
         if self._time_ns < 0:

@@ -20,6 +20,7 @@ class Mounts:
         self._machine = machine
         self._edges: dict[str, Mount] = {}
         self._found: dict[str, Mount] = {}
+        self._roles: dict[str, str] = {}
         self.warnings: list[str] = []
 
     def update(self, mount: Mount) -> None:
@@ -29,9 +30,15 @@ class Mounts:
 
     def of(self, frame: str, role: str) -> Mount:
         """Return the mount of a sensor frame on `base_link` or `rear_link`."""
+        self._roles[role] = frame
         if frame not in self._found:
             self._found[frame] = self._chain(frame) or self._assumed(frame, role)
         return self._found[frame]
+
+    def on_rear_body(self, role: str) -> bool:
+        """Return whether the sensor that was asked for in this role sits on the rear body."""
+        frame = self._roles.get(role)
+        return frame is not None and self._found[frame].parent_frame == "rear_link"
 
     def known(self, frame: str) -> bool:
         """Return whether the log itself says where this frame sits."""
@@ -76,10 +83,9 @@ def machine_of(source: LogSource, given: Machine | None) -> Machine | None:
 
 def _bends(source: LogSource) -> bool:
     """Return whether the log's joints are those of an articulated machine: wheels of a robot are joints, too."""
-    topic = source.roles.get("joints")
-    if topic is None:
+    if "joints" not in source.roles:
         return False
-    with LogSource(source.paths, {"joints": topic}) as other:  # what `source` counts of its messages stays as it is
+    with LogSource(source.paths, source.roles) as other:  # what `source` counts of its messages stays as it is
         first = next((message for _, message in other.messages(["joints"])), None)
     return isinstance(first, Joints) and "articulation" in first.positions_rad
 

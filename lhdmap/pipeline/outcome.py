@@ -30,6 +30,7 @@ from lhdmap.smoothing.smoother import corrected
 from lhdmap.trajectory import Trajectory
 
 ROLES_READ = ("front", "rear", "points", "inclinometer", "joints", "tachometer", "wheel_odometry", "tf_static")
+_GAP_S = 10.0
 _HOLE_S, _HOLE_M = 1.0, 2.0
 
 
@@ -200,7 +201,19 @@ def _remarks(pipeline: MappingPipeline) -> list[str]:
         remarks.append(f"odometry: {lost} stretch(es) where the scan did not fit; the pose there is the motion model's")
     share = pipeline.records.degenerate_share
     if share > 0.2:
-        remarks.append(f"odometry: in {100 * share:.0f} % of the scans a direction is weakly observed (smooth walls?)")
+        remarks.append(
+            f"odometry: in {100 * share:.0f} % of the scans a direction is weakly observed (smooth walls, or too far away?)"
+        )
+    gap_s = float(np.diff(pipeline.records.times_ns).max(initial=0.0)) * 1e-9
+    if gap_s > _GAP_S:
+        remarks.append(
+            f"no scan for {gap_s:.0f} s: if the machine was moved meanwhile, what follows is in another place than it was; "
+            "build it apart"
+        )
+    if pipeline.drives_by_rear_body:
+        remarks.append(
+            "the front scanner is mounted on rear_link: the path is that of a machine that does not bend, wrong in bends"
+        )
     if not pipeline.has_inclinometer and pipeline.clouds is None:
         remarks.append("no inclinometer in the log: the drive is treated as planar, heights are not observed")
     return remarks

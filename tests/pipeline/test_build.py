@@ -147,3 +147,14 @@ def test_a_log_without_scans_is_refused(untold: Path, tmp_path: Path) -> None:
             writer.write("/machine/tachometer", message)
     with pytest.raises(InputError, match=r"none\.mcap"):
         build_map(BuildRequest([tmp_path / "none.mcap"], tmp_path / "map"))
+
+
+def test_a_pause_in_the_log_is_told(untold: Path, tmp_path: Path) -> None:
+    with LogSource([untold]) as source, LogWriter(tmp_path / "pause.mcap") as writer:
+        middle = (source.start_ns or 0) + 3 * 10**9
+        for role, message in source.messages(["front", "tf_static"]):
+            if isinstance(message, LaserScan) and message.stamp_ns > middle:
+                message = message._replace(stamp_ns=message.stamp_ns + 60 * 10**9)
+            writer.write(source.roles[role], [message] if isinstance(message, Mount) else message)
+    found = build_map(BuildRequest([tmp_path / "pause.mcap"], tmp_path / "map"))
+    assert any("no scan for 60 s" in text for text in found.warnings)

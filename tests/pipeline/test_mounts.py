@@ -97,6 +97,16 @@ def test_only_an_articulated_machine_is_taken_for_a_loader(joint: str, is_loader
     """A robot's wheels are joints, too: its near walls were left out as the loader's own body."""
     with LogWriter(tmp_path / "log.mcap") as writer:
         writer.write("/scan", LaserScan(10**9, "laser", -1.0, 0.1, 0.0, 0.1, 50.0, np.full(21, 5.0, np.float32)))
+        writer.write("/other", LaserScan(10**9, "other", -1.0, 0.1, 0.0, 0.1, 50.0, np.full(21, 5.0, np.float32)))
         writer.write("/joint_states", Joints(10**9, {joint: 0.1}, {}))
-    with LogSource([tmp_path / "log.mcap"]) as source:
+    with LogSource([tmp_path / "log.mcap"], {"front": "/scan"}) as source:
         assert (machine_of(source, None) is not None) == is_loader
+
+
+def test_a_scanner_on_the_rear_body_is_known_as_such() -> None:
+    mounts = Mounts(None)
+    mounts.update(Mount(0, "rear_link", "scanner", T_MAST_SCANNER))
+    assert not mounts.on_rear_body("front")
+    mounts.of("scanner", "front")
+    assert mounts.on_rear_body("front")
+    assert not mounts.on_rear_body("rear")
