@@ -130,7 +130,7 @@ class Motion:
 
     def correct(self, matched: FloatArray, information: FloatArray) -> None:
         """Take over the matched pose (3,), found under the prior, with the match's own `information` (3, 3)."""
-        motion_filter.update_pose(self.state, self.P, matched, information)
+        motion_filter.update_pose(self.state, self.P, matched, information, self.held)
 
     def distrust_velocity(self, velocity: FloatArray) -> None:
         """Go on with this velocity (3,), hardly known: that of a jump holds errors of the poses before and would run away."""

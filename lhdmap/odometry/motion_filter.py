@@ -124,11 +124,15 @@ def update_way(
 
 
 @nb.njit(cache=True)
-def update_pose(state: FloatArray, P: FloatArray, matched: FloatArray, information: FloatArray) -> None:
+def update_pose(
+    state: FloatArray, P: FloatArray, matched: FloatArray, information: FloatArray, scale_learned: bool = True
+) -> None:
     """Fuse the matched pose in place: `matched` is the maximum a posteriori pose (prior and scan), `information` the scan's own.
 
-    The pose block moves to `matched`; the rest of the state follows through its covariance with the pose.
+    The pose block moves to `matched`; the rest of the state follows through its covariance with the pose. The wheels' scale is
+    only considered where it is not to be learned (Schmidt's filter): smooth walls pull on every scan alike.
     """
+    scale, variance = state[6], P[6, 6]
     prior = P[:3, :3].copy()
     posterior = np.linalg.inv(np.linalg.inv(prior) + information)
     correction = matched - state[:3]
@@ -138,6 +142,8 @@ def update_pose(state: FloatArray, P: FloatArray, matched: FloatArray, informati
     state[2] = (state[2] + math.pi) % (2.0 * math.pi) - math.pi
     P += A @ np.ascontiguousarray(posterior - prior) @ A.T
     P[:, :] = 0.5 * (P + P.T)
+    if not scale_learned:
+        state[6], P[6, 6] = scale, variance
 
 
 @nb.njit(cache=True)
