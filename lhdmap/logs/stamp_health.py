@@ -71,6 +71,9 @@ class StampWatch:
         found = []
         if seen.zero:
             found.append(self._unstamped(seen))
+        if seen.ahead:
+            text = f"{seen.ahead} stamps leap ahead of the log time"
+            found.append(Finding(Severity.REMARK, self.topic, text, "the log time is used for them"))
         if seen.backward:
             text = f"{seen.backward} stamps run backwards, by up to {seen.worst_backward_ns / 1e9:.3f} s"
             advice = "the log time is used for them"

@@ -67,13 +67,13 @@ def _decided(seen: TopicStamps, header_ns: int, log_ns: int) -> int:
     if header_ns == UNSTAMPED:
         seen.zero += 1
         return log_ns
+    if _leaps(seen, header_ns, log_ns):
+        return _at_log_time(seen, log_ns)
     offset = log_ns - header_ns
     if seen.offset_min_ns is None or offset < seen.offset_min_ns:
         seen.offset_min_ns = offset
     if seen.offset_max_ns is None or offset > seen.offset_max_ns:
         seen.offset_max_ns = offset
-    if _leaps(seen, header_ns, log_ns):
-        return _at_log_time(seen, log_ns)
     if not seen.count or header_ns > seen.last_ns:
         return header_ns
     if header_ns == seen.last_ns:

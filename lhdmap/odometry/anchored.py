@@ -9,7 +9,7 @@ import numpy as np
 from lhdmap.geometry import se2
 from lhdmap.messages import FloatArray
 from lhdmap.odometry.flow_reference import FlowReference, compare, scanner_pyramid
-from lhdmap.odometry.jump import NOTHING_OWED, jump, left_by, weakened
+from lhdmap.odometry.jump import NOTHING_OWED, Place, jump, left_by, weakened
 from lhdmap.odometry.matching import Hits, Match, MatchModel, Prior, match
 from lhdmap.odometry.motion import Motion
 from lhdmap.odometry.rear_view import NO_POINTS, NOTHING_BEHIND, Behind, JointOffset
@@ -144,8 +144,8 @@ class AnchoredMatcher:
         result = match(self._map, hits, prior, predicted, self._model)
         if self._trusted(result):
             return self._freed(hits, result, prior)
-        seen = np.concatenate(self._recent)
-        found = jump(self._map, seen, hits, result, prior, self._motion, self._wide, self._model, self._owed)
+        place = Place(self._map, np.concatenate(self._recent), self._model)
+        found = jump(place, hits, result, prior, self._motion, self._wide, self._owed)
         if found is None:
             return result
         self._doubt, self._jumped = _DOUBT_SCANS, True

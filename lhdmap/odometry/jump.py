@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
@@ -21,37 +22,43 @@ NOTHING_OWED = np.zeros(3)
 _GAIN, _NATS_PER_SUPPORT, _WHEELS_FREEDOM = 0.02, 22.0, 4.0
 
 
+class Place(NamedTuple):
+    """What a scan is compared with: the map, the hits (N, 3) of the last scans in it, and the model of the match."""
+
+    walls: SurfaceMap
+    seen: FloatArray
+    model: MatchModel
+
+
 def jump(
-    wall_map: SurfaceMap,
-    seen: FloatArray,
+    place: Place,
     hits: Hits,
     near: Match,
     prior: Prior,
     motion: Motion,
     s: SearchSettings,
-    model: MatchModel,
     owed: FloatArray = NOTHING_OWED,
 ) -> Match | None:
     """Return the best match from all around the prediction, None where none is better enough than the one near it.
 
     Args:
-        wall_map: the map that is matched against.
-        seen: hits (N, 3) of the last scans in the map, which the search compares with.
+        place: the map that is matched against, and what the search compares with.
         hits: the scan.
         near: the match that was found from the prediction.
         prior: the prediction.
         motion: tells how far to search, and whether wheels have measured.
         s: limits and steps of the search.
-        model: of the match.
         owed: by how much jumps a moment ago left the motion (3,): wheels speak against staying there, and for the way back.
     """
     points = hits.points[: hits.front]
     thin = points[:: max(len(points) // s.beams, 1)]
-    starts = search(seen, thin, prior.pose, prior.information, _reach(motion, s), s.cell_m, math.radians(s.step_deg))
+    starts = search(
+        place.seen, thin, prior.pose, prior.information, _reach(motion, s), s.cell_m, math.radians(s.step_deg)
+    )
     best = near
     # A jump contradicts the prior by definition: it must not hold the match back, so it is weakened here.
     for start in starts[(np.abs(starts) < 1e29).all(axis=1)]:
-        found = match(wall_map, hits, weakened(prior), start, model)
+        found = match(place.walls, hits, weakened(prior), start, place.model)
         dissent = _dissent(found, prior, motion, owed) - _dissent(best, prior, motion, owed)
         if found.support > best.support + _GAIN + dissent / _NATS_PER_SUPPORT:
             best = found

@@ -29,10 +29,8 @@ class WheelFusion:
         self.stale, self.trust = StaleWheels(), WheelTrust()
         self.turn = WheelTurn(settings.wheel_scale_std, settings.wheel_curvature_std)
         self._at, self._since_m = np.zeros(3), 0.0
-        self._all, self._good = (
-            Stretch(_SOON_M),
-            Stretch(),
-        )  # steps that were told, and those that agreed with the motion
+        self._all = Stretch(_SOON_M)
+        self._good = Stretch()  # only steps that agreed with the motion
 
     def fuse(self, wheels: WheelStep | None, dt_s: float) -> bool:
         """Tell the motion the wheels' mean speeds; return whether the forward one was used: slipping wheels stay out."""

@@ -23,6 +23,7 @@ from lhdmap.pipeline.given import given_rows
 from lhdmap.pipeline.mapping import MappingPipeline, own_boxes
 from lhdmap.pipeline.mounts import Mounts, level_sensor, machine_of
 from lhdmap.pipeline.pile import PileWatch, PlacedScan
+from lhdmap.pipeline.sweep_times import SweepTimes
 from lhdmap.pipeline.track import FinalTrack, Rows
 
 _ROLES = ("tf_static", "front", "rear", "points", "inclinometer", "joints", "tachometer", "wheel_odometry")
@@ -114,13 +115,14 @@ def placed_along(
     topics: Mapping[str, str] | None = None,
 ) -> Iterator[PlacedScan]:
     """Yield the front scans with where they were taken, on poses that are known; scans without a pose are left out."""
-    track, mounts = FinalTrack(rows), Mounts(machine)
+    track, mounts, sweep_times = FinalTrack(rows), Mounts(machine), SweepTimes()
     boxes = own_boxes(machine, settings.integration.body_margin_m)
     with LogSource(list(logs), topics) as source:
         for _, message in source.messages([role for role in ("tf_static", "front") if role in source.roles]):
             if isinstance(message, Mount):
                 mounts.update(message)
             elif isinstance(message, LaserScan):
+                message = sweep_times.checked("front", message)
                 time_ns = message.stamp_ns + half_sweep_ns(message)
                 if not track.covers(time_ns):
                     continue

@@ -168,7 +168,7 @@ class MappingPipeline:
 
     def _mount_inclinometer(self) -> None:
         """Begin the attitude, with the inclinometer's mount if it is known; once more where that comes late."""
-        if not self._early:
+        if not self._early or self._time_ns > 0:  # what was used already stands
             return
         frame, R_base_sensor = self._early[0].frame_id, None
         if self.mounts.known(frame):

@@ -22,6 +22,7 @@ from lhdmap.pipeline.beside import HelperDied
 from lhdmap.pipeline.identify import identify_along
 from lhdmap.pipeline.inspection import peak_memory_mib
 from lhdmap.pipeline.mapping import MappingPipeline
+from lhdmap.pipeline.sweep_times import SweepTimes
 from lhdmap.pipeline.sweeps import SweepIntegration
 from lhdmap.pipeline.track import FinalTrack, Rows, resample, trajectory_of
 from lhdmap.proprioception.wheels import WheelOdometry
@@ -97,7 +98,7 @@ class Outcome:
         sweeps = integrate_again(inputs, pipeline, rows) if ways.moved else pipeline.sweeps
         self.cloud: Cloud = sweeps.cloud()
         distance_m = float(np.linalg.norm(np.diff(rows.poses[:, :3], axis=0), axis=1).sum())
-        if not len(self.cloud.points_m) and distance_m == 0.0:
+        if not len(self.cloud.points_m) and pipeline.records.degenerate_share == 1.0:
             raise InputError(f"{source.paths[0]}: its scans hold no hit; lhdmap doctor tells what is wrong")
         self.pile = self._pile()
         self.warnings = [*source.warnings, *source.damage, *pipeline.warnings, *sweeps.warnings, *_remarks(pipeline)]
@@ -155,7 +156,7 @@ def integrate_again(inputs: Inputs, pipeline: MappingPipeline, rows: Rows) -> Sw
     """
     sweeps = SweepIntegration(inputs.settings, pipeline.machine, pipeline.mounts, None)
     wheels = WheelOdometry(inputs.settings.wheels, pipeline.machine or Machine())
-    track, times = FinalTrack(rows), iter(pipeline.records.times_ns)
+    track, times, sweep_times = FinalTrack(rows), iter(pipeline.records.times_ns), SweepTimes()
     with LogSource(list(inputs.logs), inputs.topics) as source:
         for role, message in source.messages(
             [role for role in ("front", "rear", "points", "joints") if role in source.roles]
@@ -164,6 +165,7 @@ def integrate_again(inputs: Inputs, pipeline: MappingPipeline, rows: Rows) -> Sw
                 wheels.update(message)
             elif isinstance(message, (LaserScan, PointCloud)):
                 time_ns = next(times, message.stamp_ns) if role == "front" else message.stamp_ns
+                message = sweep_times.checked(role, message) if isinstance(message, LaserScan) else message
                 sweeps.add_final(role, time_ns, message, track, wheels)
     sweeps.wait(track, wheels)
     return sweeps

@@ -52,6 +52,7 @@ def test_a_stamp_that_leaps_ahead_becomes_the_log_time_and_the_next_are_as_ever(
     got, keeper = _decided(pairs)
     assert got == [k * SECOND for k in range(1, 7)]
     assert keeper.warnings() == ["/scan: 1 stamps leap ahead; the log time is used for them instead"]
+    assert (keeper.topics["/scan"].offset_min_ns, keeper.topics["/scan"].offset_max_ns) == (5, 5)
 
 
 def test_a_clock_that_was_set_is_believed_once_it_is_confirmed() -> None:

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from lhdmap.geometry import se2
 from lhdmap.messages import FloatArray
-from lhdmap.odometry.jump import jump
+from lhdmap.odometry.jump import Place, jump
 from lhdmap.odometry.matching import Hits, Match, MatchModel, Prior, match
 from lhdmap.odometry.motion import FORWARD, TURNING, Motion
 from lhdmap.odometry.settings import OdometrySettings, SearchSettings
@@ -46,7 +46,8 @@ def found_from(walls: SurfaceMap, predicted: FloatArray, motion: Motion) -> tupl
     """Return the match near a prediction, and the jump from there."""
     hits, prior = Hits(room(TRUE), len(room(TRUE)), layered=False), Prior(predicted, SURE)
     near = match(walls, hits, prior, predicted, MODEL)
-    return near, jump(walls, room(np.zeros(3)), hits, near, prior, motion, SearchSettings(), MODEL)
+    place = Place(walls, room(np.zeros(3)), MODEL)
+    return near, jump(place, hits, near, prior, motion, SearchSettings())
 
 
 def test_a_kidnapped_machine_is_found(walls: SurfaceMap) -> None:
@@ -79,12 +80,12 @@ def test_wheels_that_disagree_want_more_support(walls: SurfaceMap) -> None:
     hits, prior = Hits(room(TRUE), len(room(TRUE)), layered=False), Prior(predicted, SURE)
     away = match(walls, hits, prior, predicted, MODEL)
     seen, wide = room(np.zeros(3)), SearchSettings()
-    assert jump(walls, seen, hits, away, prior, wheeled(), wide, MODEL) is not None
+    assert jump(Place(walls, seen, MODEL), hits, away, prior, wheeled(), wide) is not None
     close = away._replace(support=0.75)  # as if a crowd hid what is wrong there
-    free = jump(walls, seen, hits, close, prior, Motion(OdometrySettings()), wide, MODEL)
+    free = jump(Place(walls, seen, MODEL), hits, close, prior, Motion(OdometrySettings()), wide)
     assert free is not None
     assert free.support > close.support
-    assert jump(walls, seen, hits, close, prior, wheeled(), wide, MODEL) is None
+    assert jump(Place(walls, seen, MODEL), hits, close, prior, wheeled(), wide) is None
 
 
 def test_a_jump_back_to_where_the_wheels_lead_is_cheap(walls: SurfaceMap) -> None:
@@ -93,8 +94,8 @@ def test_a_jump_back_to_where_the_wheels_lead_is_cheap(walls: SurfaceMap) -> Non
     hits, prior = Hits(room(TRUE), len(room(TRUE)), layered=False), Prior(predicted, SURE)
     close = match(walls, hits, prior, predicted, MODEL)._replace(pose=predicted, support=0.82)
     seen, wide, back = room(np.zeros(3)), SearchSettings(), TRUE - predicted
-    assert jump(walls, seen, hits, close, prior, wheeled(), wide, MODEL) is None
-    found = jump(walls, seen, hits, close, prior, wheeled(), wide, MODEL, owed=-back)
+    assert jump(Place(walls, seen, MODEL), hits, close, prior, wheeled(), wide) is None
+    found = jump(Place(walls, seen, MODEL), hits, close, prior, wheeled(), wide, owed=-back)
     assert found is not None
     assert np.hypot(*(found.pose - TRUE)[:2]) < 0.01
 

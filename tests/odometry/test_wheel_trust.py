@@ -39,13 +39,14 @@ def test_a_moment_of_slip_does_not_undo_what_was_right_for_long() -> None:
 
 
 @pytest.mark.parametrize(
-    ("ratio", "word"), [(-1.0, "sign"), (3.6, "km/h"), (0.0, "stand still"), (2.0, "2 times the scans' speed")]
+    ("ratio", "length_m", "word"),
+    [(-1.0, 30, "sign"), (3.6, 108, "km/h"), (0.0, 30, "stand still"), (2.0, 60, "2 times the scans' speed")],
 )
-def test_the_warning_says_what_it_may_come_from(ratio: float, word: str) -> None:
+def test_the_warning_says_what_it_may_come_from(ratio: float, length_m: int, word: str) -> None:
     warning = _taught(*[ratio] * 30).warning()
     assert warning is not None
     assert word in warning
-    assert "30 of 30 m" in warning or ratio > 1.0
+    assert f"{length_m} of {length_m} m" in warning
 
 
 def test_a_few_metres_are_not_worth_a_warning() -> None:

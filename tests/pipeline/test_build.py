@@ -108,11 +108,16 @@ def test_bad_streams_make_a_map(untold: Path, tmp_path: Path, change: str) -> No
     assert any("inclinometer" in text for text in found.warnings)
 
 
-def test_a_log_whose_scans_are_all_blind_is_refused_as_by_doctor(untold: Path, tmp_path: Path) -> None:
+@pytest.mark.parametrize("roles", [("front",), ("front", "tachometer", "joints", "tf_static")])
+def test_a_log_whose_scans_are_all_blind_is_refused_as_by_doctor(
+    roles: tuple[str, ...], untold: Path, tmp_path: Path
+) -> None:
+    """Also where the wheels tell of a drive: a map without a wall is none."""
     with LogSource([untold]) as source, LogWriter(tmp_path / "blind.mcap") as writer:
-        for _, scan in source.messages(["front"]):
-            assert isinstance(scan, LaserScan)
-            writer.write("/lidar/front/scan", scan._replace(ranges_m=np.full_like(scan.ranges_m, np.inf)))
+        for role, message in source.messages(roles):
+            if isinstance(message, LaserScan):
+                message = message._replace(ranges_m=np.full_like(message.ranges_m, np.inf))
+            writer.write(source.roles[role], [message] if isinstance(message, Mount) else message)
     with pytest.raises(InputError, match=r"blind\.mcap: its scans hold no hit"):
         build_map(BuildRequest([tmp_path / "blind.mcap"], tmp_path / "map"))
 

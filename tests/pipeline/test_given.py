@@ -9,8 +9,10 @@ import numpy as np
 import pytest
 from lhdmap.errors import InputError
 from lhdmap.geometry import se3
+from lhdmap.integration.cloud_io import read_cloud
+from lhdmap.logs.source import LogSource
 from lhdmap.logs.writer import LogWriter
-from lhdmap.messages import LaserScan
+from lhdmap.messages import LaserScan, Mount
 from lhdmap.pipeline.build import BuildRequest, build_map
 from lhdmap.pipeline.given import GROUND_TRUTH, given_rows
 from lhdmap.provenance import sha256_of
@@ -72,3 +74,17 @@ def test_holes_between_poses_are_told_and_the_map_says_what_it_was_made_of(
     assert info["options"]["request"]["poses"] == poses
     assert info["options"]["request"]["poses_file"]["sha256"] == sha256_of(Path(poses))
     assert "given poses" in info["frames"]["map"]
+
+
+def test_a_sweep_that_cannot_be_is_left_out_with_given_poses_too(drive: SimulatedDrive, tmp_path: Path) -> None:
+    """The time of a scan given for that of a beam: each sweep was smeared over fifteen seconds of the path."""
+    points = []
+    for name, increment_s in (("none", 0.0), ("wrong", 0.04)):
+        with LogSource([drive.log]) as source, LogWriter(tmp_path / f"{name}.mcap") as writer:
+            for role, message in source.messages(["front", "tf_static", "ground_truth"]):
+                if isinstance(message, LaserScan):
+                    message = message._replace(time_increment_s=increment_s)
+                writer.write(source.roles[role], [message] if isinstance(message, Mount) else message)
+        found = build_map(BuildRequest([tmp_path / f"{name}.mcap"], tmp_path / name, poses=GROUND_TRUTH))
+        points.append(read_cloud(found.folder / "cloud.ply").points_m)
+    assert points[0] == pytest.approx(points[1])

@@ -12,7 +12,7 @@ from lhdmap.geometry import se3
 from lhdmap.logs.source import LogSource
 from lhdmap.logs.writer import LogWriter
 from lhdmap.machine import Machine
-from lhdmap.messages import Inclination, Joints, LaserScan, Mount
+from lhdmap.messages import Inclination, Joints, LaserScan, Mount, PointCloud
 from lhdmap.pipeline.mapping import MappingPipeline
 from lhdmap.pipeline.mounts import Mounts, level_sensor, machine_of
 
@@ -110,3 +110,18 @@ def test_a_scanner_on_the_rear_body_is_known_as_such() -> None:
     mounts.of("scanner", "front")
     assert mounts.on_rear_body("front")
     assert not mounts.on_rear_body("rear")
+
+
+def test_a_mount_that_comes_during_the_drive_of_a_3d_scanner_leaves_the_attitude() -> None:
+    """`/tf_static` is often published again: the filter began anew with the first messages, and the slope was gone."""
+    pipeline = MappingPipeline(Settings(), cloud=False, primary="points")
+    walls = np.random.default_rng(0).uniform(-10.0, 10.0, (3000, 3)).astype(np.float32)
+    walls[:, 1] = np.sign(walls[:, 1]) * 2.0
+    for k in range(400):
+        pipeline.update("inclinometer", Inclination(k * 10_000_000, "imu", 0.0, 0.001 * k, None, None))
+        if k % 10 == 0:
+            pipeline.update("points", PointCloud(k * 10_000_000, "lidar", walls, np.empty(0, np.float32)))
+    before = pipeline.attitude.roll_pitch_at(3_500_000_000)
+    pipeline.update("tf_static", Mount(0, "base_link", "other", np.eye(4)))
+    assert pipeline.attitude.roll_pitch_at(3_500_000_001) == pytest.approx(before, abs=1e-6)
+    assert before[1] == pytest.approx(0.35, abs=0.02)
