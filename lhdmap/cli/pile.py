@@ -93,6 +93,9 @@ def _text(values: dict[str, Any], folder: Path) -> str:
         lines.append(f"decided      {distance_m:.1f} m before the toe")
     elif not values["identified"]:
         lines.append("decided      no: not identified")
+    if len(values["piles"]) > 1:
+        statuses = ", ".join(one["status"] for one in values["piles"])
+        lines.append(f"on the drive {statuses}: in pile.json, piles")
     return "\n".join(lines)
 
 

@@ -2,19 +2,31 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 
 from lhdmap.geometry import se2
 from lhdmap.messages import FloatArray
-from lhdmap.pile.result import AttackPoint, PileEstimate, PileReport, Snapshot
+from lhdmap.pile.result import Approach, AttackPoint, PileEstimate, PileReport, Snapshot
 
 
-def moved_report(report: PileReport, T_to_from: FloatArray) -> PileReport:
-    """Return the report with all that lies in space moved by a planar motion (3,); heights stay."""
+def moved_report(report: PileReport, motion_at: Callable[[int], FloatArray]) -> PileReport:
+    """Return the report with all that lies in space moved; heights stay.
+
+    `motion_at`: planar motion (3,) of what was measured at a time (ns). A pile is moved as a whole, as its last estimate is.
+    """
+    if report.last is None:
+        return report
+    T_to_from = motion_at(report.last.stamp_ns)
     history = tuple(_moved_snapshot(one, T_to_from) for one in report.history)
     decision, last = (one and _moved_snapshot(one, T_to_from) for one in (report.decision, report.last))
     around = se2.transform(T_to_from, report.around_m)
-    return replace(report, history=history, decision=decision, last=last, around_m=around)
+    piles = tuple(_moved_approach(one, motion_at(one.last.stamp_ns)) for one in report.piles)
+    return replace(report, history=history, decision=decision, last=last, around_m=around, piles=piles)
+
+
+def _moved_approach(pile: Approach, T_to_from: FloatArray) -> Approach:
+    return Approach(_moved_snapshot(pile.decision, T_to_from), _moved_snapshot(pile.last, T_to_from))
 
 
 def _moved_snapshot(snapshot: Snapshot, T_to_from: FloatArray) -> Snapshot:

@@ -72,11 +72,19 @@ class Snapshot(NamedTuple):
     estimate: PileEstimate
 
 
+class Approach(NamedTuple):
+    """What was decided of one pile, and the last estimate of it."""
+
+    decision: Snapshot
+    last: Snapshot
+
+
 @dataclass(frozen=True, slots=True)
 class PileReport:
     """Outcome of a drive: the decision (None: not identified), the last estimate, and how it came about.
 
     `around_m` (N, 3): hits around the pile in the map, thinned, for pictures; `warnings`: what is to be said of the log.
+    `piles`: all that was decided on the drive, this one too, in the order of time: the decision and the last estimate of each.
     """
 
     decision: Snapshot | None
@@ -85,6 +93,7 @@ class PileReport:
     method: str = "surface"
     around_m: FloatArray = field(default_factory=lambda: np.zeros((0, 3)))
     warnings: tuple[str, ...] = ()
+    piles: tuple[Approach, ...] = ()
 
     def to_json(self) -> dict[str, Any]:
         """Return the content of `pile.json`: the last estimate, and when and how far away it was decided."""
@@ -96,7 +105,17 @@ class PileReport:
         table["decided_at_ns"] = self.decision.stamp_ns if self.decision else None
         table["distance_at_decision_m"] = _number(self.decision.distance_m) if self.decision else None
         table["decision"] = estimate_json(self.decision.estimate) if self.decision else None
+        table["piles"] = [_approach_json(one) for one in self.piles]
         return table
+
+
+def _approach_json(pile: Approach) -> dict[str, Any]:
+    """Return what was decided in one approach as JSON values: the last estimate, and when and how far away it was decided."""
+    return {
+        **estimate_json(_of_a_pile(pile.last.estimate)),
+        "decided_at_ns": pile.decision.stamp_ns,
+        "distance_at_decision_m": _number(pile.decision.distance_m),
+    }
 
 
 def _of_a_pile(estimate: PileEstimate) -> PileEstimate:

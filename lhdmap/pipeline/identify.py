@@ -18,7 +18,7 @@ from lhdmap.messages import FloatArray, LaserScan, Mount
 from lhdmap.odometry.scan_points import half_sweep_ns
 from lhdmap.pile.face import Registration
 from lhdmap.pile.heap import measure_cloud
-from lhdmap.pile.result import PileReport, Snapshot
+from lhdmap.pile.result import Approach, PileReport, Snapshot
 from lhdmap.pipeline.given import given_rows
 from lhdmap.pipeline.mapping import MappingPipeline, own_boxes
 from lhdmap.pipeline.mounts import Mounts, level_sensor, machine_of
@@ -85,7 +85,8 @@ def _in_cloud(source: LogSource, settings: Settings, machine: Machine | None) ->
     estimate = measure_cloud(pipeline.sweeps.cloud().points_m.astype(np.float64), "z").estimate
     last = Snapshot(pipeline.track.last_ns or 0, math.nan, estimate)
     decision = last if estimate.found and estimate.status != "none" else None
-    return PileReport(decision, last, (last,), "cloud")
+    piles = () if decision is None else (Approach(decision, last),)
+    return PileReport(decision, last, (last,), "cloud", piles=piles)
 
 
 def _warned(report: PileReport, told: Sequence[str]) -> PileReport:

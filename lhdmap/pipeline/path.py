@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 import numpy as np
 
 from lhdmap.messages import FloatArray
@@ -47,10 +49,7 @@ class FinalPath:
     def moved(self, report: PileReport) -> PileReport:
         """Return a pile that was measured on the odometry's path as it lies on the final one."""
         correction = self.correction()
-        if correction is None or report.last is None:
-            return report
-        at = int(np.searchsorted(correction.times_ns, report.last.stamp_ns))
-        return moved_report(report, correction.T_map_odom[min(at, len(correction.T_map_odom) - 1)])
+        return report if correction is None else moved_report(report, partial(_motion_at, correction))
 
     def _advance(self, moves: list[tuple[int, FloatArray]], until_ns: int) -> None:
         """Take over the odometry's poses up to a time, moved as the final nodes around them are."""
@@ -59,6 +58,12 @@ class FinalPath:
             recent = _correction(moves[max(self._moves - 1, 0) :])
             self.final.extend(Rows(rows.times_ns, corrected(rows.poses, rows.times_ns, recent)))
         self._used, self._moves = self._used + len(rows.times_ns), len(moves)
+
+
+def _motion_at(correction: Correction, time_ns: int) -> FloatArray:
+    at = int(np.searchsorted(correction.times_ns, time_ns))
+    motion: FloatArray = correction.T_map_odom[min(at, len(correction.T_map_odom) - 1)]
+    return motion
 
 
 def _correction(moves: list[tuple[int, FloatArray]]) -> Correction:

@@ -70,6 +70,8 @@ def pile_sections(report: PileReport, *, drawn: bool = False) -> str:
             picture = _picture(pile_charts.convergence_chart(report), CONVERGENCE)
             parts.append(markup.section("How the estimate converged", picture))
     parts.append(markup.section("Probabilities and places", _tables(pile)))
+    if len(report.piles) > 1:
+        parts.append(markup.section("All that was decided on this drive", _piles(report)))
     return "".join(parts)
 
 
@@ -121,6 +123,22 @@ def _tables(pile: PileEstimate) -> str:
         places.append((heading, *_xyz(pile.attack.point_m)))
     first = markup.table(("status", "probability, %", "meaning"), shares, numbers_from=1, numbers_to=2)
     return first + markup.table(("in map", "x, m", "y, m", "z, m"), places, numbers_from=1)
+
+
+def _piles(report: PileReport) -> str:
+    """Return a row for each pile or wall that was decided, in the order of time."""
+    rows = [
+        (
+            one.last.estimate.status.replace("_", " ") + (" (the one above)" if one.last is report.last else ""),
+            f"{one.last.estimate.width_m:.2f} {_deviation(one.last.estimate.width_std_m, 2, '')}",
+            f"{one.last.estimate.inclination_deg:.1f} {_deviation(one.last.estimate.inclination_std_deg, 1, '')}",
+            f"{one.decision.distance_m:.1f}",
+            *_xyz(one.last.estimate.center_m),
+        )
+        for one in report.piles
+    ]
+    names = ("status", "width, m", "inclination, °", "decided at, m", "x, m", "y, m", "z, m")
+    return markup.table(names, rows, numbers_from=1)
 
 
 def _deviation(value: float, digits: int, unit: str) -> str:

@@ -43,8 +43,8 @@ def add_pile(writer: RecordingWriter, report: PileReport, around_m: FloatArray |
     """
     writer.curves = (*writer.curves, *CURVES)
     _add_course(writer, report)
-    if report.decision is not None:
-        writer.add_text(f"pile decided: {report.decision.estimate.status}", report.decision.stamp_ns, "INFO")
+    for one in report.piles:
+        writer.add_text(f"pile decided: {one.decision.estimate.status}", one.decision.stamp_ns, "INFO")
     if report.last is None or not report.last.estimate.found:
         return
     pile = report.last.estimate

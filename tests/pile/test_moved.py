@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from lhdmap.pile.moved import moved_report
-from lhdmap.pile.result import AttackPoint, Boulder, PileEstimate, PileReport, Snapshot
+from lhdmap.pile.result import Approach, AttackPoint, Boulder, PileEstimate, PileReport, Snapshot
 
 T = np.array([1.0, 2.0, math.pi / 2])  # a quarter turn to the left, then the shift
 PLACE, MOVED = np.array([3.0, 1.0, 0.5]), np.array([0.0, 5.0, 0.5])
@@ -27,11 +28,11 @@ def report() -> PileReport:
         face_m=np.stack([PLACE, PLACE]),
     )
     last = Snapshot(7, 9.0, pile)
-    return PileReport(last, last, (last,), around_m=PLACE[None])
+    return PileReport(last, last, (last,), around_m=PLACE[None], piles=(Approach(last, last),))
 
 
 def test_all_places_move_and_nothing_else() -> None:
-    moved = moved_report(report(), T)
+    moved = moved_report(report(), lambda _: T)
     assert moved.last is not None
     pile = moved.last.estimate
     for place in (
@@ -55,7 +56,18 @@ def test_all_places_move_and_nothing_else() -> None:
     )
 
 
+def test_each_pile_moves_by_its_own_motion() -> None:
+    """A loop that was closed later moves what was seen before it more than what was seen after it."""
+    one = report().piles[0]
+    later = Approach(one.decision, one.last._replace(stamp_ns=8))
+    both = replace(report(), piles=(one, later))
+    moved = moved_report(both, lambda stamp_ns: T if stamp_ns == 7 else np.zeros(3))
+    assert moved.piles[0].last.estimate.center_m == pytest.approx(MOVED)
+    assert moved.piles[0].decision.estimate.toe_m[0] == pytest.approx(MOVED)
+    assert moved.piles[1].last.estimate.center_m == pytest.approx(PLACE)
+
+
 def test_a_report_of_nothing_stays_one() -> None:
-    moved = moved_report(PileReport(None, None), T)
+    moved = moved_report(PileReport(None, None), lambda _: T)
     assert moved.last is None
     assert moved.decision is None

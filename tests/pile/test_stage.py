@@ -12,6 +12,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from lhdmap.messages import FloatArray
+from lhdmap.pile.approach import Approaches
 from lhdmap.pile.face import Registration
 from lhdmap.pile.result import PileEstimate, PileReport, Snapshot, estimate_json
 from lhdmap.pile.settings import PileSettings
@@ -243,12 +244,11 @@ def test_slope_that_is_too_unsure_is_not_said() -> None:
 
 
 def _fed(*found: Snapshot) -> PileReport:
-    """Return the report of a stage that came to these estimates, half a metre apart."""
-    stage = PileStage(PileSettings(), EXACT)
-    for one in found:
-        stage._travelled_m += 0.5
-        stage._take(one)
-    return stage.report()
+    """Return the report of an approach that came to these estimates, half a metre apart."""
+    approaches = Approaches(PileSettings())
+    for number, one in enumerate(found):
+        approaches.take(one, 0.5 * number)
+    return approaches.report(np.zeros((0, 3)))
 
 
 def test_decision_falls_with_what_it_was_on() -> None:
@@ -283,6 +283,74 @@ def test_a_pile_that_was_decided_stays_when_the_machine_backs_out() -> None:
     assert before.decision is not None
     assert after.decision is before.decision
     assert last_of(after).estimate.width_m == last_of(before).estimate.width_m
+
+
+def _cycle(*legs: tuple[CastDrift, float, float]) -> PileReport:
+    """Return the report of legs driven one after the other: a drift, from x to x; in reverse where x falls."""
+    stage, stamp_ns = PileStage(PileSettings(), EXACT), 0
+    for drift, from_m, to_m in legs:
+        scans = list(drift.scans(min(from_m, to_m), max(from_m, to_m)))
+        for scan in scans if to_m > from_m else reversed(scans):
+            stamp_ns += 100_000_000
+            stage.update(scan._replace(stamp_ns=stamp_ns))
+    return stage.report()
+
+
+def _other(slope_deg: float | None, width_m: float = 4.0) -> CastDrift:
+    return CastDrift(slope_deg, width_m, turn_rad=1.8, shift_m=(-60.0, 40.0, 0.5))
+
+
+@pytest.mark.parametrize("slope_deg", [None, 90.0])
+def test_a_whole_loading_cycle_keeps_the_pile(slope_deg: float | None) -> None:
+    """To the pile, back, and forward into another drift, to its end or not: what lay ahead last took the pile's place."""
+    pile = CastDrift(45.0)
+    alone = _cycle((pile, 0.0, 32.0))
+    whole = _cycle((pile, 0.0, 32.0), (pile, 32.0, 4.0), (_other(slope_deg), 0.0, 26.0))
+    assert alone.decision is not None
+    assert whole.decision is not None
+    assert whole.decision.stamp_ns == alone.decision.stamp_ns
+    assert last_of(whole).estimate.width_m == last_of(alone).estimate.width_m
+    assert len(whole.around_m) > 1000
+    statuses = [last.estimate.status for _, last in whole.piles if last is not None]
+    assert statuses == ["loadable"] + ([] if slope_deg is None else ["wall"])
+
+
+def test_the_pile_that_was_loaded_last_is_reported() -> None:
+    first, second = CastDrift(45.0), _other(38.0, 4.6)
+    report = _cycle((first, 0.0, 30.0), (first, 30.0, 10.0), (second, 0.0, 28.0))
+    assert last_of(report).estimate.inclination_deg == pytest.approx(-38.0, abs=1.0)
+    assert last_of(report).estimate.width_m == pytest.approx(4.6, abs=0.1)
+    table = report.to_json()
+    assert [pile["status"] for pile in table["piles"]] == ["loadable", "loadable"]
+    assert [pile["width_m"] for pile in table["piles"]] == pytest.approx([4.0, 4.6], abs=0.1)
+    assert table["piles"][1]["decided_at_ns"] == table["decided_at_ns"]
+
+
+def test_a_pile_that_was_loaded_from_is_looked_at_anew() -> None:
+    """The second time its face is steeper: hits of the first time would blur it."""
+    before, after = CastDrift(38.0), CastDrift(50.0)
+    report = _cycle((before, 0.0, 32.0), (after, 32.0, 8.0), (after, 8.0, 28.0))
+    assert last_of(report).estimate.inclination_deg == pytest.approx(-50.0, abs=1.0)
+    assert len(report.piles) == 1
+
+
+def test_a_short_second_approach_to_the_same_face_does_not_make_it_less_known() -> None:
+    drift = CastDrift(45.0)
+    once = _cycle((drift, 0.0, 32.0), (drift, 32.0, 24.0))
+    twice = _cycle((drift, 0.0, 32.0), (drift, 32.0, 20.0), (drift, 20.0, 26.0))
+    first, second = last_of(once).estimate, last_of(twice).estimate
+    assert second.inclination_std_deg <= first.inclination_std_deg
+    assert second.inclination_deg == pytest.approx(-45.0, abs=2.0 * second.inclination_std_deg)
+    assert len(twice.piles) == 1
+
+
+def test_backing_out_of_what_is_driven_through_later_keeps_it_once() -> None:
+    """A second look at the same pile that comes to nothing leaves the first."""
+    drift = CastDrift(45.0)
+    once = _cycle((drift, 0.0, 30.0), (drift, 30.0, 20.0))
+    twice = _cycle((drift, 0.0, 30.0), (drift, 30.0, 20.0), (_other(None), 0.0, 20.0))
+    assert last_of(twice).estimate.width_m == last_of(once).estimate.width_m
+    assert len(twice.piles) == len(once.piles) == 1
 
 
 @pytest.mark.parametrize("fall", [0.04, 0.08, 0.12])
