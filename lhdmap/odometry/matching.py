@@ -12,9 +12,12 @@ from lhdmap.messages import FloatArray
 from lhdmap.odometry.surface_map import LINE, fit_line
 
 # Finest cells that a pose may move before lines are fitted anew. Where the walls hold: measured, no loss, half the time. Where
-# they hardly do, one step corrects only a part of an error along them, and what pulls towards standing still adds up.
+# they hardly do, one step corrects only a part of an error along them, and what pulls towards standing still adds up. There lines
+# are wide, too: the direction of a short one is mostly noise, and noise that the map keeps holds the pose where it is.
 _LINES_HOLD, _WEAK_LINES_HOLD = 0.3, 0.03
 _WEAK_M = 0.003  # deviation of a match in its worse direction from which walls hardly hold
+_SMOOTH_RATIO = 5.0  # of both deviations: rough walls give 2, moderate ones 4, smooth ones 10, a coarse scanner 1
+_CLOT_SIGMAS = 1.5
 NO_SLANTS = np.zeros((0, 2))
 
 
@@ -65,10 +68,15 @@ class Match(NamedTuple):
 
 
 @nb.njit(cache=True, nogil=True)
-def lines_at(map_, pose, hits, min_cells, lines):  # type: ignore[no-untyped-def]
-    """Fit the wall's line at each hit, lines (N, LINE); return how many of the front scanner's have one."""
+def lines_at(map_, pose, hits, model, wide, lines):  # type: ignore[no-untyped-def]
+    """Fit the wall's line at each hit, lines (N, LINE); return how many of the front scanner's have one.
+
+    The finest level that supports a line serves; with `wide` the next one instead where its line fits at least as well: where the
+    wall is straight over both, its cells have more hits each and stand less beside it.
+    """
     c, s = math.cos(pose[2]), math.sin(pose[2])
-    points, sums = hits.points, np.empty(8)
+    points, sums, wider = hits.points, np.empty(8), np.empty(LINE)
+    wanted = (model.min_cells, (_CLOT_SIGMAS * model.noise_m) ** 2 if wide else 0.0)
     found = 0
     for i in range(points.shape[0]):
         at = (
@@ -77,11 +85,14 @@ def lines_at(map_, pose, hits, min_cells, lines):  # type: ignore[no-untyped-def
             points[i, 2],
         )
         lines[i, 6] = 0.0
-        if fit_line(map_.fine, at, hits.layered, min_cells, sums, lines[i]):
+        if fit_line(map_.fine, at, hits.layered, wanted, sums, lines[i]):
             lines[i, 6] = map_.fine.cell_m
-        elif fit_line(map_.middle, at, hits.layered, min_cells, sums, lines[i]):
+            if wide and fit_line(map_.middle, at, hits.layered, wanted, sums, wider) and wider[4] < lines[i, 4]:
+                wider[6] = map_.middle.cell_m
+                lines[i] = wider
+        elif fit_line(map_.middle, at, hits.layered, wanted, sums, lines[i]):
             lines[i, 6] = map_.middle.cell_m
-        elif fit_line(map_.coarse, at, hits.layered, min_cells, sums, lines[i]):
+        elif fit_line(map_.coarse, at, hits.layered, wanted, sums, lines[i]):
             lines[i, 6] = map_.coarse.cell_m
         found += i < hits.front and lines[i, 6] > 0.0
     return found
@@ -223,10 +234,11 @@ def solve3(A: FloatArray, b: FloatArray) -> FloatArray:
 
 
 @nb.njit(cache=True, nogil=True, inline="always")
-def _hardly_held(H):  # type: ignore[no-untyped-def]
-    """Return whether the information H (3, 3) leaves one direction of the plane uncertain."""
+def _held(H):  # type: ignore[no-untyped-def]
+    """Return the information (1/m²) of H (3, 3) along its worse and its better direction of the plane."""
     half, difference = 0.5 * (H[0, 0] + H[1, 1]), 0.5 * (H[0, 0] - H[1, 1])
-    return half - math.sqrt(difference * difference + H[0, 1] * H[0, 1]) < 1.0 / _WEAK_M**2
+    root = math.sqrt(difference * difference + H[0, 1] * H[0, 1])
+    return half - root, half + root
 
 
 @nb.njit(cache=True, nogil=True)
@@ -239,9 +251,9 @@ def match(map_, hits, prior, start, model):  # type: ignore[no-untyped-def]
     lines = np.zeros((hits.points.shape[0], LINE))
     H, b = np.zeros((3, 3)), np.zeros(3)
     fine_m = map_.fine.cell_m
-    found = 0
+    found, wide = 0, False
     for _ in range(model.rounds):
-        found = lines_at(map_, pose, hits, model.min_cells, lines)
+        found = lines_at(map_, pose, hits, model, wide, lines)
         moved = 0.0
         for _ in range(3):
             normal_equations(pose, hits, lines, fine_m, model, H, b)
@@ -251,8 +263,11 @@ def match(map_, hits, prior, start, model):  # type: ignore[no-untyped-def]
             moved += size
             if size < 2e-5:
                 break
-        hold = _WEAK_LINES_HOLD if not hits.layered and _hardly_held(H) else _LINES_HOLD
-        if moved < hold * fine_m:
+        worse, better = _held(H)
+        weak = not hits.layered and worse < 1.0 / _WEAK_M**2
+        if weak and not wide and worse * _SMOOTH_RATIO**2 < better:
+            wide = True
+        elif moved < (_WEAK_LINES_HOLD if weak else _LINES_HOLD) * fine_m:
             break
     total, weights = normal_equations(pose, hits, lines, fine_m, model, H, b)
     n = max(hits.front, 1)

@@ -12,6 +12,9 @@ from lhdmap.odometry.settings import OdometrySettings
 
 FORWARD, LATERAL, TURNING = 3, 4, 5
 _GATE_SIGMAS = 4.0
+# Share of what wheels that slip were off by at first, within which they are believed again: walls alone tell the speed less and
+# less, and what still slips soon comes within the gate.
+_AGAIN = 0.5
 # Where walls do not hold the motion: wheels that turn faster than the machine moves slip, for seconds; wheels that say anything
 # else for longer than a moment are right, and the match has run away.
 _SLIP_S, _DISSENT_S = 3.0, 0.5
@@ -33,6 +36,7 @@ class Motion:
         )
         self.state, self.P = motion_filter.initial(np.zeros(3))
         self._dissent_s = self._step_s = 0.0
+        self._off_mps = 0.0  # of wheels that slip
         self._way, self._joint = np.zeros(3), np.zeros((10, 10))
         self._measured: set[int] = set()
         self.held = False  # whether walls hold it in all directions, as the last scan says
@@ -90,25 +94,36 @@ class Motion:
         direction = np.array([math.cos(heading), math.sin(heading), 0.0] if axis == FORWARD else [0.0, 0.0, 1.0])
         if dt_s > _LONGEST_STEP_S:
             self._open(direction, _GAP_VARIANCE[axis - FORWARD, axis - FORWARD] * dt_s**2)
-        nis = motion_filter.update_way(
-            self.state, self._joint, self._way, direction, measured * dt_s, (sigma * dt_s) ** 2, scaled, _GATE_SIGMAS
-        )
-        self.P[:, :] = self._joint[:7, :7]
-        agrees = bool(nis <= _GATE_SIGMAS**2)
+        off_mps = abs(measured - float(self.state[FORWARD])) if axis == FORWARD else 0.0
+        agrees = not off_mps > _AGAIN * self._off_mps > 0.0
+        if agrees:
+            nis = motion_filter.update_way(
+                self.state,
+                self._joint,
+                self._way,
+                direction,
+                measured * dt_s,
+                (sigma * dt_s) ** 2,
+                scaled,
+                _GATE_SIGMAS,
+            )
+            self.P[:, :] = self._joint[:7, :7]
+            agrees = bool(nis <= _GATE_SIGMAS**2)
         if agrees:
             self._measured.add(axis)
         if axis != FORWARD:
             return agrees
         if agrees:
-            self._dissent_s = 0.0
+            self._dissent_s = self._off_mps = 0.0
             return True
+        self._off_mps = self._off_mps or off_mps
         speed = float(self.state[FORWARD])
         slips = measured * speed > 0.0 and abs(measured) > abs(speed)
         if self.held or self._dissent_s < (_SLIP_S if slips else _DISSENT_S):
             return False
         self._override(direction, measured, sigma)
         self.P[:, :] = self._joint[:7, :7]
-        self._dissent_s = 0.0
+        self._dissent_s = self._off_mps = 0.0
         return True
 
     def _override(self, direction: FloatArray, measured: float, sigma: float) -> None:

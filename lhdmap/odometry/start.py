@@ -6,8 +6,8 @@ see the speed at all. The scans are run twice, the second time from what the fir
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import NamedTuple, Protocol
+from collections.abc import Callable, Sequence
+from typing import NamedTuple
 
 import numpy as np
 
@@ -18,11 +18,9 @@ from lhdmap.odometry.steps import OdometryStep, WheelStep
 
 _SPAN_SCANS = 6  # the starting speed is the mean over so many scans
 _LONGEST_SPAN_S = 1.0
-# Share of weak scans from which range flow tells the speed: its information has the noise of the slopes taken out, while a map of
-# a few scans of a smooth wall holds any speed fast.
-_WEAK_SHARE = 0.2
-_FLOW_EVERY = 2  # scans between the beginnings of such runs
-_DRY_SCANS = 25  # of a run against the map; range flow wants more
+_WEAK_SHARE = 0.2  # of scans from which the walls are smooth: other speeds are tried, too
+_SPEEDS_MPS = (0.0, 2.0, -2.0, 4.0, 6.0)
+_DRY_SCANS = 25  # of a run where walls hold; smooth ones want all there are
 
 
 class ScanInput(NamedTuple):
@@ -34,11 +32,7 @@ class ScanInput(NamedTuple):
     view: View = View()
 
 
-class Maker(Protocol):
-    """Makes an odometry with a starting velocity (None: unknown) and a method (empty: as it is set)."""
-
-    def __call__(self, velocity: FloatArray | None, method: str = "") -> PlanarOdometry:
-        """Return the odometry."""
+Maker = Callable[[FloatArray | None], PlanarOdometry]  # takes a starting velocity, None: unknown
 
 
 def starting_velocity(make: Maker, inputs: Sequence[ScanInput]) -> FloatArray | None:
@@ -50,29 +44,32 @@ def starting_velocity(make: Maker, inputs: Sequence[ScanInput]) -> FloatArray | 
     if any(step.lost for step in steps):
         return None
     if np.mean([step.degenerate for step in steps if step.processed]) > _WEAK_SHARE:
-        velocity = _by_flow(make, all_inputs)
+        velocity = _by_trial(make, all_inputs, steps[-1].velocity)
     else:
         velocity = steps[-1].velocity
     steps = _run(make(velocity), inputs)
     return velocity if any(step.lost for step in steps) else _mean_velocity(steps)
 
 
-def _by_flow(make: Maker, inputs: Sequence[ScanInput]) -> FloatArray:
-    """Return the speed (3,) at the last scan by range flow, the median over runs that begin at one scan or another.
+def _by_trial(make: Maker, inputs: Sequence[ScanInput], about: FloatArray) -> FloatArray:
+    """Return the speed (3,) at the last scan of the run that fits best, of runs that begin at one forward speed or another.
 
-    A run whose first pair is far off stays off; where it begins elsewhere it is not.
+    A run from far off ends in a map that is smeared, whose walls fewer hits agree with; `about` (3,) has the turning speed.
     """
-    late = range(0, len(inputs) // 2, _FLOW_EVERY)
-    runs = [_settled_velocity(_run(make(None, "range_flow"), inputs[first:])) for first in late]
-    found: FloatArray = np.median(runs, axis=0)
-    return found
+    runs = [_second_half(_run(make(np.array([speed, 0.0, about[2]])), inputs)) for speed in _SPEEDS_MPS]
+    residuals_m = [float(np.mean([step.residual_m for step in run])) for run in runs]
+    fits = [
+        np.mean([step.support for step in run]) - residual_m / min(residuals_m)
+        for run, residual_m in zip(runs, residuals_m, strict=True)
+    ]
+    best = runs[int(np.argmax(fits))]
+    mean = _between(best)
+    return best[-1].velocity if mean is None else mean
 
 
-def _settled_velocity(steps: Sequence[OdometryStep]) -> FloatArray:
-    """Return the mean speed (3,) over the second half of a run."""
+def _second_half(steps: Sequence[OdometryStep]) -> list[OdometryStep]:
     processed = [step for step in steps if step.processed]
-    mean = _between(processed[len(processed) // 2 :])
-    return steps[-1].velocity if mean is None else mean
+    return processed[len(processed) // 2 :]
 
 
 def _run(odometry: PlanarOdometry, inputs: Sequence[ScanInput]) -> list[OdometryStep]:

@@ -23,6 +23,10 @@ from lhdmap.messages import FloatArray
 KERNEL_CELLS = 3  # a line is fitted to the cells within this many cells of a point
 LINE = 8  # numbers of a line: see `fit_line`
 KERNEL_SIGMA_CELLS = 2.0
+_CLOT_SHARE, _CLOT_WIDER = (
+    0.1,
+    9.0,
+)  # of the variance along a line: across a clot from which on, and what a clot is taken for
 LAYERS = 8
 LAYER_M = 0.12
 _LAYERS_PER_M = 1.0 / LAYER_M  # one expression for all: a height between two layers falls into one
@@ -223,13 +227,20 @@ def _gather(level: Level, x: float, y: float, z: float, layered: bool, sums: Flo
 
 @nb.njit(cache=True, nogil=True)
 def fit_line(
-    level: Level, at: tuple[float, float, float], layered: bool, min_cells: float, sums: FloatArray, line: FloatArray
+    level: Level,
+    at: tuple[float, float, float],
+    layered: bool,
+    wanted: tuple[float, float],
+    sums: FloatArray,
+    line: FloatArray,
 ) -> bool:
     """Fit the wall near `at` (x, y, height) by a line with Gaussian weights; return whether the cells there support one.
 
-    `layered`: look at the layers above and below, too (a planar scan has one). `sums` (8,) is room to work in. `line`,
-    shape (LINE,), receives: centre x, y, normal x, y, scatter across the line (variance, m²), effective number
-    of cells, [6] left to the caller, and by how much the cells lie lower than the point (m).
+    `layered`: look at the layers above and below, too (a planar scan has one). `wanted`: effective cells that a line needs,
+    and the variance (m²) that noise alone gives: few far hits that scatter no more are a clot, whose direction is noise; it agrees
+    with all that is near, and says hardly anything (0: none is one). `sums` (8,) is room to work in. `line`, shape (LINE,),
+    receives: centre x, y, normal x, y, scatter across the line (variance, m²), effective number of cells, [6] left to the
+    caller, and by how much the cells lie lower than the point (m).
     """
     if not _gather(level, at[0], at[1], at[2], layered, sums):
         return False
@@ -237,7 +248,7 @@ def fit_line(
     effective = s0 * s0 / sums[1]
     # A line wants cells spread along it, and little beside it. Chords between a few sparse hits fit best where those beams
     # hit before: they pull the estimate towards standing still.
-    if effective < min_cells:
+    if effective < wanted[0]:
         return False
     mx, my, mz = sums[2] / s0, sums[3] / s0, sums[4] / s0
     cxx, cxy, cyy = sums[5] / s0 - mx * mx, sums[6] / s0 - mx * my, sums[7] / s0 - my * my
@@ -254,5 +265,6 @@ def fit_line(
         math.copysign(math.sqrt(max(0.5 * (1.0 - cos2), 0.0)), cxy),
     )
     line[0], line[1], line[2], line[3] = at[0] + mx, at[1] + my, -along_y, along_x
-    line[4], line[5] = small, effective
+    clot = small > _CLOT_SHARE * large and small < wanted[1]
+    line[4], line[5] = _CLOT_WIDER * large if clot else small, effective
     return True

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from dataclasses import replace
 from functools import partial
 from typing import Literal
 
@@ -216,10 +215,9 @@ class MappingPipeline:
         wanted = self._cloud and self.settings.smoothing.realign and self.settings.odometry.method == "anchored"
         return wanted and tilted and self.has_inclinometer and self.rear.near(stamp_ns, 0.0, 0.0) is not None
 
-    def _odometry(self, velocity: FloatArray | None, method: str = "") -> PlanarOdometry:
+    def _odometry(self, velocity: FloatArray | None) -> PlanarOdometry:
         s = self.settings
-        odometry = replace(s.odometry, method=method) if method else s.odometry
-        return PlanarOdometry(odometry, s.anchor, s.search, s.range_flow, velocity)
+        return PlanarOdometry(s.odometry, s.anchor, s.search, s.range_flow, velocity)
 
     def _rising(self, stamp_ns: int) -> int:
         """Return a stamp that never runs backwards once stamps of scans did: the order of the log then tells more."""

@@ -94,15 +94,21 @@ def drift_world(
     half_width_m: float = 2.0,
     pieces: tuple[tuple[float, float], ...] | None = None,
     cross_drift_at_m: float | None = 45.0,
+    octaves: int = 6,
+    persistence: float = 0.75,
 ) -> PlanarWorld:
-    """Build a closed drift: straights, bends of 12 m and 9 m radius, a cross drift on the left; about 180 m."""
+    """Build a closed drift: straights, bends of 12 m and 9 m radius, a cross drift on the left; about 180 m.
+
+    `octaves`, `persistence`: of the walls' roughness, see `rough_profile`.
+    """
     rng = np.random.default_rng(seed)
     if pieces is None:
         r12, r9 = math.pi / 3, math.pi / 2
         pieces = ((60.0, 0.0), (12.0 * r12, r12), (40.0, 0.0), (9.0 * r9, -r9), (53.3, 0.0))
     line = centre_line(pieces)
     length = 0.02 * (len(line) - 1)
-    walls = [_wall(rng, line, side * half_width_m, rms_m, length) for side in (1.0, -1.0)]
+    profiles = [rough_profile(rng, length, rms_m, octaves, persistence) for _ in range(2)]
+    walls = [_wall(line, side * half_width_m, profile) for side, profile in zip((1.0, -1.0), profiles, strict=True)]
     parts = [walls[1]]
     if cross_drift_at_m is None:
         parts.append(walls[0])
@@ -177,9 +183,9 @@ def simulate_scans(
     return scans
 
 
-def _wall(rng: np.random.Generator, line: FloatArray, offset_m: float, rms_m: float, length_m: float) -> FloatArray:
+def _wall(line: FloatArray, offset_m: float, profile: CubicSpline) -> FloatArray:
     s = 0.02 * np.arange(len(line))
-    shift = offset_m + rough_profile(rng, length_m, rms_m)(s)
+    shift = offset_m + profile(s)
     return line[:, :2] + shift[:, None] * np.column_stack([-np.sin(line[:, 2]), np.cos(line[:, 2])])
 
 

@@ -66,7 +66,7 @@ def along(speeds_mps: FloatArray, start: int = 0) -> FloatArray:
 def run(scans: tuple[LaserScan, ...], truth: FloatArray, method: str = "anchored") -> Driven:
     inputs = [ScanInput(scan, LEVEL) for scan in scans]
 
-    def make(velocity: FloatArray | None, method: str = method) -> PlanarOdometry:
+    def make(velocity: FloatArray | None) -> PlanarOdometry:
         return PlanarOdometry(OdometrySettings(method=method), velocity=velocity)
 
     odometry = make(starting_velocity(make, inputs[:WARM_SCANS]))

@@ -135,6 +135,20 @@ def test_wheels_that_are_believed_against_the_motion_set_the_way_too() -> None:
     assert np.linalg.eigvalsh(motion.P).min() > 0.0
 
 
+def test_wheels_that_slipped_must_agree_well_to_be_believed_again() -> None:
+    """Without them the speed becomes uncertain, and wheels that still slip come within four deviations."""
+    motion = Motion(OdometrySettings(), np.array([2.5, 0.0, 0.0]))
+    motion.P[3:6, 3:6] = np.diag([0.05**2, 0.01, 0.01])
+    taken = []
+    for _ in range(100):  # two seconds
+        motion.predict(0.02)
+        taken.append(motion.fuse_speed(FORWARD, 3.75, 0.03, scaled=True))
+    assert not any(taken)
+    motion.predict(0.02)
+    assert motion.fuse_speed(FORWARD, 2.5, 0.03, scaled=True)
+    assert motion.velocity[0] == pytest.approx(2.5, abs=0.05)
+
+
 def test_after_a_gap_what_was_not_measured_is_uncertain() -> None:
     motion = Motion(OdometrySettings(), np.array([1.0, 0.0, 0.0]))
     motion.predict(5.0)

@@ -66,7 +66,7 @@ def _with_wheels(poses: FloatArray, wheels: Callable[[float], float]) -> tuple[D
         for scan, step in zip(scans_at(poses), steps, strict=True)
     ]
 
-    def make(velocity: FloatArray | None, method: str = "") -> PlanarOdometry:
+    def make(velocity: FloatArray | None) -> PlanarOdometry:
         return PlanarOdometry(velocity=velocity)
 
     odometry = make(starting_velocity(make, inputs[:WARM_SCANS]))

@@ -34,7 +34,7 @@ def drive_run(drive: Drive, method: str = "anchored", *, wheels: bool = False, r
     truth, scans = scans_of(drive)
     steps = wheels_of(truth, drive.rate_hz, drive.seed) if wheels else None
 
-    def make(velocity: FloatArray | None, method: str = method) -> PlanarOdometry:
+    def make(velocity: FloatArray | None) -> PlanarOdometry:
         return odometry(method, velocity, range_noise_m=range_noise_m)
 
     return run(scans, truth, make, steps)

@@ -36,10 +36,8 @@ worlds that settings are chosen on, not those of `odometry.md`.
 def error_pct(speed_kmh: float, odometry: OdometrySettings, range_flow: RangeFlowSettings) -> tuple[float, float]:
     """Return the error over 10 m and the share of scans processed, means over the worlds."""
 
-    def make(velocity: FloatArray | None, method: str = "") -> PlanarOdometry:
-        return PlanarOdometry(
-            replace(odometry, method=method or odometry.method), range_flow=range_flow, velocity=velocity
-        )
+    def make(velocity: FloatArray | None) -> PlanarOdometry:
+        return PlanarOdometry(odometry, range_flow=range_flow, velocity=velocity)
 
     found = []
     for seed in WORLDS:
