@@ -18,6 +18,7 @@ _LINES_HOLD, _WEAK_LINES_HOLD = 0.3, 0.03
 _WEAK_M = 0.003  # deviation of a match in its worse direction from which walls hardly hold
 _SMOOTH_RATIO = 5.0  # of both deviations: rough walls give 2, moderate ones 4, smooth ones 10, a coarse scanner 1
 _CLOT_SIGMAS = 1.5
+_APART_M, _MOST_ACROSS = 0.3, 0.2  # of the hits beside a hit; how far a line may run across them, as a share
 NO_SLANTS = np.zeros((0, 2))
 
 
@@ -67,6 +68,21 @@ class Match(NamedTuple):
     lines: FloatArray
 
 
+@nb.njit(cache=True, nogil=True, inline="always")
+def _uncross(points, i, turn, noise_m, line):  # type: ignore[no-untyped-def]
+    """Let a line say hardly anything that the scan's own neighbours of the hit, far apart, do not lie along: hits on a far face
+    that come nearer scan by scan at a speed slightly wrong leave a streak, not a wall.
+    """
+    x, y = points[i + 1, 0] - points[i - 1, 0], points[i + 1, 1] - points[i - 1, 1]
+    length2 = x * x + y * y
+    if length2 < _APART_M * _APART_M:
+        return
+    c, s = turn
+    across = line[2] * (c * x - s * y) + line[3] * (s * x + c * y)
+    if abs(across) > _MOST_ACROSS * math.sqrt(length2) + 3.0 * noise_m:
+        line[4] += length2
+
+
 @nb.njit(cache=True, nogil=True)
 def lines_at(map_, pose, hits, model, wide, lines):  # type: ignore[no-untyped-def]
     """Fit the wall's line at each hit, lines (N, LINE); return how many of the front scanner's have one.
@@ -94,6 +110,8 @@ def lines_at(map_, pose, hits, model, wide, lines):  # type: ignore[no-untyped-d
             lines[i, 6] = map_.middle.cell_m
         elif fit_line(map_.coarse, at, hits.layered, wanted, sums, lines[i]):
             lines[i, 6] = map_.coarse.cell_m
+        if wide and 0 < i < hits.front - 1 and lines[i, 6] > 0.0:
+            _uncross(points, i, (c, s), model.noise_m, lines[i])
         found += i < hits.front and lines[i, 6] > 0.0
     return found
 
@@ -264,10 +282,10 @@ def match(map_, hits, prior, start, model):  # type: ignore[no-untyped-def]
             if size < 2e-5:
                 break
         worse, better = _held(H)
-        weak = not hits.layered and worse < 1.0 / _WEAK_M**2
+        weak = worse < 1.0 / _WEAK_M**2
         if weak and not wide and worse * _SMOOTH_RATIO**2 < better:
             wide = True
-        elif moved < (_WEAK_LINES_HOLD if weak else _LINES_HOLD) * fine_m:
+        elif moved < (_WEAK_LINES_HOLD if weak and (wide or not hits.layered) else _LINES_HOLD) * fine_m:
             break
     total, weights = normal_equations(pose, hits, lines, fine_m, model, H, b)
     n = max(hits.front, 1)

@@ -112,7 +112,7 @@ def _turned(seed: int, method: str, degrees: float) -> float:
     headings = np.radians(degrees) * np.arange(frames + 1)
     poses = place + np.column_stack([np.zeros((frames + 1, 2)), headings])
     scans = simulate_scans(world, poses, PlanarScanner(noise_m=0.0), 25.0, 1)
-    found = run(scans, poses, lambda velocity, other="": odometry(other or method, velocity))
+    found = run(scans, poses, lambda velocity: odometry(method, velocity))
     heading = np.unwrap(found.estimate[:, 2])
     return float((heading[-1] - heading[0]) / (poses[-1, 2] - poses[0, 2]))
 
