@@ -111,7 +111,7 @@ class AnchoredMatcher:
         after = self._motion.pose
         travelled = math.hypot(after[0] - before[0], after[1] - before[1])
         self._motion.forget(1.0 - math.exp(-travelled / self._anchor.memory_m))
-        self._grow(points)
+        self._grow(points, smooth=result.smooth)
         doubtful = self._doubt > 0 or result.support < _DOUBTFUL_SUPPORT
         self._doubt = max(self._doubt - 1, 0)
         self._owed = _OWED_KEPT * self._owed if self._doubt else NOTHING_OWED
@@ -217,13 +217,16 @@ class AnchoredMatcher:
         self._noise_scale = min(max(self._noise_scale, _NOISE_SCALES[0]), _NOISE_SCALES[1])
         self._model = self._model._replace(noise_m=self._noise_m * self._noise_scale)
 
-    def _grow(self, points: FloatArray) -> None:
-        """Insert the scan where the machine has moved on since the last one that was; the first scans always."""
+    def _grow(self, points: FloatArray, *, smooth: bool) -> None:
+        """Insert the scan where the machine has moved on since the last one that was; the first scans always.
+
+        But not where walls are smooth: chords between the same far hits, again and again, hold a machine that starts where it stood.
+        """
         step = self._motion.pose - (self._inserted if self._inserted is not None else np.zeros(3))
         still = np.hypot(*step[:2]) < self._anchor.insert_m and abs(se2.wrap(step[2])) < math.radians(
             self._anchor.insert_deg
         )
-        if not still or len(self._recent) < _YOUNG_SCANS:
+        if not still or (len(self._recent) < _YOUNG_SCANS and not smooth):
             self._insert(points)
 
     def _insert(self, points: FloatArray) -> None:

@@ -58,6 +58,7 @@ class Match(NamedTuple):
     """Result: `pose` (3,), `information` (3, 3) of the scan alone in map axes, share of hits with a line, share that agrees.
 
     `lines` (N, LINE): the wall at each hit, as `fit_line` gives it, [6] the cell size of the level that served (0: none).
+    `smooth`: the walls hardly hold one direction, so lines were wide.
     """
 
     pose: FloatArray
@@ -66,12 +67,14 @@ class Match(NamedTuple):
     support: float
     residual_sigmas: float
     lines: FloatArray
+    smooth: bool
 
 
 @nb.njit(cache=True, nogil=True, inline="always")
 def _uncross(points, i, turn, noise_m, line):  # type: ignore[no-untyped-def]
-    """Let a line say hardly anything that the scan's own neighbours of the hit, far apart, do not lie along: hits on a far face
-    that come nearer scan by scan at a speed slightly wrong leave a streak, not a wall.
+    """Let a line say hardly anything that the scan's own neighbours of the hit, far apart, do not lie along.
+
+    Hits on a far face that come nearer scan by scan, at a speed slightly wrong, leave streaks along the way and no wall.
     """
     x, y = points[i + 1, 0] - points[i - 1, 0], points[i + 1, 1] - points[i - 1, 1]
     length2 = x * x + y * y
@@ -79,7 +82,8 @@ def _uncross(points, i, turn, noise_m, line):  # type: ignore[no-untyped-def]
         return
     c, s = turn
     across = line[2] * (c * x - s * y) + line[3] * (s * x + c * y)
-    if abs(across) > _MOST_ACROSS * math.sqrt(length2) + 3.0 * noise_m:
+    along_way = abs(line[2] * c + line[3] * s) < math.sqrt(0.5)
+    if along_way and abs(across) > _MOST_ACROSS * math.sqrt(length2) + 3.0 * noise_m:
         line[4] += length2
 
 
@@ -289,4 +293,4 @@ def match(map_, hits, prior, start, model):  # type: ignore[no-untyped-def]
             break
     total, weights = normal_equations(pose, hits, lines, fine_m, model, H, b)
     n = max(hits.front, 1)
-    return Match(pose, H, found / n, weights / n, math.sqrt(total / max(weights, 1e-9)), lines)
+    return Match(pose, H, found / n, weights / n, math.sqrt(total / max(weights, 1e-9)), lines, wide)

@@ -142,16 +142,29 @@ def drive_along(
     line: FloatArray, speed_mps: float, rate_hz: float, start_m: float = 5.0, end_m: float = 8.0
 ) -> FloatArray:
     """Return poses x, y, heading, shape (N, 3), at the scan rate along the centre line at constant speed."""
-    s = np.arange(start_m, 0.02 * (len(line) - 1) - end_m, speed_mps / rate_hz)
+    return poses_along(line, np.arange(start_m, 0.02 * (len(line) - 1) - end_m, speed_mps / rate_hz))
+
+
+def poses_along(line: FloatArray, way_m: FloatArray) -> FloatArray:
+    """Return poses x, y, heading, shape (N, 3), at places (N,) along the centre line."""
     grid = 0.02 * np.arange(len(line))
     # A machine cannot jump in curvature: its heading is the line's, averaged over 2 m.
     kernel = np.hanning(101) / np.hanning(101).sum()
     smooth = np.column_stack(
         [np.convolve(np.pad(column, 50, mode="reflect", reflect_type="odd"), kernel, "valid") for column in line.T]
     )
-    poses = np.column_stack([CubicSpline(grid, column)(s) for column in smooth[:, :2].T])
-    tangent = np.column_stack([CubicSpline(grid, column)(s, 1) for column in smooth[:, :2].T])
-    return np.column_stack([poses, np.unwrap(np.arctan2(tangent[:, 1], tangent[:, 0]))])
+    splines = [CubicSpline(grid, column) for column in smooth[:, :2].T]
+    tangent = [spline(way_m, 1) for spline in splines]
+    return np.column_stack([*(spline(way_m) for spline in splines), np.unwrap(np.arctan2(tangent[1], tangent[0]))])
+
+
+def way_from_rest(speed_mps: float, rate_hz: float, length_m: float, acceleration_mps2: float = 0.6) -> FloatArray:
+    """Return the places (m) at the scan rate of a drive of `length_m`: at rest for a second, then up to the speed."""
+    ramp_s = speed_mps / acceleration_mps2
+    since = np.maximum(np.arange(0.0, 2.0 + ramp_s + length_m / speed_mps, 1.0 / rate_hz) - 1.0, 0.0)
+    ramp = 0.5 * acceleration_mps2 * np.minimum(since, ramp_s) ** 2
+    way = ramp + speed_mps * np.maximum(since - ramp_s, 0.0)
+    return way[way < length_m]
 
 
 def simulate_scans(

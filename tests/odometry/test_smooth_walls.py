@@ -13,7 +13,7 @@ from lhdmap.odometry.planar import PlanarOdometry
 from lhdmap.odometry.settings import AnchorSettings, OdometrySettings
 from lhdmap.odometry.start import ScanInput, starting_velocity
 from lhdmap.odometry.steps import WheelStep
-from lhdmap.simulation.planar import PlanarScanner, drift_world, drive_along, simulate_scans
+from lhdmap.simulation.planar import PlanarScanner, drift_world, drive_along, poses_along, simulate_scans, way_from_rest
 
 from tests.odometry.planar_drives import LEVEL, WARM_SCANS, Driven, segment_errors_pct
 
@@ -100,18 +100,14 @@ def straight_drive(kind: Straight, seed: int, slips: bool = False) -> Driven:
         octaves=kind.octaves,
         persistence=kind.persistence,
     )
-    fine = drive_along(world.centre_line_m, 0.01, 1.0)
-    times = np.arange(0.0, 60.0, 1.0 / kind.rate_hz)
-    ramp = np.maximum(times - 1.0, 0.0)
-    way = np.where(ramp < 4.0, 0.3 * ramp**2, 4.8 + 2.4 * (ramp - 4.0)) if kind.at_rest else 2.4 * times
-    way = way[way < 60.0]
-    poses = np.column_stack([np.interp(way, 0.01 * np.arange(len(fine)), column) for column in fine.T])
+    way = np.arange(0.0, 60.0, 2.4 / kind.rate_hz) if not kind.at_rest else way_from_rest(2.4, kind.rate_hz, 60.0)
+    poses = poses_along(world.centre_line_m, 5.0 + way)
     scans = simulate_scans(world, poses, PlanarScanner(max_range_m=kind.max_range_m), kind.rate_hz, seed)
     wheels: list[WheelStep | None] = [None] * len(scans)
     if slips:
         wheels = [
             WheelStep(step * (1.5 if 5.0 < time % 10.0 < 7.0 else 1.0), 0.02 / kind.rate_hz, None, 0.0)
-            for time, step in zip(times, np.diff(way, prepend=0.0), strict=False)
+            for time, step in zip(np.arange(len(way)) / kind.rate_hz, np.diff(way, prepend=0.0), strict=True)
         ]
     inputs = [ScanInput(scan, LEVEL, step) for scan, step in zip(scans, wheels, strict=True)]
     stage = begun(starting_velocity(begun, inputs[:WARM_SCANS]))

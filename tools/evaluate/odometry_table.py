@@ -17,6 +17,7 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 from tools.evaluate import odometry_pairs as single
 from tools.evaluate import odometry_rows as rows
+from tools.evaluate import odometry_straight
 from tools.evaluate.figures import Figure, number, write
 
 HEADING = """\
@@ -39,6 +40,7 @@ def sections(seeds: tuple[int, ...], *, quick: bool) -> dict[str, Callable[[], I
         "disturbed": lambda: rows.disturbed(seeds),
         "sweep": lambda: rows.sweep(seeds),
         "smooth": lambda: rows.smooth(seeds),
+        "straight": lambda: odometry_straight.straight(odometry_straight.SEEDS[: 2 * len(seeds)]),
         "pairs": lambda: single.pairs(seeds),
         "rotation": lambda: single.rotation_gain(seeds),
         "cold": lambda: single.cold_start(seeds),
