@@ -16,7 +16,7 @@ from lhdmap.odometry.surface_map import LINE, fit_line
 # are wide, too: the direction of a short one is mostly noise, and noise that the map keeps holds the pose where it is.
 _LINES_HOLD, _WEAK_LINES_HOLD = 0.3, 0.03
 _WEAK_M = 0.003  # deviation of a match in its worse direction from which walls hardly hold
-_SMOOTH_RATIO = 5.0  # of both deviations: rough walls give 2, moderate ones 4, smooth ones 10, a coarse scanner 1
+_SMOOTH_RATIO = 8.0  # of both deviations: rough walls give 2, moderate ones 4, smooth ones 10, a coarse scanner 1
 _CLOT_SIGMAS = 1.5
 _APART_M, _MOST_ACROSS = 0.3, 0.2  # of the hits beside a hit; how far a line may run across them, as a share
 NO_SLANTS = np.zeros((0, 2))

@@ -19,7 +19,7 @@ _START_M, _LENGTH_M, _WORLD_M = 5.0, 100.0, 115.0
 
 
 class Straight(NamedTuple):
-    """A kind of drive: range of the scanner, from rest or at full speed all along, octaves and persistence of the walls, stream."""
+    """A kind of drive: range, from rest or at full speed all along, octaves and persistence of the walls, stream."""
 
     max_range_m: float
     from_rest: bool
