@@ -220,7 +220,7 @@ class AnchoredMatcher:
     def _grow(self, points: FloatArray, *, smooth: bool) -> None:
         """Insert the scan where the machine has moved on since the last one that was; the first scans always.
 
-        But not where walls are smooth: chords between the same far hits, again and again, hold a machine that starts where it stood.
+        But not where walls are smooth: chords between the same far hits, again and again, hold a machine where it stood.
         """
         step = self._motion.pose - (self._inserted if self._inserted is not None else np.zeros(3))
         still = np.hypot(*step[:2]) < self._anchor.insert_m and abs(se2.wrap(step[2])) < math.radians(

@@ -19,6 +19,7 @@ from lhdmap.odometry.steps import OdometryStep, WheelStep
 _SPAN_SCANS = 6  # the starting speed is the mean over so many scans
 _LONGEST_SPAN_S = 1.0
 _WEAK_SHARE = 0.2  # of scans from which the walls are smooth: other speeds are tried, too
+_NO_RESIDUAL_M = 1e-6  # of scans without noise
 _SPEEDS_MPS = (0.0, 2.0, -2.0, 4.0, 6.0)
 _DRY_SCANS = 25  # of a run where walls hold; smooth ones want all there are
 
@@ -43,7 +44,8 @@ def starting_velocity(make: Maker, inputs: Sequence[ScanInput]) -> FloatArray | 
     steps = _run(make(None), inputs)
     if any(step.lost for step in steps):
         return None
-    if np.mean([step.degenerate for step in steps if step.processed]) > _WEAK_SHARE:
+    weak = np.mean([step.degenerate for step in steps if step.processed]) > _WEAK_SHARE
+    if weak and all(one.wheels is None for one in inputs):  # else wheels tell it
         velocity = _by_trial(make, all_inputs, steps[-1].velocity)
     else:
         velocity = steps[-1].velocity
@@ -56,10 +58,13 @@ def _by_trial(make: Maker, inputs: Sequence[ScanInput], about: FloatArray) -> Fl
 
     A run from far off ends in a map that is smeared, whose walls fewer hits agree with; `about` (3,) has the turning speed.
     """
-    runs = [_second_half(_run(make(np.array([speed, 0.0, about[2]])), inputs)) for speed in _SPEEDS_MPS]
-    residuals_m = [float(np.mean([step.residual_m for step in run])) for run in runs]
+    tried = [_run(make(np.array([speed, 0.0, about[2]])), inputs) for speed in _SPEEDS_MPS]
+    runs = [_second_half(steps) for steps in tried if not any(step.lost for step in steps)]
+    if not runs:
+        return about
+    residuals_m = [_NO_RESIDUAL_M + float(np.mean([step.residual_m for step in run])) for run in runs]
     fits = [
-        np.mean([step.support for step in run]) - residual_m / min(residuals_m)
+        float(np.mean([step.support for step in run])) - residual_m / min(residuals_m)
         for run, residual_m in zip(runs, residuals_m, strict=True)
     ]
     best = runs[int(np.argmax(fits))]

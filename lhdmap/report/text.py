@@ -7,6 +7,8 @@ from typing import NamedTuple
 from lhdmap.evaluation.trajectory import TrajectoryEvaluation
 from lhdmap.report.data import ReportData, Summary
 
+_MOSTLY = 0.5
+
 
 class Figure(NamedTuple):
     """One headline figure: `value` with its unit, `name`, and what it means in plain words."""
@@ -72,11 +74,11 @@ def _degeneracy(s: Summary) -> list[Figure]:
 
 
 def _lost(s: Summary) -> str:
-    return (
-        "the scans were followed all the way"
-        if s.lost_stretches == 0
-        else "the map may be bent there: see the warnings"
-    )
+    if s.lost_stretches:
+        return "the map may be bent there: see the warnings"
+    if (s.degenerate_share or 0.0) > _MOSTLY:
+        return "every scan fitted the map, but most say little of one direction: the path along it is not proven"
+    return "the scans were followed all the way"
 
 
 def _closures(s: Summary) -> str:
