@@ -10,7 +10,7 @@ from lhdmap.messages import FloatArray
 from lhdmap.odometry import motion_filter
 from lhdmap.odometry.settings import OdometrySettings
 
-FORWARD, LATERAL, TURNING = 3, 4, 5
+FORWARD, LATERAL, TURNING, SCALE = 3, 4, 5, 6
 _GATE_SIGMAS = 4.0
 # Share of what wheels that slip were off by at first, within which they are believed again: walls alone tell the speed less and
 # less, and what still slips soon comes within the gate.
@@ -94,8 +94,9 @@ class Motion:
         direction = np.array([math.cos(heading), math.sin(heading), 0.0] if axis == FORWARD else [0.0, 0.0, 1.0])
         if dt_s > _LONGEST_STEP_S:
             self._open(direction, _GAP_VARIANCE[axis - FORWARD, axis - FORWARD] * dt_s**2)
-        off_mps = abs(measured - float(self.state[FORWARD])) if axis == FORWARD else 0.0
-        agrees = not off_mps > _AGAIN * self._off_mps > 0.0
+        scale = float(self.state[SCALE]) if scaled else 1.0
+        off_mps = abs(measured - scale * float(self.state[FORWARD])) if axis == FORWARD else 0.0
+        agrees = self.held or not off_mps > _AGAIN * self._off_mps > 0.0
         if agrees:
             nis = motion_filter.update_way(
                 self.state,

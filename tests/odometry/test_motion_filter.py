@@ -149,6 +149,17 @@ def test_wheels_that_slipped_must_agree_well_to_be_believed_again() -> None:
     assert motion.velocity[0] == pytest.approx(2.5, abs=0.05)
 
 
+def test_wheels_with_a_scale_of_their_own_come_back_after_a_spike() -> None:
+    """Compared with the speed itself, not with what such wheels show at it, they would never have agreed again."""
+    motion = Motion(OdometrySettings(), np.array([3.0, 0.0, 0.0]))
+    motion.P[3:6, 3:6] = np.diag([0.02**2, 0.01, 0.01])
+    motion.state[6], motion.P[6, 6] = 0.9, 1e-6
+    motion.predict(0.02)
+    assert not motion.fuse_speed(FORWARD, 3.2, 0.03, scaled=True)
+    motion.predict(0.02)
+    assert motion.fuse_speed(FORWARD, 2.7, 0.03, scaled=True)
+
+
 def test_after_a_gap_what_was_not_measured_is_uncertain() -> None:
     motion = Motion(OdometrySettings(), np.array([1.0, 0.0, 0.0]))
     motion.predict(5.0)

@@ -80,6 +80,33 @@ def smooth_drive(seed: int) -> Driven:
     return Driven(np.array([step.T_odom_base for step in steps]), poses, steps)
 
 
+def _standing_scans(noise_m: float, wheels: WheelStep | None = None) -> list[ScanInput]:
+    world = drift_world(425, rms_m=0.005, pieces=((75.0, 0.0),), cross_drift_at_m=None)
+    poses = np.repeat(poses_along(world.centre_line_m, np.array([30.0])), WARM_SCANS, axis=0)
+    return [
+        ScanInput(scan, LEVEL, wheels)
+        for scan in simulate_scans(world, poses, PlanarScanner(noise_m=noise_m, max_range_m=10.0), RATE_HZ, 425)
+    ]
+
+
+def test_scans_without_noise_tell_the_speed_too() -> None:
+    velocity = starting_velocity(begun, _standing_scans(0.0))
+    assert velocity is not None
+    assert velocity[0] == pytest.approx(0.0, abs=0.1)
+
+
+@pytest.mark.parametrize(("wheels", "runs"), [(None, 7), (WheelStep(0.0, 0.001, None, 0.0), 2)])
+def test_other_speeds_are_tried_only_where_no_wheels_tell(wheels: WheelStep | None, runs: int) -> None:
+    made = []
+
+    def counted(velocity: FloatArray | None) -> PlanarOdometry:
+        made.append(velocity)
+        return begun(velocity)
+
+    starting_velocity(counted, _standing_scans(0.012, wheels))
+    assert len(made) == runs
+
+
 class Straight(NamedTuple):
     """A straight drift of smooth walls, and how it is driven: at rest for a second first, or at full speed all along."""
 

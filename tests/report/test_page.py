@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 from lhdmap.report.data import ReportData
 from lhdmap.report.page import render_report, write_report
+from lhdmap.report.text import headline
 
 from tests.report.synthetic import report_data
 
@@ -144,3 +145,14 @@ def test_same_data_gives_the_same_file(data: ReportData, page: str, tmp_path: Pa
 def test_a_long_drive_gives_a_small_page() -> None:
     big = report_data(scans=10_000, points=500_000)
     assert len(render_report(big)) < 1_500_000
+
+
+@pytest.mark.parametrize(
+    ("share", "lost", "words"),
+    [(0.12, 0, "followed all the way"), (0.99, 0, "not proven"), (0.99, 2, "may be bent there")],
+)
+def test_what_is_said_of_lost_stretches(data: ReportData, share: float, lost: int, words: str) -> None:
+    """None lost, but nearly all weak: that is no praise."""
+    data = replace(data, summary=replace(data.summary, degenerate_share=share, lost_stretches=lost))
+    found = next(figure for figure in headline(data) if figure.name == "lost stretches")
+    assert words in found.meaning

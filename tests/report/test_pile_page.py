@@ -12,7 +12,7 @@ from xml.etree import ElementTree as ET
 import numpy as np
 import pytest
 from lhdmap.messages import FloatArray
-from lhdmap.pile.result import AttackPoint, Boulder, PileEstimate, PileReport, Snapshot
+from lhdmap.pile.result import Approach, AttackPoint, Boulder, PileEstimate, PileReport, Snapshot
 from lhdmap.report.page import render_report
 from lhdmap.report.pile_charts import Ahead
 from lhdmap.report.pile_page import pile_sections, write_pile_report
@@ -146,3 +146,15 @@ def test_estimates_of_something_else_are_not_joined_to_the_course(report: PileRe
     with_wrong = replace(report, history=(Snapshot(0, 12.0, wrong), *report.history))
     *_, course = (_words(picture) for picture in _pictures(pile_sections(with_wrong)))
     assert course == _words(_pictures(pile_sections(report))[-1])
+
+
+def test_all_that_was_decided_is_listed(report: PileReport) -> None:
+    """Two piles on one drive: the page draws one, and lists both."""
+    assert report.last is not None
+    other = report.last._replace(estimate=replace(report.last.estimate, status="wall", width_m=3.21))
+    both = replace(report, piles=(Approach(other, other), Approach(report.last, report.last)))
+    page = pile_sections(both)
+    assert "All that was decided on this drive" in page
+    assert "3.21" in page
+    assert page.count("(the one above)") == 1
+    assert "All that was decided" not in pile_sections(report)
