@@ -260,6 +260,14 @@ def test_decision_falls_with_what_it_was_on() -> None:
     assert (table["status"], table["identified"], table["decision"]) == ("none", False, None)
 
 
+def test_a_log_that_begins_near_the_pile_reports_what_it_decided() -> None:
+    """Too near for an estimate to improve one, but the only one: it was identified, with status none."""
+    seen = driven(CastDrift(90.0)).last
+    assert seen is not None
+    table = _fed(seen._replace(distance_m=PileSettings().closest_m - 1.0)).to_json()
+    assert (table["status"], table["identified"], len(table["piles"])) == ("wall", True, 1)
+
+
 def test_what_is_not_seen_any_more_is_forgotten() -> None:
     seen = driven(CastDrift(90.0), 20.0).last
     assert seen is not None
