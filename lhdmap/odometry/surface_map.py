@@ -23,10 +23,8 @@ from lhdmap.messages import FloatArray
 KERNEL_CELLS = 3  # a line is fitted to the cells within this many cells of a point
 LINE = 8  # numbers of a line: see `fit_line`
 KERNEL_SIGMA_CELLS = 2.0
-_CLOT_SHARE, _CLOT_WIDER = (
-    0.1,
-    9.0,
-)  # of the variance along a line: across a clot from which on, and what a clot is taken for
+_CLOT_SHARE = 0.1  # of the variance along a line: from which on what scatters across it is a clot
+_CLOT_WIDER = 9.0  # times that variance: what a clot is taken to scatter by
 LAYERS = 8
 LAYER_M = 0.12
 _LAYERS_PER_M = 1.0 / LAYER_M  # one expression for all: a height between two layers falls into one

@@ -352,8 +352,8 @@ def test_a_short_second_approach_to_the_same_face_does_not_make_it_less_known() 
     assert len(twice.piles) == 1
 
 
-def test_backing_out_of_what_is_driven_through_later_keeps_it_once() -> None:
-    """A second look at the same pile that comes to nothing leaves the first."""
+def test_a_short_way_back_keeps_the_pile_too() -> None:
+    """10 m are far less than the window holds: its hits would still be there, and nothing ahead contradicts them."""
     drift = CastDrift(45.0)
     once = _cycle((drift, 0.0, 30.0), (drift, 30.0, 20.0))
     twice = _cycle((drift, 0.0, 30.0), (drift, 30.0, 20.0), (_other(None), 0.0, 20.0))
