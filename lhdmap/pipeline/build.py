@@ -7,15 +7,16 @@ import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, Literal, TypeVar
 
 from lhdmap.config import Settings, settings_table
 from lhdmap.errors import InputError
 from lhdmap.integration.cloud_io import write_cloud
 from lhdmap.logs.source import LogSource
 from lhdmap.machine import Machine
-from lhdmap.mapfolder import FRAMES, MapFolderWriter, MapInfo
+from lhdmap.mapfolder import FRAMES, Diagnostics, MapFolderWriter, MapInfo
 from lhdmap.messages import Message
 from lhdmap.pipeline.beside import Beside, HelperDied, Here
 from lhdmap.pipeline.given import GROUND_TRUTH, given_rows
@@ -29,6 +30,7 @@ from lhdmap.report.recording import Thinning
 from lhdmap.trajectory import Trajectory
 
 _BESIDE_FROM_S = 60.0  # a process takes most of a second to start
+_Stamped = TypeVar("_Stamped", Trajectory, Diagnostics)
 Progress = Callable[[Iterable[tuple[str, Message]], float], Iterable[tuple[str, Message]]]
 
 
@@ -38,6 +40,7 @@ class BuildRequest:
 
     `poses`: given poses for the cloud and the final trajectory (`given.given_rows`); empty: the odometry's.
     `helper`: whether a second process may look for the pile, record and report; what comes out is the same.
+    `force`: whether a log that the survey calls unusable is tried nevertheless.
     """
 
     logs: Sequence[Path]
@@ -48,11 +51,12 @@ class BuildRequest:
     progress: Progress | None = None
     poses: str = ""
     helper: bool = False
+    force: bool = False
 
     @property
     def inputs(self) -> Inputs:
         """What the map is made of."""
-        return Inputs(self.logs, self.settings, self.topics, self.target.name, bool(self.poses))
+        return Inputs(self.logs, self.settings, self.topics, self.target.name, bool(self.poses), self.force)
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,7 +77,10 @@ def build_map(request: BuildRequest) -> BuildResult:
     """
     started = time.monotonic()
     given = given_rows(request.poses, request.logs, request.topics) if request.poses else None
-    with LogSource(list(request.logs), request.topics) as source, MapFolderWriter(request.target) as folder:
+    with (
+        LogSource(list(request.logs), request.topics, force=request.force) as source,
+        MapFolderWriter(request.target) as folder,
+    ):
         hashes, pool = _hash_in_background(request.logs)
         with pool, _inspector(request, source, folder.path) as inspector:
             primary: Literal["front", "points"] = "front" if "front" in source.roles else "points"
@@ -85,18 +92,28 @@ def build_map(request: BuildRequest) -> BuildResult:
                 pile=PileBeside(inspector),
             )
             interrupted = _run(pipeline, source, request.progress)
-            folder.write_odometry(odometry_of(pipeline))  # an interruption of what follows must not lose it
-            folder.write_diagnostics(pipeline.records.diagnostics())
+            as_recorded = partial(source.recorded_ns, primary)
+            # An interruption of what follows must not lose it.
+            folder.write_odometry(_stamped(odometry_of(pipeline), as_recorded))
+            folder.write_diagnostics(_stamped(pipeline.records.diagnostics(), as_recorded))
             ways = ways_of(pipeline, given)
-            folder.write_trajectory(ways.final)
+            final = _stamped(ways.final, as_recorded)
+            folder.write_trajectory(final)
             outcome = Outcome(request.inputs, source, pipeline, ways, started)
             beside_mib = _write(folder, request, source, outcome, inspector)
         if interrupted:  # what was finished is kept under the partial name
             raise KeyboardInterrupt
         info = MapInfo(request.logs, _options(request), outcome.summary, outcome.warnings, _frames(request))
-        final = folder.complete(info, {path: future.result() for path, future in hashes.items()})
-    summary = outcome.summary | {"map": str(final)} | cost(started, outcome.duration_s, beside_mib)
-    return BuildResult(final, summary, outcome.warnings, ways.final)
+        path = folder.complete(info, {path: future.result() for path, future in hashes.items()})
+    summary = outcome.summary | {"map": str(path)} | cost(started, outcome.duration_s, beside_mib)
+    return BuildResult(path, summary, outcome.warnings, final)
+
+
+def _stamped(rows: _Stamped, stamps_of: Callable[[Any], Any]) -> _Stamped:
+    """Return poses or diagnostics under the stamps that their scans have in the log."""
+    if isinstance(rows, Trajectory):
+        return rows._replace(stamps_ns=stamps_of(rows.stamps_ns))
+    return rows._replace(stamp_ns=stamps_of(rows.stamp_ns))
 
 
 def _run(pipeline: MappingPipeline, source: LogSource, progress: Progress | None) -> bool:
