@@ -25,6 +25,7 @@ from lhdmap.pipeline.interruption import Interruption
 from lhdmap.pipeline.mapping import MappingPipeline
 from lhdmap.pipeline.mounts import machine_of
 from lhdmap.pipeline.outcome import ROLES_READ, Inputs, Outcome, cost, odometry_of, ways_of
+from lhdmap.pipeline.refusal import require_a_map
 from lhdmap.provenance import file_entry, source_entry
 from lhdmap.report.recording import Thinning
 from lhdmap.trajectory import Trajectory
@@ -97,6 +98,8 @@ def build_map(request: BuildRequest) -> BuildResult:
             folder.write_odometry(_stamped(odometry_of(pipeline), as_recorded))
             folder.write_diagnostics(_stamped(pipeline.records.diagnostics(), as_recorded))
             ways = ways_of(pipeline, given)
+            if given is None and not interrupted:
+                require_a_map(source.paths[0], pipeline.records, ways.rows)
             final = _stamped(ways.final, as_recorded)
             folder.write_trajectory(final)
             outcome = Outcome(request.inputs, source, pipeline, ways, started)

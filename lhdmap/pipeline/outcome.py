@@ -22,6 +22,7 @@ from lhdmap.pipeline.beside import HelperDied
 from lhdmap.pipeline.identify import identify_along
 from lhdmap.pipeline.inspection import peak_memory_mib
 from lhdmap.pipeline.mapping import MappingPipeline
+from lhdmap.pipeline.refusal import key_scans_remark
 from lhdmap.pipeline.sweep_times import SweepTimes
 from lhdmap.pipeline.sweeps import SweepIntegration
 from lhdmap.pipeline.track import FinalTrack, Rows, resample, trajectory_of
@@ -207,6 +208,7 @@ def _remarks(pipeline: MappingPipeline) -> list[str]:
         remarks.append(
             f"odometry: in {100 * share:.0f} % of the scans a direction is weakly observed (smooth walls, or too far away?)"
         )
+    remarks += key_scans_remark(pipeline.records)
     gap_s = float(np.diff(pipeline.records.times_ns).max(initial=0.0)) * 1e-9
     if gap_s > _GAP_S:
         remarks.append(
