@@ -13,6 +13,7 @@ from lhdmap.logs.health import examine
 from lhdmap.logs.order import clock_was_set_back
 from lhdmap.logs.source import LogSource
 from lhdmap.logs.stamp_clocks import ONE_CLOCK, Sample, find_clocks
+from lhdmap.logs.writer import LogWriter
 from lhdmap.messages import Inclination, Message, Tachometer
 from lhdmap.pipeline.build import BuildRequest, build_map
 
@@ -59,7 +60,7 @@ def test_a_clock_that_is_set_in_mid_drive_is_taken_out_and_told(tmp_path: Path, 
 def test_a_pause_in_which_the_machine_drove_on_is_a_pause(tmp_path: Path) -> None:
     log = tmp_path / "log.mcap"
     kept = [k for k in range(150) if not 60 <= k < 85]
-    with drives.LogWriter(log) as writer:
+    with LogWriter(log) as writer:
         for k in kept:
             writer.write(drives.FRONT, drives.drive()[1][k])
     with open_log(log) as reader:
@@ -72,7 +73,7 @@ def test_a_pause_of_a_standing_machine_is_a_pause(tmp_path: Path) -> None:
     rng = np.random.default_rng(0)
     first = drives.drive()[1][0]
     log = tmp_path / "log.mcap"
-    with drives.LogWriter(log) as writer:
+    with LogWriter(log) as writer:
         for k in range(120):
             noise = rng.normal(0.0, 0.01, len(first.ranges_m)).astype(np.float32)
             stamp = first.stamp_ns + k * drives.PERIOD_NS + (5 * SECOND if k >= 70 else 0)
@@ -85,7 +86,7 @@ def test_a_pause_of_a_standing_machine_is_a_pause(tmp_path: Path) -> None:
 def test_usual_times_between_messages_are_not_moved_by_a_step(tmp_path: Path) -> None:
     """A step of an hour made the mean of 20 messages minutes long, and no gap was seen any more."""
     log = tmp_path / "log.mcap"
-    with drives.LogWriter(log) as writer:
+    with LogWriter(log) as writer:
         for k, scan in enumerate(drives.drive()[1][:60]):
             later = (3600 * SECOND if k >= 20 else 0) + (2 * SECOND if k >= 40 else 0)
             ranges = scan.ranges_m + np.float32(0.3 * (k >= 20) + 0.5 * (k >= 40))  # elsewhere

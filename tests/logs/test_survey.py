@@ -12,6 +12,7 @@ from lhdmap.cli.main import main
 from lhdmap.geometry import se3
 from lhdmap.logs.health import Verdict, examine
 from lhdmap.logs.source import LogSource
+from lhdmap.logs.writer import LogWriter
 from lhdmap.messages import Inclination, Joints, LaserScan, Message, Mount, Tachometer, WheelPose
 from lhdmap.pipeline.build import BuildRequest, build_map
 
@@ -143,7 +144,7 @@ def test_two_scanners_on_one_topic_are_not_mixed(tmp_path: Path, frames: tuple[s
     """Taken for one scanner they gave a jump of 3.9 m."""
     log = tmp_path / "log.mcap"
     mounts = [Mount(drives.START_NS, "base_link", frame, np.eye(4)) for frame in dict.fromkeys(frames)]
-    with drives.LogWriter(log) as writer:
+    with LogWriter(log) as writer:
         writer.write("/tf_static", mounts)
         for scan in drives.drive()[1]:
             writer.write("/scan", _half(scan, -1, frames[0]))
@@ -169,7 +170,7 @@ def test_one_scanner_that_interlaces_or_was_set_anew_stays_one(tmp_path: Path) -
 
 def test_two_topics_that_could_be_the_scanner_are_refused_by_both(tmp_path: Path) -> None:
     log = tmp_path / "log.mcap"
-    with drives.LogWriter(log) as writer:
+    with LogWriter(log) as writer:
         for scan in drives.drive()[1][:30]:
             writer.write("/a", scan)
             writer.write("/b", scan)
