@@ -37,7 +37,7 @@ def in_order_of_drive(trajectory: Trajectory) -> Ordered:
     if not count:
         return Ordered(once)
     what = f"stamps run backwards {count} times, by up to {float(back_ns.max()) / 1e9:.3g} s"
-    by_time = _by_time(once)
+    by_time = _rows(once, _sorting(once))
     if _length_m(by_time) <= _LONGER * _length_m(once):
         return Ordered(by_time, f"{what}: its poses were sorted by time")
     return Ordered(once, f"{what}, but the path is the shorter one in the order given, which was kept")
@@ -65,7 +65,7 @@ def file_in_order(trajectory: Trajectory, path: Path) -> Ordered:
             "trajectories in one file? One was wanted"
         )
     if len(back):
-        found = Ordered(_by_time(once), f"stamps run backwards {len(back)} times: its poses were sorted by time")
+        found = Ordered(_rows(once, _sorting(once)), f"stamps run backwards {len(back)} times: its poses were sorted by time")
     if not twice:
         return found
     kept = found.remark + "; " if found.remark else ""
@@ -82,11 +82,6 @@ def _once(trajectory: Trajectory) -> Trajectory:
     if not same.any():
         return trajectory
     return _rows(trajectory, np.sort(order[np.concatenate([[True], ~same])]))
-
-
-def _by_time(trajectory: Trajectory) -> Trajectory:
-    """Return the poses by rising stamps, of each stamp one, the same whatever the order was."""
-    return _first_of_each(_rows(trajectory, _sorting(trajectory)))
 
 
 def _first_of_each(trajectory: Trajectory) -> Trajectory:
