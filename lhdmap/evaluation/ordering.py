@@ -44,11 +44,13 @@ def in_order_of_drive(trajectory: Trajectory) -> Ordered:
 
 
 def file_in_order(trajectory: Trajectory, path: Path) -> Ordered:
-    """Return the poses of a file whose lines may stand in any order.
+    """Return the poses of a file whose lines may stand in any order; those in a map folder stand in the order of the scans.
 
     Raises:
         InputError: there are two trajectories in it, so that no order makes a path.
     """
+    if (path.parent / "map.json").is_file():
+        return Ordered(trajectory)
     once = _once(trajectory)
     twice = len(once.stamps_ns) - len(np.unique(once.stamps_ns))
     if twice > max(1, _MOST_TWICE * len(once.stamps_ns)):
@@ -65,7 +67,9 @@ def file_in_order(trajectory: Trajectory, path: Path) -> Ordered:
             "trajectories in one file? One was wanted"
         )
     if len(back):
-        found = Ordered(_rows(once, _sorting(once)), f"stamps run backwards {len(back)} times: its poses were sorted by time")
+        found = Ordered(
+            _rows(once, _sorting(once)), f"stamps run backwards {len(back)} times: its poses were sorted by time"
+        )
     if not twice:
         return found
     kept = found.remark + "; " if found.remark else ""
