@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
 from pathlib import Path
 from typing import NamedTuple
 
@@ -69,12 +70,11 @@ def read_header(path: Path, data: bytes) -> PlyHeader:
     if encoding not in ORDERS:
         raise InputError(f"{path}: PLY format '{encoding}'; one of {', '.join(ORDERS)} was wanted")
     starts = [at for at, line in enumerate(words) if line[0] == "element"]
-    blocks = [words[start:end] for start, end in zip(starts, [*starts[1:], len(words)], strict=True)]
+    blocks = [words[start:end] for start, end in pairwise([*starts, len(words)])]
     names = [" ".join(block[0][1:2]).lower() for block in blocks]
     if _VERTEX not in names:
-        raise InputError(
-            f"{path}: no element 'vertex' in the PLY file, only {', '.join(names) or 'none'}: it has no points"
-        )
+        found = ", ".join(names) or "of no kind"
+        raise InputError(f"{path}: the PLY file has elements {found}, not 'vertex': it holds no points")
     wanted = blocks[: names.index(_VERTEX) + 1]
     return PlyHeader(length, encoding, tuple(_element(path, block, ORDERS[encoding], len(data)) for block in wanted))
 
@@ -113,12 +113,7 @@ def _property(path: Path, words: list[str], order: str) -> Property:
     kinds = [TYPES.get(word.lower(), "") for word in words[1:-1]]
     if words[0] == "property" and len(words) == 3 and kinds[0]:
         return Property(words[2].lower(), order + kinds[0])
-    if (
-        words[0] == "property"
-        and len(words) == 5
-        and words[1].lower() == "list"
-        and all(kinds[1:])
-        and kinds[1][0] != "f"
-    ):
+    is_list = len(words) == 5 and words[1].lower() == "list" and words[4].lower() not in ("x", "y", "z")
+    if words[0] == "property" and is_list and all(kinds[1:]) and kinds[1][0] != "f":
         return Property(words[4].lower(), order + kinds[2], order + kinds[1])
     raise InputError(f"{path}: '{' '.join(words)}' in the PLY header; a property of known types was wanted")

@@ -26,6 +26,7 @@ from lhdmap.pile.slope_status import status_probabilities
 FEWEST_POINTS = 200
 _LEAST_RISE = 0.02
 _LIMIT_SHARE = 0.02
+_LYING = ("too_shallow", "loadable")
 _PLACES = ("center_m", "left_limit_m", "right_limit_m", "toe_m", "face_m")
 
 
@@ -115,9 +116,19 @@ def measure_heap(points_m: FloatArray, floor: Floor | None = None) -> CloudPile:
         reason = f"flat: nothing of note rises more than {rise:.3g} m above its floor"
         return CloudPile(_without_face(heap, points_m, reason), _extra(heap, points_m, "flat", reason))
     if not heap.faces:
-        reason = "material, but no face: the surface is rough everywhere"
-        return CloudPile(_without_face(heap, points_m, reason), _extra(heap, points_m, "rough", reason))
-    return CloudPile(_estimate(heap, points_m), _extra(heap, points_m, "heap", ""))
+        reason = "material, but no face: the surface is rough everywhere, and no drift is seen around it"
+        volume, volume_std = volume_m3(heap, points_m)
+        unknown = replace(PileEstimate.unknown(reason), volume_m3=volume, volume_std_m3=volume_std)
+        return CloudPile(unknown, _extra(heap, points_m, "rough", reason))
+    estimate = _estimate(heap, points_m)
+    if estimate.status in _LYING:
+        return CloudPile(estimate, _extra(heap, points_m, "heap", ""))
+    reason = (
+        f"the largest face stands at {heap.faces[0].slope_deg:.0f}°, steeper than what lies loose, and no drift is seen around "
+        "it: whether that is a pile, a wall or something else cannot be said"
+    )
+    extra = _extra(heap, points_m, "steep", reason) | {"volume_m3": math.nan, "volume_std_m3": math.nan}
+    return CloudPile(PileEstimate.unknown(reason), extra)
 
 
 def volume_m3(heap: Heap, points_m: FloatArray) -> tuple[float, float]:
@@ -139,7 +150,7 @@ def volume_m3(heap: Heap, points_m: FloatArray) -> tuple[float, float]:
 
 
 def _points(path: Path) -> tuple[FloatArray, FloatArray]:
-    """Return the points of a file about an origin (3,) near them, and the origin: nothing is measured in a national grid's numbers."""
+    """Return the points of a file about an origin (3,) near them, and that origin: a national grid's numbers are large."""
     cloud = read_cloud(path)
     if len(cloud) < FEWEST_POINTS:
         raise InputError(f"{path}: {len(cloud)} points; at least {FEWEST_POINTS} were wanted for a pile")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import codecs
+import tempfile
 import warnings
 from collections.abc import Callable
 from pathlib import Path
@@ -231,8 +232,6 @@ def test_stamps_are_read_to_the_nanosecond(ns: int, unit_ns: int) -> None:
 
 @given(st.text(alphabet='0123456789.,;- \t\neE+#naixyzqwt"', max_size=200))
 def test_any_text_is_read_or_refused(text: str) -> None:
-    import tempfile
-
     with tempfile.TemporaryDirectory() as folder, warnings.catch_warnings():
         warnings.simplefilter("ignore", LhdmapWarning)
         try:
