@@ -2,8 +2,8 @@
 
 Columns are found by their names in the first line that is no comment (`#`): `attempt,gt_width_m,gt_inclination_deg`, and `log` or
 `pred_width_m,pred_inclination_deg` (or both), optionally `gt_status`, `pred_status`, `pred_width_std_m` and
-`pred_inclination_std_deg`. Other columns are passed over. An empty cell is a value that is not known. Cells are separated by commas, semicolons or tabs; a
-decimal comma is one wherever it does not separate.
+`pred_inclination_std_deg`. Other columns are passed over. An empty cell is a value that is not known. Cells are separated by
+commas, semicolons or tabs; a decimal comma is one wherever it does not separate.
 """
 
 from __future__ import annotations
