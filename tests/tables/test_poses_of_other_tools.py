@@ -24,11 +24,11 @@ Row = tuple[int, list[float]]
 
 def rows(start_ns: int = START_NS, count: int = 40) -> list[Row]:
     """Return stamps and x y z qx qy qz qw, no two of them alike, rounded as in a file."""
-    k = np.arange(count)
+    k = np.arange(count, dtype=np.float64)
     rotations = quaternions_from_rpy(0.02 + 0.001 * k, -0.03 + 0.0 * k, 1.0 + 0.01 * k)
     places = np.column_stack([0.1 * k - 3.0, 5.0 - 0.05 * k, 0.01 * k])
     poses = np.round(np.column_stack([places, rotations]), 9).tolist()
-    return [(start_ns + STEP_NS * n, pose) for n, pose in zip(k.tolist(), poses, strict=True)]
+    return [(start_ns + STEP_NS * n, pose) for n, pose in zip(range(count), poses, strict=True)]
 
 
 def seconds(ns: int) -> str:
