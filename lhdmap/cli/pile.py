@@ -101,11 +101,7 @@ def _text(values: dict[str, Any], folder: Path) -> str:
 
 
 def _measures(values: dict[str, Any]) -> list[str]:
-    if values["status"] is None:
-        lines = [f"status       not said: {values['reason']}"]
-    else:
-        chance = values["probabilities"][values["status"]]
-        lines = [f"status       {values['status']} ({100 * chance:.0f} %)"]
+    lines = [f"status       {_status(values)}"]
     if values["width_m"] is not None:
         lines.append(f"width        {values['width_m']:.2f} m{_deviation(values['width_std_m'], 2)}")
     if values["inclination_deg"] is not None:
@@ -116,6 +112,17 @@ def _measures(values: dict[str, Any]) -> list[str]:
         lines.append(f"volume seen  {values['volume_m3']:.1f} m³{_deviation(values['volume_std_m3'], 1)}")
     lines.extend(f"boulder      {one['size_m']:.1f} m" for one in values["boulders"])
     return lines
+
+
+def _status(values: dict[str, Any]) -> str:
+    """Return the status with what is known of it: its probability, or why there is none."""
+    status, shares = values["status"], values["probabilities"]
+    if status is None:
+        return f"unknown: {values['reason']}"
+    if status == "none" and shares[status] < max(shares.values()):
+        return "none: what lies ahead is not known well enough to be called anything"
+    words = "none: nothing closes the drift" if status == "none" and "piles" in values else status
+    return f"{words} ({100 * shares[status]:.0f} %)"
 
 
 def _over(values: dict[str, Any]) -> str:

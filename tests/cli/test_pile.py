@@ -94,6 +94,6 @@ def test_the_cloud_of_a_grizzly_gets_no_status(tmp_path: Path, capsys: pytest.Ca
     assert written["status"] is None
     assert main(["pile", cloud, "--quiet"]) == 0
     told = capsys.readouterr()
-    assert "not said: the largest face stands at 8" in told.out
+    assert "unknown: the largest face stands at 8" in told.out
     assert "%" not in told.out
     assert told.err == ""
