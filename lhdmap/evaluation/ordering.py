@@ -46,6 +46,8 @@ def in_order_of_drive(trajectory: Trajectory) -> Ordered:
 def file_in_order(trajectory: Trajectory, path: Path) -> Ordered:
     """Return the poses of a file whose lines may stand in any order; those in a map folder stand in the order of the scans.
 
+    The remark says what was changed.
+
     Raises:
         InputError: there are two trajectories in it, so that no order makes a path.
     """
@@ -70,6 +72,8 @@ def file_in_order(trajectory: Trajectory, path: Path) -> Ordered:
         found = Ordered(
             _rows(once, _sorting(once)), f"stamps run backwards {len(back)} times: its poses were sorted by time"
         )
+    if (np.diff(found.trajectory.stamps_ns) < 0).any():
+        found = found._replace(remark="")
     if not twice:
         return found
     kept = found.remark + "; " if found.remark else ""

@@ -48,16 +48,19 @@ def read_text(path: Path, *, strict: bool = False) -> str:
         strict: refuse what is no text, instead of putting a replacement where a character cannot be read.
 
     Raises:
-        InputError: the file is missing or not readable, or (strict) no text.
+        InputError: the file is missing or not readable, or no text.
     """
     try:
         data = path.read_bytes()
     except OSError as error:
         raise InputError(f"{path}: {error.strerror or error}") from error
     try:
-        return data.decode(_encoding(data), errors="strict" if strict else "replace")
+        text = data.decode(_encoding(data), errors="strict" if strict else "replace")
     except UnicodeDecodeError:
-        raise InputError(f"{path}: it is no text; UTF-8 or UTF-16 was wanted") from None
+        text = "\0"
+    if "\0" in text:
+        raise InputError(f"{path}: it is no text; UTF-8 or UTF-16 was wanted")
+    return text
 
 
 def layout_of(path: Path, lines: Sequence[str], columns: int) -> Layout:

@@ -223,6 +223,11 @@ def test_what_is_not_clear_is_refused_with_line_and_reason(content: str, tmp_pat
     refused(tmp_path, content, REFUSED[content])
 
 
+def test_a_binary_file_is_no_text(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="it is no text"):
+        read(tmp_path, b"\x89MCAP0\r\n\x01\x00\x00\x00profile 1 2 3 4 5 6 7 8\n")
+
+
 @given(st.integers(-(2**63) + 1, 2**63 - 1), st.sampled_from([1, 1_000, 1_000_000, 10**9]))
 def test_stamps_are_read_to_the_nanosecond(ns: int, unit_ns: int) -> None:
     digits = len(str(unit_ns)) - 1
