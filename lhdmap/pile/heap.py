@@ -127,7 +127,7 @@ def measure_heap(points_m: FloatArray, floor: Floor | None = None) -> CloudPile:
         f"the largest face stands at {heap.faces[0].slope_deg:.0f}°, steeper than what lies loose, and no drift is seen around "
         "it: whether that is a pile, a wall or something else cannot be said"
     )
-    extra = _extra(heap, points_m, "steep", reason) | {"volume_m3": math.nan, "volume_std_m3": math.nan}
+    extra = _extra(heap, points_m, "steep", reason) | {"volume_m3": None, "volume_std_m3": None}
     return CloudPile(PileEstimate.unknown(reason), extra)
 
 

@@ -96,4 +96,6 @@ def test_the_cloud_of_a_grizzly_gets_no_status(tmp_path: Path, capsys: pytest.Ca
     told = capsys.readouterr()
     assert "unknown: the largest face stands at 8" in told.out
     assert "%" not in told.out
+    assert "nan" not in told.out
+    assert "volume" not in told.out
     assert told.err == ""
