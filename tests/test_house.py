@@ -28,7 +28,8 @@ PACKAGE = ROOT / "lhdmap"
 FLOORS = [
     {"errors"},
     {"messages", "settings", "resources"},
-    {"geometry", "trajectory", "provenance"},
+    {"geometry", "tables", "provenance"},
+    {"trajectory"},
     {"machine", "mapfolder"},
     {"kinematics"},
     {"logs", "proprioception", "odometry", "integration"},

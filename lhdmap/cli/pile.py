@@ -15,7 +15,7 @@ CLOUD_SUFFIXES = (".ply", ".pcd", ".laz", ".las")
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options of `lhdmap pile`."""
     parser.add_argument(
-        "input", type=Path, metavar="LOG|CLOUD", help="log or bag folder, or a cloud (.ply, .pcd, .laz)"
+        "input", type=Path, metavar="LOG|CLOUD", help="log or bag folder, or a cloud (.ply, .pcd, .las, .laz)"
     )
     parser.add_argument("-o", "--output", type=Path, metavar="DIR", help="folder to make (default: beside the input)")
     parser.add_argument("--config", type=Path, metavar="FILE.toml", help="settings over the defaults")
@@ -67,6 +67,7 @@ def _run_cloud(arguments: argparse.Namespace, console: Console) -> int:
         raise UsageError(f"{arguments.input}: {', '.join(given)} concern logs; a cloud takes --up and -o")
     estimate, more = run_cloud(arguments.input, arguments.up)
     values = estimate_json(estimate) | more
+    values["reason"] = values["reason"] or None
     if arguments.output is not None:
         with MapFolderWriter(Path(arguments.output)) as folder:
             folder.write_json("pile.json", values)
@@ -100,8 +101,7 @@ def _text(values: dict[str, Any], folder: Path) -> str:
 
 
 def _measures(values: dict[str, Any]) -> list[str]:
-    chance = values["probabilities"][values["status"]]
-    lines = [f"status       {values['status']} ({100 * chance:.0f} %)"]
+    lines = [f"status       {_status(values)}"]
     if values["width_m"] is not None:
         lines.append(f"width        {values['width_m']:.2f} m{_deviation(values['width_std_m'], 2)}")
     if values["inclination_deg"] is not None:
@@ -112,6 +112,17 @@ def _measures(values: dict[str, Any]) -> list[str]:
         lines.append(f"volume seen  {values['volume_m3']:.1f} m³{_deviation(values['volume_std_m3'], 1)}")
     lines.extend(f"boulder      {one['size_m']:.1f} m" for one in values["boulders"])
     return lines
+
+
+def _status(values: dict[str, Any]) -> str:
+    """Return the status with what is known of it: its probability, or why there is none."""
+    status, shares = values["status"], values["probabilities"]
+    if status is None:
+        return f"unknown: {values['reason']}"
+    if status == "none" and shares[status] < max(shares.values()):
+        return "none: what lies ahead is not known well enough to be called anything"
+    words = "none: nothing closes the drift" if status == "none" and "piles" in values else status
+    return f"{words} ({100 * shares[status]:.0f} %)"
 
 
 def _over(values: dict[str, Any]) -> str:

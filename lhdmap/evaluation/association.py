@@ -3,7 +3,7 @@
 Each stamp of the sparser trajectory looks for the nearest of the denser one, within a tolerance (as evo does).
 Where the nearest is not exact, the denser trajectory is interpolated at the sparser's stamp: at 24 km/h a stamp that is
 5 ms off would otherwise look like an error of 33 mm. Stamps may run backwards (CARMEN logs of Intel do, 631 times): the
-search goes through a sorted index, the order of the file is kept, and nothing is interpolated then.
+search goes through a sorted index, the order given is kept (`ordering` has chosen it), and nothing is interpolated then.
 """
 
 from __future__ import annotations
@@ -94,7 +94,12 @@ def _too_few(estimate: Trajectory, truth: Trajectory, found: int, nearest_ns: in
         f"{name} {trajectory.stamps_ns.min() / 1e9:.3f} to {trajectory.stamps_ns.max() / 1e9:.3f} s"
         for name, trajectory in (("estimate", estimate), ("truth", truth))
     ]
+    alone = [name for name, one in (("estimate", estimate), ("truth", truth)) if len(one.stamps_ns) < 2]
+    if alone:
+        return f"{' and '.join(alone)} of one pose ({', '.join(spans)}): at least 2 were wanted"
+    apart = max(estimate.stamps_ns.min(), truth.stamps_ns.min()) > min(estimate.stamps_ns.max(), truth.stamps_ns.max())
+    hint = "they share no time: are both of one clock?" if apart else "raise --tolerance if both have the same clock"
     return (
         f"{found} matching stamps: at least 2 within {tolerance_ns / 1e9:g} s were wanted, the nearest are "
-        f"{nearest_ns / 1e9:g} s apart ({', '.join(spans)}); raise --tolerance if both have the same clock"
+        f"{nearest_ns / 1e9:g} s apart ({', '.join(spans)}); {hint}"
     )
