@@ -8,6 +8,7 @@ search goes through a sorted index, the order given is kept (`ordering` has chos
 
 from __future__ import annotations
 
+import itertools
 from typing import NamedTuple
 
 import numpy as np
@@ -21,6 +22,7 @@ from lhdmap.trajectory import Trajectory
 IndexArray = npt.NDArray[np.int64]
 EXACT_NS = 1_000
 """Stamps closer than this are the same stamp: float seconds of other tools keep no more than a microsecond."""
+_MOST_STRETCHES = 20  # more steps back than clocks are set in a drive: stamps of old loggers
 
 
 class Pairs(NamedTuple):
@@ -39,7 +41,7 @@ def associate(estimate: Trajectory, truth: Trajectory, tolerance_ns: int = 20_00
     """
     estimate_is_denser = len(estimate.stamps_ns) >= len(truth.stamps_ns)
     dense, sparse = (estimate, truth) if estimate_is_denser else (truth, estimate)
-    rows = nearest_rows(dense.stamps_ns, sparse.stamps_ns)
+    rows = _nearest(dense.stamps_ns, sparse.stamps_ns)
     away_ns = np.abs(dense.stamps_ns[rows] - sparse.stamps_ns)
     kept = np.flatnonzero(away_ns <= tolerance_ns)
     if len(kept) < 2:
@@ -48,6 +50,21 @@ def associate(estimate: Trajectory, truth: Trajectory, tolerance_ns: int = 20_00
     from_sparse = poses_from_quaternions(sparse.positions_m[kept], sparse.quaternions_xyzw[kept])
     sides = (from_dense, from_sparse) if estimate_is_denser else (from_sparse, from_dense)
     return Pairs(sparse.stamps_ns[kept], *sides)
+
+
+def _nearest(stamps_ns: IndexArray, wanted_ns: IndexArray) -> IndexArray:
+    """Return `nearest_rows`; stretch by stretch where both step back as often: a clock was set, and times came twice."""
+    dense, sparse = _stretches(stamps_ns), _stretches(wanted_ns)
+    if len(dense) != len(sparse) or len(dense) > _MOST_STRETCHES:
+        return nearest_rows(stamps_ns, wanted_ns)
+    parts = [a.start + nearest_rows(stamps_ns[a], wanted_ns[b]) for a, b in zip(dense, sparse, strict=True)]
+    return np.concatenate(parts)
+
+
+def _stretches(stamps_ns: IndexArray) -> list[slice]:
+    """Return the stretches of stamps that do not step back."""
+    edges = [0, *(np.flatnonzero(np.diff(stamps_ns) < 0) + 1).tolist(), len(stamps_ns)]
+    return [slice(start, end) for start, end in itertools.pairwise(edges)]
 
 
 def nearest_rows(stamps_ns: IndexArray, wanted_ns: IndexArray) -> IndexArray:

@@ -19,6 +19,8 @@ from lhdmap.evaluation.poses import JUMP_BACK_NS
 from lhdmap.trajectory import Trajectory
 
 _LONGER = 1.02
+_MOST_SETTINGS = 5
+_RUNS_ON, _RUNS_ON_M = 5.0, 0.05  # of the usual step: what lies before and behind a clock that was set
 _MOST_TWICE = 0.05
 
 
@@ -54,6 +56,8 @@ def file_in_order(trajectory: Trajectory, path: Path) -> Ordered:
     if (path.parent / "map.json").is_file():
         return Ordered(trajectory)
     once = _once(trajectory)
+    if _clock_was_set(once):
+        return in_order_of_drive(once)
     twice = len(once.stamps_ns) - len(np.unique(once.stamps_ns))
     if twice > max(1, _MOST_TWICE * len(once.stamps_ns)):
         raise InputError(
@@ -80,6 +84,14 @@ def file_in_order(trajectory: Trajectory, path: Path) -> Ordered:
     return Ordered(
         _first_of_each(found.trajectory), f"{kept}{twice} poses have the stamp of another one: they were left out"
     )
+
+
+def _clock_was_set(trajectory: Trajectory) -> bool:
+    """Return whether stamps step back a few times, and the path runs on where they do: no second file begins there."""
+    back = np.diff(trajectory.stamps_ns) < 0
+    steps_m = np.linalg.norm(np.diff(trajectory.positions_m, axis=0), axis=1)
+    runs_on = (steps_m[back] <= _RUNS_ON * float(np.median(steps_m)) + _RUNS_ON_M).all() if back.any() else False
+    return bool(0 < np.count_nonzero(back) <= _MOST_SETTINGS and runs_on)
 
 
 def _once(trajectory: Trajectory) -> Trajectory:

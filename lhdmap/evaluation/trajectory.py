@@ -13,6 +13,7 @@ from lhdmap.evaluation.alignment import ALIGNMENTS, Alignment, align, aligned
 from lhdmap.evaluation.association import IndexArray, associate
 from lhdmap.evaluation.ordering import in_order_of_drive
 from lhdmap.evaluation.poses import Poses, distances_along, flattened
+from lhdmap.evaluation.two_clocks import clock_offset_ns, shifted
 from lhdmap.messages import FloatArray
 from lhdmap.settings import setting
 from lhdmap.trajectory import Trajectory
@@ -100,10 +101,17 @@ def evaluate_trajectory(
         raise UsageError("no segment length was given: at least one was wanted, e.g. 5,10,20")
     estimate, of_estimate = in_order_of_drive(estimate)
     truth, of_truth = in_order_of_drive(truth)
+    offset_ns = clock_offset_ns(estimate, truth)
+    if offset_ns is not None:
+        estimate = shifted(estimate, offset_ns)
     pairs = associate(estimate, truth, round(chosen.tolerance_s * 1e9))
     sides = (flattened(pairs.estimate), flattened(pairs.truth)) if chosen.planar else (pairs.estimate, pairs.truth)
     reach = metrics.reach(pairs.stamps_ns, truth.stamps_ns, truth.positions_m, _hole_ns(pairs.stamps_ns))
     remarks = [f"the {name}: {text}" for name, text in (("estimate", of_estimate), ("truth", of_truth)) if text]
+    if offset_ns is not None:
+        remarks.append(
+            f"the stamps are of two clocks: the estimate's were moved by {offset_ns / 1e9:.3f} s, to where both move alike"
+        )
     along_m = distances_along(sides[1].positions_m, pairs.stamps_ns)
     return _compared(*sides, along_m, reach, chosen, remarks)
 
