@@ -3,16 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Iterator
+from functools import partial
 from pathlib import Path
 from types import TracebackType
 from typing import NamedTuple, Self
 
 from lhdmap.errors import InputError
 from lhdmap.logs.base import Channel, RawMessage, TopicInfo, span_s
+from lhdmap.logs.cloud_times import CloudTimes
 from lhdmap.logs.container import Container, Contents, OpenContainer
 from lhdmap.logs.cursor import Cursor
 from lhdmap.logs.decoders import DECODERS, LASER_SCAN, UNSTAMPED_TYPES, Decoder, ground_truth, scan_numbers
 from lhdmap.logs.findings import Findings
+from lhdmap.logs.kinds import of_one_type
+from lhdmap.logs.pointcloud import point_cloud
 from lhdmap.logs.stamps import StampKeeper, TopicStamps
 from lhdmap.logs.topics import is_ground_truth
 from lhdmap.messages import Message, Record
@@ -32,6 +36,7 @@ class DecodedLog:
         self._findings = Findings()
         self._skipped = Findings()
         self._keeper = StampKeeper()
+        self._cloud_times: dict[str, CloudTimes] = {}
 
     def __enter__(self) -> Self:
         """Open the log; raises InputError where it is not usable."""
@@ -53,8 +58,9 @@ class DecodedLog:
 
     @property
     def remarks(self) -> list[str]:
-        """What was odd in the stamps."""
-        return self._keeper.warnings()
+        """What was odd in the file, its topics and the times in it."""
+        clouds = [line for topic, times in self._cloud_times.items() for line in times.remarks(topic)]
+        return [*self._need().remarks.lines(), *self._typed()[1], *self._keeper.warnings(), *clouds]
 
     @property
     def stamps(self) -> dict[str, TopicStamps]:
@@ -77,14 +83,15 @@ class DecodedLog:
         return span_s(self.start_ns, self.end_ns)
 
     def topics(self) -> dict[str, TopicInfo]:
-        """Return the topics by name; channels of one topic are added up."""
-        found: dict[str, TopicInfo] = {}
+        """Return the topics by name; channels of one topic and type are added up, of several types one is chosen."""
+        return self._typed()[0]
+
+    def _typed(self) -> tuple[dict[str, TopicInfo], list[str]]:
         contents = self._contents()
-        for number, channel in contents.channels.items():
-            before = found[channel.topic].count or 0 if channel.topic in found else 0
-            count = before + contents.counts.get(number, 0)
-            found[channel.topic] = TopicInfo(channel.topic, channel.type_name, count)
-        return found
+        return of_one_type(
+            TopicInfo(channel.topic, channel.type_name, contents.counts.get(number, 0))
+            for number, channel in contents.channels.items()
+        )
 
     def raw(self, topics: Collection[str] | None = None) -> Iterator[RawMessage]:
         """Yield the messages of `topics` (all by default) as they are stored, in log-time order."""
@@ -96,7 +103,7 @@ class DecodedLog:
         """Return the `angle_max` of the first LaserScan of `topic`, None where there is none."""
         for channel, _, data in self.raw({topic}):
             if channel.type_name != LASER_SCAN or channel.encoding not in _ENCODINGS:
-                return None
+                continue
             try:
                 return scan_numbers(Cursor(data, channel.encoding))[2][1]
             except InputError:
@@ -105,7 +112,10 @@ class DecodedLog:
 
     def records(self, topics: Collection[str] | None = None) -> Iterator[Record]:
         """Yield the decoded messages of `topics` (all that can be decoded by default) in log-time order."""
-        plans = {number: self._plan(channel) for number, channel in self._chosen(topics).items()}
+        self._cloud_times = {}
+        kinds = {name: info.type_name for name, info in self.topics().items()}
+        meant = {n: channel for n, channel in self._chosen(topics).items() if channel.type_name == kinds[channel.topic]}
+        plans = {number: self._plan(channel) for number, channel in meant.items()}
         known = {number: plan for number, plan in plans.items() if plan is not None}
         self._keeper = keeper = StampKeeper()
         self._skipped = Findings()
@@ -127,6 +137,8 @@ class DecodedLog:
         decoder = DECODERS.get(channel.type_name)
         if truth and channel.type_name == "nav_msgs/msg/Odometry":
             decoder = ground_truth
+        elif decoder is point_cloud:
+            decoder = partial(point_cloud, times=self._cloud_times.setdefault(channel.topic, CloudTimes()))
         if decoder is None or channel.encoding not in _ENCODINGS:
             return None
         return _Plan(channel.topic, decoder, channel.encoding, channel.type_name not in UNSTAMPED_TYPES)
