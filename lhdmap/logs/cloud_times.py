@@ -18,12 +18,13 @@ from lhdmap.messages import Float32Array, FloatArray
 
 Mask = npt.NDArray[np.bool_]
 
-_LONGEST_S = 1.0  # no scanner turns slower
+_LONGEST_S = 1.0  # no scanner turns slower, hardly one slower than _NO_STEP_S: for the first cloud
 _LONGER = 1.2  # than the longest of the last steps from cloud to cloud
-_STEPS, _FEWEST_STEPS = 9, 4
+_STEPS = 9
+_NO_STEP_S = 0.25
 _MOST_FRAMES = 64
 _SAMPLED = 1024
-_LEAP = 0.1  # of the window
+_LEAP = 0.1  # of a sweep
 _MOST_LEAPING = 0.4  # more is the order of the points, not nonsense
 _MOST_BESIDE = 0.25
 _FEW_POINTS = 32
@@ -72,7 +73,7 @@ class CloudTimes:
             values = _signed(raw)
             finite = np.isfinite(values)
             told = self._read(values, finite, raw.dtype.kind, window_s, stamp_ns) if finite.any() else None
-            if told is None or np.count_nonzero(told.good) <= 0.5 * len(raw):
+            if told is None:
                 self._without += 1
                 return _NONE
             self._wrapped += _below_zero(raw, told)
@@ -87,8 +88,9 @@ class CloudTimes:
         if self._wrapped:
             lines.append(f"{its} are wrapped below zero for {self._share(self._wrapped)} of the points; read as signed")
         if self._odd:
+            off = f"up to {self._worst_s:.3g} s off" if self._worst_s else "no numbers"
             lines.append(
-                f"{its} are nonsense for {self._share(self._odd)} of the points (up to {self._worst_s:.3g} s off); "
+                f"{its} are nonsense for {self._share(self._odd)} of the points ({off}); "
                 "the times of the points beside them are taken"
             )
         if self._without:
@@ -105,20 +107,22 @@ class CloudTimes:
         self._last_ns[frame] = stamp_ns
         if step_s > 0.0:
             steps_s.append(step_s)
-        return min(_LONGER * max(steps_s), _LONGEST_S) if len(steps_s) >= _FEWEST_STEPS else _LONGEST_S
+        return min(_LONGER * max(steps_s), _LONGEST_S) if steps_s else _NO_STEP_S
 
     def _read(self, values: FloatArray, finite: Mask, kind: str, window_s: float, stamp_ns: int) -> _Told | None:
         """Return the times of a cloud, None where they are those of more than a sweep."""
         self._widths.append(2.0 * _half_width(values[finite]))
-        unit = _unit(kind, float(np.median(self._widths)), window_s)
-        first, good = _densest(values, finite, window_s / unit)
-        if _outlasts(values, good, first, window_s / unit):
+        width = float(np.median(self._widths))
+        unit = _unit(kind, width, window_s)
+        steady = finite & ~_leaping(values, finite, _LEAP * width)
+        first, good = _densest(values, steady, window_s / unit)
+        if np.count_nonzero(good) <= 0.5 * len(values) or _outlasts(values[steady], first, window_s / unit):
             return None
         told = _told((values - first) * unit, good, first * unit, stamp_ns * 1e-9, window_s)
         self._foreign += told.clock is _Clock.OTHER
         usual = 1e-9 if kind in "iu" else 1.0
         self._unit = "" if unit == usual or told.clock is _Clock.STAMP else _UNITS[unit]
-        return told._replace(good=told.good & ~_leaping(told.times_s, told.good, window_s))
+        return told
 
     def _filled(self, told: _Told) -> Float32Array:
         """Return the times, those of the odd points from the points beside them in the cloud."""
@@ -146,7 +150,8 @@ def _signed(raw: npt.NDArray[Any]) -> FloatArray:
     counts = raw.astype(np.uint32)
     sampled = np.sort(counts[:: max(len(counts) // _SAMPLED, 1)])
     middle = sampled[len(sampled) // 2 :][:1]
-    return (counts - middle).view(np.int32) + middle.view(np.int32).astype(np.float64)
+    signed: FloatArray = (counts - middle).view(np.int32) + middle.view(np.int32).astype(np.float64)
+    return signed
 
 
 def _half_width(values: FloatArray) -> float:
@@ -176,10 +181,11 @@ def _densest(values: FloatArray, finite: Mask, window: float) -> tuple[float, Ma
     return first, finite & (values >= first) & (values <= first + window)
 
 
-def _outlasts(values: FloatArray, good: Mask, first: float, window: float) -> bool:
+def _outlasts(steady: FloatArray, first: float, window: float) -> bool:
     """Return whether the sweep goes on beyond the window: many points are just before or behind it."""
-    beside = ~good & (values >= first - window) & (values <= first + 2.0 * window)
-    return bool(np.count_nonzero(beside) > _MOST_BESIDE * len(values))
+    near = (steady >= first - window) & (steady <= first + 2.0 * window)
+    beside = near & ~((steady >= first) & (steady <= first + window))
+    return bool(np.count_nonzero(beside) > _MOST_BESIDE * len(steady))
 
 
 def _told(after_s: FloatArray, good: Mask, start_s: float, stamp_s: float, window_s: float) -> _Told:
@@ -198,20 +204,22 @@ def _below_zero(raw: npt.NDArray[Any], told: _Told) -> int:
     return int(np.count_nonzero(told.times_s[told.good] < 0.0))
 
 
-def _leaping(times_s: FloatArray, good: Mask, window_s: float) -> Mask:
-    """Return which points (N,) stand in a stretch that leaps away from the points before and behind it, which fit each other.
+def _leaping(values: FloatArray, finite: Mask, least: float) -> Mask:
+    """Return which points (N,) stand in a stretch that leaps by more than `least` away from the points before and behind it.
 
-    Clouds that are sorted by ring leap from the end of a ring to the start of the next one: those do not fit each other.
+    Those before and behind fit each other, and are more. Clouds that are sorted by ring leap, too, from the end of a ring to the
+    start of the next one: but those do not fit each other.
     """
-    kept = np.flatnonzero(good)
-    times = times_s[kept]
-    ends = np.flatnonzero(np.abs(np.diff(times)) > _LEAP * window_s)  # last points of stretches
-    leaping = np.zeros(len(times_s), dtype=bool)
+    kept = np.flatnonzero(finite)
+    times = values[kept]
+    leaping = np.zeros(len(values), dtype=bool)
+    ends = np.flatnonzero(np.abs(np.diff(times)) > least)  # last points of stretches
     if len(ends) < 2:
         return leaping
     before, behind = times[ends[:-1]], times[ends[1:] + 1]
-    leap_s = np.minimum(np.abs(times[ends[:-1] + 1] - before), np.abs(times[ends[1:]] - behind))
-    fit = np.abs(behind - before) < 0.5 * leap_s
+    leap = np.minimum(np.abs(times[ends[:-1] + 1] - before), np.abs(times[ends[1:]] - behind))
     lengths = np.diff(ends, prepend=-1, append=len(times) - 1)
-    leaping[kept] = np.repeat(np.concatenate(([False], fit, [False])), lengths)
-    return leaping if np.count_nonzero(leaping) <= _MOST_LEAPING * len(times) else np.zeros(len(times_s), dtype=bool)
+    short = lengths[1:-1] < 0.5 * (lengths[:-2] + lengths[2:])
+    odd = short & (np.abs(behind - before) < 0.5 * leap)
+    leaping[kept] = np.repeat(np.concatenate(([False], odd, [False])), lengths)
+    return leaping if np.count_nonzero(leaping) <= _MOST_LEAPING * len(times) else np.zeros(len(values), dtype=bool)

@@ -112,11 +112,7 @@ class DecodedLog:
 
     def records(self, topics: Collection[str] | None = None) -> Iterator[Record]:
         """Yield the decoded messages of `topics` (all that can be decoded by default) in log-time order."""
-        self._cloud_times = {}
-        kinds = {name: info.type_name for name, info in self.topics().items()}
-        meant = {n: channel for n, channel in self._chosen(topics).items() if channel.type_name == kinds[channel.topic]}
-        plans = {number: self._plan(channel) for number, channel in meant.items()}
-        known = {number: plan for number, plan in plans.items() if plan is not None}
+        known = self._with_times(self._plans(topics))
         self._keeper = keeper = StampKeeper()
         self._skipped = Findings()
         for log_ns, number, data in self._need().messages(known):
@@ -132,13 +128,30 @@ class DecodedLog:
             self._skipped.add(f"{plan.topic}: a message was skipped: {error}")
             return ()
 
+    def _plans(self, topics: Collection[str] | None) -> dict[int, _Plan]:
+        """Return how to decode the channels of `topics` (all by default) that can be decoded."""
+        kinds = {name: info.type_name for name, info in self.topics().items()}
+        chosen = {
+            n: channel for n, channel in self._chosen(topics).items() if channel.type_name == kinds[channel.topic]
+        }
+        plans = {number: self._plan(channel) for number, channel in chosen.items()}
+        return {number: plan for number, plan in plans.items() if plan is not None}
+
+    def _with_times(self, plans: dict[int, _Plan]) -> dict[int, _Plan]:
+        """Let the clouds of each topic share what is known of their times."""
+        self._cloud_times = {plan.topic: CloudTimes() for plan in plans.values() if plan.decoder is point_cloud}
+        return {
+            number: plan._replace(decoder=partial(point_cloud, times=self._cloud_times[plan.topic]))
+            if plan.decoder is point_cloud
+            else plan
+            for number, plan in plans.items()
+        }
+
     def _plan(self, channel: Channel) -> _Plan | None:
         truth = channel.topic in self.truth_topics or is_ground_truth(channel.topic)
         decoder = DECODERS.get(channel.type_name)
         if truth and channel.type_name == "nav_msgs/msg/Odometry":
             decoder = ground_truth
-        elif decoder is point_cloud:
-            decoder = partial(point_cloud, times=self._cloud_times.setdefault(channel.topic, CloudTimes()))
         if decoder is None or channel.encoding not in _ENCODINGS:
             return None
         return _Plan(channel.topic, decoder, channel.encoding, channel.type_name not in UNSTAMPED_TYPES)

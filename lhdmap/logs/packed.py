@@ -8,7 +8,6 @@ from __future__ import annotations
 import bz2
 import gzip
 import lzma
-import shutil
 import tempfile
 import zlib
 from collections.abc import Callable, Collection, Iterator
@@ -131,7 +130,8 @@ def _stream(file: IO[bytes]) -> tuple[Any, str]:
 def _copied(stream: Any, target: IO[bytes]) -> str:
     """Copy all that can be had; return what is wrong with the stream, if anything."""
     try:
-        shutil.copyfileobj(stream, target, _STEP)
+        while part := stream.read1(_STEP):  # what comes before a break is given, `read` would keep it
+            target.write(part)
     except _BROKEN as error:
         return f"the compressed file is damaged or cut off ({error}): what comes before that is used"
     except OSError as error:

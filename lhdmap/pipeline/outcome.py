@@ -166,7 +166,7 @@ def integrate_again(inputs: Inputs, pipeline: MappingPipeline, rows: Rows) -> Sw
                 wheels.update(message)
             elif isinstance(message, (LaserScan, PointCloud)):
                 time_ns = next(times, message.stamp_ns) if role == "front" else message.stamp_ns
-                message = sweep_times.checked(role, message) if isinstance(message, (LaserScan, PointCloud)) else message
+                message = sweep_times.checked(role, message)
                 sweeps.add_final(role, time_ns, message, track, wheels)
     sweeps.wait(track, wheels)
     return sweeps

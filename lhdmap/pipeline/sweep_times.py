@@ -7,13 +7,12 @@ wherever they come from.
 from __future__ import annotations
 
 from collections import deque
-from typing import TypeVar
+from typing import overload
 
 import numpy as np
 
 from lhdmap.messages import LaserScan, PointCloud
 
-Sweep = TypeVar("Sweep", LaserScan, PointCloud)
 _LONGEST_S = 1.0  # no scanner turns slower
 _STEPS = 9
 _LONGER = 1.2
@@ -27,7 +26,13 @@ class SweepTimes:
         self._steps_s: dict[str, deque[float]] = {}
         self._worst_s: dict[str, tuple[str, float]] = {}
 
-    def checked(self, role: str, sweep: Sweep) -> Sweep:
+    @overload
+    def checked(self, role: str, sweep: LaserScan) -> LaserScan: ...
+    @overload
+    def checked(self, role: str, sweep: PointCloud) -> PointCloud: ...
+    @overload
+    def checked(self, role: str, sweep: LaserScan | PointCloud) -> LaserScan | PointCloud: ...
+    def checked(self, role: str, sweep: LaserScan | PointCloud) -> LaserScan | PointCloud:
         """Return a scanner's sweep as it can be taken."""
         steps_s = self._steps_s.setdefault(role, deque(maxlen=_STEPS))
         if role in self._last_ns:
