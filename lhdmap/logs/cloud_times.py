@@ -18,14 +18,14 @@ from lhdmap.messages import Float32Array, FloatArray
 
 Mask = npt.NDArray[np.bool_]
 
-_LONGEST_S = 1.0  # no scanner turns slower, hardly one slower than _NO_STEP_S: for the first cloud
+_LONGEST_S, _USUAL_S = 1.0, 0.25  # no scanner turns slower; hardly one does
 _LONGER = 1.2  # than the longest of the last steps from cloud to cloud
 _STEPS = 9
-_NO_STEP_S = 0.25
 _MOST_FRAMES = 64
 _SAMPLED = 1024
 _LEAP = 0.1  # of a sweep
-_MOST_LEAPING = 0.4  # more is the order of the points, not nonsense
+_PASSES = 4
+_MOST_LEAPS, _FEWEST_STEADY = 0.05, 0.6  # of the points
 _MOST_BESIDE = 0.25
 _FEW_POINTS = 32
 _NEAR_S = 2.0  # a clock that is as near to the stamp is the stamp's
@@ -107,14 +107,17 @@ class CloudTimes:
         self._last_ns[frame] = stamp_ns
         if step_s > 0.0:
             steps_s.append(step_s)
-        return min(_LONGER * max(steps_s), _LONGEST_S) if steps_s else _NO_STEP_S
+        longest_s = _LONGER * max(steps_s, default=0.0)
+        if len(steps_s) < _STEPS:  # clouds may come in bunches
+            longest_s = max(longest_s, _USUAL_S)
+        return min(longest_s, _LONGEST_S)
 
     def _read(self, values: FloatArray, finite: Mask, kind: str, window_s: float, stamp_ns: int) -> _Told | None:
         """Return the times of a cloud, None where they are those of more than a sweep."""
         self._widths.append(2.0 * _half_width(values[finite]))
         width = float(np.median(self._widths))
         unit = _unit(kind, width, window_s)
-        steady = finite & ~_leaping(values, finite, _LEAP * width)
+        steady = _steady(values, finite, _LEAP * width)
         first, good = _densest(values, steady, window_s / unit)
         if np.count_nonzero(good) <= 0.5 * len(values) or _outlasts(values[steady], first, window_s / unit):
             return None
@@ -150,8 +153,8 @@ def _signed(raw: npt.NDArray[Any]) -> FloatArray:
     counts = raw.astype(np.uint32)
     sampled = np.sort(counts[:: max(len(counts) // _SAMPLED, 1)])
     middle = sampled[len(sampled) // 2 :][:1]
-    signed: FloatArray = (counts - middle).view(np.int32) + middle.view(np.int32).astype(np.float64)
-    return signed
+    after, first = (counts - middle).view(np.int32), middle.view(np.int32)
+    return after.astype(np.float64) + first.astype(np.float64)
 
 
 def _half_width(values: FloatArray) -> float:
@@ -204,22 +207,37 @@ def _below_zero(raw: npt.NDArray[Any], told: _Told) -> int:
     return int(np.count_nonzero(told.times_s[told.good] < 0.0))
 
 
-def _leaping(values: FloatArray, finite: Mask, least: float) -> Mask:
-    """Return which points (N,) stand in a stretch that leaps by more than `least` away from the points before and behind it.
+def _steady(values: FloatArray, finite: Mask, least: float) -> Mask:
+    """Return which values (N,) do not leap by more than `least` away from those before and behind them in the cloud.
 
-    Those before and behind fit each other, and are more. Clouds that are sorted by ring leap, too, from the end of a ring to the
-    start of the next one: but those do not fit each other.
+    All do not where many leap all the same: then the order of the points is not that of time.
     """
     kept = np.flatnonzero(finite)
-    times = values[kept]
-    leaping = np.zeros(len(values), dtype=bool)
+    for _ in range(_PASSES):
+        odd = _odd_stretches(values[kept], least)
+        if not odd.any():
+            break
+        kept = kept[~odd]
+    leaps = np.count_nonzero(np.abs(np.diff(values[kept])) > least)
+    if leaps > _MOST_LEAPS * len(kept) or len(kept) < _FEWEST_STEADY * len(values):
+        return finite
+    steady = np.zeros(len(values), dtype=bool)
+    steady[kept] = True
+    return steady
+
+
+def _odd_stretches(times: FloatArray, least: float) -> Mask:
+    """Return which values (N,) are in a stretch that leaps away from those before and behind it, which fit each other.
+
+    Those are more than the stretch. Clouds that are sorted by ring leap, too, from the end of a ring to the start of the next
+    one: but those before and behind a ring do not fit each other.
+    """
     ends = np.flatnonzero(np.abs(np.diff(times)) > least)  # last points of stretches
     if len(ends) < 2:
-        return leaping
+        return np.zeros(len(times), dtype=bool)
     before, behind = times[ends[:-1]], times[ends[1:] + 1]
     leap = np.minimum(np.abs(times[ends[:-1] + 1] - before), np.abs(times[ends[1:]] - behind))
     lengths = np.diff(ends, prepend=-1, append=len(times) - 1)
     short = lengths[1:-1] < 0.5 * (lengths[:-2] + lengths[2:])
     odd = short & (np.abs(behind - before) < 0.5 * leap)
-    leaping[kept] = np.repeat(np.concatenate(([False], odd, [False])), lengths)
-    return leaping if np.count_nonzero(leaping) <= _MOST_LEAPING * len(times) else np.zeros(len(values), dtype=bool)
+    return np.repeat(np.concatenate(([False], odd, [False])), lengths)
