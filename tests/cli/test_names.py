@@ -45,7 +45,9 @@ def test_a_log_whose_name_is_not_utf8(room: Path, tmp_path: Path) -> None:
     assert folder.changed_files() == []
     assert folder.info["sources"][0]["path"] == f"{tmp_path}/{SHOWN}.mcap"
     assert len(folder.diagnostics().stamp_ns) == built["scans_processed"]
-    assert {"report.html", "recording.rrd", "cloud.ply", "trajectory.tum"} <= {path.name for path in folder.path.iterdir()}
+    assert {"report.html", "recording.rrd", "cloud.ply", "trajectory.tum"} <= {
+        path.name for path in folder.path.iterdir()
+    }
     assert "M\\xfcller &lt;drive&gt;" in (folder.path / "report.html").read_text(encoding="utf-8")
     assert (folder.path / "recording.rrd").read_bytes()[:4] == b"RRF2"
     assert _lhdmap("pile", str(log))["folder"] == f"{tmp_path}/{SHOWN}_pile"

@@ -14,9 +14,8 @@ from lhdmap.logs import open_log
 from lhdmap.logs.ros_messages import definition, serialized
 from lhdmap.messages import LaserScan
 from mcap.writer import Writer
-from rosbags.rosbag2 import StoragePlugin
+from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin
 from rosbags.rosbag2 import Writer as BagWriter
-from rosbags.rosbag2.writer import CompressionFormat, CompressionMode
 from rosbags.typesys import Stores, get_typestore
 
 START, STEP, COUNT = 1_700_000_000 * 10**9, 40_000_000, 12
