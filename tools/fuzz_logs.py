@@ -105,9 +105,10 @@ def write_mcap(
 
 
 def compressed(path: Path) -> Path:
-    """Compress a log as a whole; returns the path of what comes out."""
-    target = path.with_name(path.name + ".zst")
-    target.write_bytes(zstandard.compress(path.read_bytes()))
+    """Compress a log as a whole, in frames as large logs have; returns the path of what comes out."""
+    target, data = path.with_name(path.name + ".zst"), path.read_bytes()
+    frames = [zstandard.compress(data[start : start + 4096]) for start in range(0, len(data), 4096)]
+    target.write_bytes(b"".join(frames))
     return target
 
 
