@@ -27,7 +27,7 @@ PACKAGE = ROOT / "lhdmap"
 
 FLOORS = [
     {"errors"},
-    {"messages", "settings", "resources"},
+    {"messages", "settings", "resources", "names"},
     {"geometry", "tables", "provenance"},
     {"trajectory"},
     {"machine", "mapfolder"},

@@ -8,6 +8,7 @@ from typing import Any
 
 from lhdmap.cli.build_map import topic_overrides
 from lhdmap.cli.console import Console
+from lhdmap.names import beside, name_of
 
 CLOUD_SUFFIXES = (".ply", ".pcd", ".laz", ".las")
 
@@ -44,11 +45,11 @@ def run(arguments: argparse.Namespace, console: Console) -> int:
     settings = load_settings(arguments.config, arguments.set)
     machine = load_machine(arguments.machine) if arguments.machine else None
     report = identify(arguments.input, settings, arguments.poses, machine, topic_overrides(arguments.topic))
-    with MapFolderWriter(_target(arguments)) as folder:
+    with MapFolderWriter(arguments.output or beside(arguments.input, "pile")) as folder:
         values = report.to_json()
         folder.write_json("pile.json", values)
-        write_pile_report(report, folder.path / "report.html", f"Ore pile, {arguments.input.name}")
-        write_pile_recording(report, folder.path / "pile.rrd", arguments.input.name)
+        write_pile_report(report, folder.path / "report.html", f"Ore pile, {name_of(arguments.input)}")
+        write_pile_recording(report, folder.path / "pile.rrd", name_of(arguments.input))
         path = folder.complete(MapInfo([arguments.input], settings_table(settings), warnings=values["warnings"]))
     for text in values["warnings"]:
         console.warn(text)
@@ -77,13 +78,6 @@ def _run_cloud(arguments: argparse.Namespace, console: Console) -> int:
         console.warn(text)
     console.result(values, _cloud_text(values))
     return 0
-
-
-def _target(arguments: argparse.Namespace) -> Path:
-    if arguments.output is not None:
-        return Path(arguments.output)
-    name = arguments.input.name.split(".")[0]
-    return Path(arguments.input).resolve().parent / f"{name}_pile"
 
 
 def _text(values: dict[str, Any], folder: Path) -> str:

@@ -106,7 +106,7 @@ class MappingPipeline:
 
     def update(self, role: str, message: Message) -> None:
         """Take one message of the log."""
-        if isinstance(message, LaserScan):
+        if isinstance(message, (LaserScan, PointCloud)):
             message = self._sweep_times.checked(role, message)
         match message:
             case LaserScan() | PointCloud() if role == self._primary:

@@ -17,6 +17,7 @@ from lhdmap.integration.cloud import Cloud
 from lhdmap.logs.source import LogSource
 from lhdmap.machine import Machine
 from lhdmap.messages import Joints, LaserScan, PointCloud
+from lhdmap.names import name_of
 from lhdmap.pile.result import PileReport
 from lhdmap.pipeline.beside import HelperDied
 from lhdmap.pipeline.identify import identify_along
@@ -147,7 +148,7 @@ class Outcome:
             pile=self.pile,
             warnings=self.warnings,
             settings_text=settings_toml(inputs.settings),
-            provenance={"log": ", ".join(path.name for path in inputs.logs)},
+            provenance={"log": ", ".join(name_of(path) for path in inputs.logs)},
         )
 
 
@@ -167,7 +168,7 @@ def integrate_again(inputs: Inputs, pipeline: MappingPipeline, rows: Rows) -> Sw
                 wheels.update(message)
             elif isinstance(message, (LaserScan, PointCloud)):
                 time_ns = next(times, message.stamp_ns) if role == "front" else message.stamp_ns
-                message = sweep_times.checked(role, message) if isinstance(message, LaserScan) else message
+                message = sweep_times.checked(role, message)
                 sweeps.add_final(role, time_ns, message, track, wheels)
     sweeps.wait(track, wheels)
     return sweeps
