@@ -2,13 +2,9 @@
 
 from __future__ import annotations
 
-<<<<<<< HEAD
 import contextlib
 from collections.abc import Collection, Iterator, Mapping
-=======
-from collections.abc import Collection, Iterator
 from functools import partial
->>>>>>> h-containers
 from pathlib import Path
 from types import TracebackType
 from typing import NamedTuple, Self
@@ -17,23 +13,16 @@ import numpy as np
 import numpy.typing as npt
 
 from lhdmap.errors import InputError
-<<<<<<< HEAD
 from lhdmap.logs.base import RUN, Channel, RawMessage, TopicInfo, run_stride, span_s
 from lhdmap.logs.clock import ClockStep, LogClock, Timed
-=======
-from lhdmap.logs.base import Channel, RawMessage, TopicInfo, span_s
 from lhdmap.logs.cloud_times import CloudTimes
->>>>>>> h-containers
 from lhdmap.logs.container import Container, Contents, OpenContainer
 from lhdmap.logs.cursor import Cursor
 from lhdmap.logs.decoders import DECODERS, LASER_SCAN, UNSTAMPED_TYPES, Decoder, ground_truth, scan_numbers, transforms
 from lhdmap.logs.findings import Findings
-<<<<<<< HEAD
-from lhdmap.logs.stamp_clocks import Sample, StampClocks, find_clocks
-=======
 from lhdmap.logs.kinds import of_one_type
 from lhdmap.logs.pointcloud import point_cloud
->>>>>>> h-containers
+from lhdmap.logs.stamp_clocks import Sample, StampClocks, find_clocks
 from lhdmap.logs.stamps import StampKeeper, TopicStamps
 from lhdmap.logs.topics import is_ground_truth
 from lhdmap.messages import Message, Mount, Record
@@ -54,11 +43,8 @@ class DecodedLog:
         self._findings = Findings()
         self._skipped = Findings()
         self._keeper = StampKeeper()
-<<<<<<< HEAD
         self._clocks: StampClocks | None = None
-=======
         self._cloud_times: dict[str, CloudTimes] = {}
->>>>>>> h-containers
 
     def __enter__(self) -> Self:
         """Open the log; raises InputError where it is not usable."""
@@ -155,13 +141,8 @@ class DecodedLog:
 
     def records(self, topics: Collection[str] | None = None) -> Iterator[Record]:
         """Yield the decoded messages of `topics` (all that can be decoded by default) in log-time order."""
-<<<<<<< HEAD
-        known = self._plans(topics)
-        self._keeper = keeper = StampKeeper(self._stamp_clocks(), LogClock())
-=======
         known = self._with_times(self._plans(topics))
-        self._keeper = keeper = StampKeeper()
->>>>>>> h-containers
+        self._keeper = keeper = StampKeeper(self._stamp_clocks(), LogClock())
         self._skipped = Findings()
         for topic, log_ns, message, stamped in keeper.clock.steady(self._stream(known)):
             stamp = keeper.decide(topic, message.stamp_ns, log_ns, has_header=stamped)
@@ -207,11 +188,6 @@ class DecodedLog:
         if not usable and isinstance(message, Mount):
             self._skipped.add(f"a transform to '{message.child_frame}' that is no pose was left out")
         return usable
-
-    def _plans(self, topics: Collection[str] | None) -> dict[int, _Plan]:
-        """Return how to decode the channels of `topics` (all by default) that can be decoded."""
-        plans = {number: self._plan(channel) for number, channel in self._chosen(topics).items()}
-        return {number: plan for number, plan in plans.items() if plan is not None}
 
     def _plans(self, topics: Collection[str] | None) -> dict[int, _Plan]:
         """Return how to decode the channels of `topics` (all by default) that can be decoded."""
