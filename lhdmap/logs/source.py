@@ -18,11 +18,8 @@ from lhdmap.logs.base import LogReader, TopicInfo
 from lhdmap.logs.finding import Severity
 from lhdmap.logs.formats import open_log
 from lhdmap.logs.inventory import Inventory, take_inventory
-<<<<<<< HEAD
-from lhdmap.logs.survey import Survey, take_survey, transform_topics
-=======
 from lhdmap.logs.kinds import of_one_type
->>>>>>> h-containers
+from lhdmap.logs.survey import Survey, take_survey, transform_topics
 from lhdmap.logs.topics import assign_topics, missing_scanner
 from lhdmap.messages import Message
 
@@ -101,16 +98,12 @@ class LogSource:
     @property
     def warnings(self) -> list[str]:
         """What was odd so far, with the file it concerns."""
-<<<<<<< HEAD
         told = (Severity.PROBLEM, Severity.FATAL)
         found = [finding for finding in self.survey.findings if finding.severity in told]
         lines = [f"{self.paths[0]}: {finding.topic}: {finding.text}; {finding.advice}" for finding in found]
         lines += [f"{self.paths[0]}: {line}" for line in self.survey.frames.remarks]
-        return lines + [f"{reader.path}: {line}" for reader in self._readers for line in reader.remarks]
-=======
-        told = [f"{reader.path}: {line}" for reader in self._readers for line in reader.remarks]
-        return told + (self._typed()[1] if len(self._readers) > 1 else [])
->>>>>>> h-containers
+        lines += [f"{reader.path}: {line}" for reader in self._readers for line in reader.remarks]
+        return lines + (self._typed()[1] if len(self._readers) > 1 else [])
 
     @property
     def start_ns(self) -> int | None:
@@ -141,7 +134,6 @@ class LogSource:
         Transforms come first, whenever they were sent: they hold for the whole log.
         """
         wanted = {topic: role for role, topic in self.roles.items() if roles is None or role in roles}
-<<<<<<< HEAD
         mounts = self.survey.frames.transforms() if _MOUNTS in wanted.values() else []
         measured = self._measured({topic: role for topic, role in wanted.items() if role != _MOUNTS})
         first = next(measured, None)
@@ -153,8 +145,6 @@ class LogSource:
 
     def _measured(self, wanted: Mapping[str, str]) -> Iterator[tuple[str, Message]]:
         """Yield role and message of the wanted topics, scans as they were meant."""
-        streams = [reader.records(set(wanted)) for reader in self._readers]
-=======
         kinds = {topic: info.type_name for topic, info in self.topics().items()}
         streams = [
             reader.records(
@@ -162,7 +152,6 @@ class LogSource:
             )
             for reader in self._readers
         ]
->>>>>>> h-containers
         merged = streams[0] if len(streams) == 1 else heapq.merge(*streams, key=itemgetter(1))
         for topic, _, raw in merged:
             message = self.survey.repaired(topic, raw)
