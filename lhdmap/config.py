@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import tomllib
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -63,12 +63,38 @@ def load_settings(path: Path | None = None, assignments: Iterable[str] = ()) -> 
     for assignment in assignments:
         section, key, value = _parsed(assignment)
         table.setdefault(section, {})[key] = value
+    return _built(table, _origin(path))
+
+
+def settings_from(values: Mapping[str, Any]) -> Settings:
+    """Return the defaults with these over them: `{"odometry.method": "range_flow"}` or `{"odometry": {"method": …}}`.
+
+    Raises:
+        ConfigError: a section, key or value is wrong.
+    """
+    table: dict[str, dict[str, Any]] = {}
+    for name, value in values.items():
+        section, dot, key = str(name).partition(".")
+        if not dot and not isinstance(value, Mapping):
+            raise ConfigError(f"settings: '{name}' names no section{_full_names(name)}")
+        table.setdefault(section, {}).update({key: value} if dot else value)
+    return _built(table, "settings: ")
+
+
+def _full_names(key: str) -> str:
+    """Return the question whether one of the settings of this key was meant, or what else is near."""
+    names = [section for section, kind in SECTIONS.items() if key in {field.name for field in dataclasses.fields(kind)}]
+    meant = " or ".join(f"'{section}.{key}'" for section in names)
+    return f"; did you mean {meant}?" if meant else nearest(key, SECTIONS)
+
+
+def _built(table: Mapping[str, Any], origin: str) -> Settings:
     sections = {}
     for name, values in table.items():
         if name not in SECTIONS:
-            raise ConfigError(f"{_origin(path)}unknown section '{name}'{nearest(name, SECTIONS)}")
+            raise ConfigError(f"{origin}unknown section '{name}'{nearest(name, SECTIONS)}")
         if not isinstance(values, dict):
-            raise ConfigError(f"{_origin(path)}'{name}' is a section: [{name}] with its settings below was wanted")
+            raise ConfigError(f"{origin}'{name}' is a section: [{name}] with its settings below was wanted")
         sections[name] = load_section(SECTIONS[name], name, values)
     return Settings(**sections)
 

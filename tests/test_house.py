@@ -28,7 +28,8 @@ PACKAGE = ROOT / "lhdmap"
 FLOORS = [
     {"errors"},
     {"messages", "settings", "resources"},
-    {"geometry", "trajectory", "provenance"},
+    {"geometry", "provenance"},
+    {"trajectory"},
     {"machine", "mapfolder"},
     {"kinematics"},
     {"logs", "proprioception", "odometry", "integration"},
@@ -37,6 +38,7 @@ FLOORS = [
     {"report"},
     {"config"},
     {"pipeline"},
+    {"front"},
     {"cli"},
     {"__main__"},
 ]

@@ -46,7 +46,7 @@ def run(arguments: argparse.Namespace, console: Console) -> int:
     """Build the map and print where it is."""
     from lhdmap.config import load_settings
     from lhdmap.machine import load_machine
-    from lhdmap.pipeline.build import BuildRequest, build_map
+    from lhdmap.pipeline.build import BuildRequest, build_map, default_target
 
     request = BuildRequest(
         logs=arguments.logs,
@@ -63,14 +63,6 @@ def run(arguments: argparse.Namespace, console: Console) -> int:
         console.warn(text)
     console.result(result.summary | {"warnings": result.warnings}, summary_text(result.summary))
     return 0
-
-
-def default_target(log: Path) -> Path:
-    """Return the folder beside the log that the map goes to."""
-    name = log.name
-    while "." in name[1:]:
-        name = name[: name.rindex(".")]
-    return log.resolve().parent / f"{name}_map"
 
 
 def topic_overrides(words: Iterable[str]) -> dict[str, str]:

@@ -48,6 +48,7 @@ class BuildRequest:
     progress: Progress | None = None
     poses: str = ""
     helper: bool = False
+    force: bool = False
 
     @property
     def inputs(self) -> Inputs:
@@ -93,10 +94,19 @@ def build_map(request: BuildRequest) -> BuildResult:
             beside_mib = _write(folder, request, source, outcome, inspector)
         if interrupted:  # what was finished is kept under the partial name
             raise KeyboardInterrupt
-        info = MapInfo(request.logs, _options(request), outcome.summary, outcome.warnings, _frames(request))
-        final = folder.complete(info, {path: future.result() for path, future in hashes.items()})
-    summary = outcome.summary | {"map": str(final)} | cost(started, outcome.duration_s, beside_mib)
-    return BuildResult(final, summary, outcome.warnings, ways.final)
+        known = {path: future.result() for path, future in hashes.items()}
+        figures = outcome.summary | cost(started, outcome.duration_s, beside_mib)  # the same in map.json and on screen
+        info = MapInfo(request.logs, _options(request), figures, outcome.warnings, _frames(request))
+        final = folder.complete(info, known)
+    return BuildResult(final, figures | {"map": str(final)}, outcome.warnings, ways.final)
+
+
+def default_target(log: Path) -> Path:
+    """Return the folder beside the log that the map goes to."""
+    name = log.name
+    while "." in name[1:]:
+        name = name[: name.rindex(".")]
+    return log.resolve().parent / f"{name}_map"
 
 
 def _run(pipeline: MappingPipeline, source: LogSource, progress: Progress | None) -> bool:
