@@ -34,14 +34,16 @@ __all__ = [
 _LATER = {"Map", "build_map", "open_map"}  # of lhdmap.front, which loads numpy and the pipeline
 
 
-def __getattr__(name: str) -> Any:
-    """Load what is heavy when it is first asked for (PEP 562)."""
-    if name not in _LATER:
-        raise AttributeError(f"module 'lhdmap' has no attribute '{name}'")
-    from lhdmap import front
-
-    return getattr(front, name)
-
-
 def __dir__() -> list[str]:
     return sorted({*globals(), *_LATER})
+
+
+if not TYPE_CHECKING:  # a type checker shall see unknown names as such
+
+    def __getattr__(name: str) -> Any:
+        """Load what is heavy when it is first asked for (PEP 562)."""
+        if name not in _LATER:
+            raise AttributeError(f"module 'lhdmap' has no attribute '{name}'")
+        from lhdmap import front
+
+        return getattr(front, name)

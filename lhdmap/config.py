@@ -63,7 +63,20 @@ def load_settings(path: Path | None = None, assignments: Iterable[str] = ()) -> 
     for assignment in assignments:
         section, key, value = _parsed(assignment)
         table.setdefault(section, {})[key] = value
-    return _built(table, _origin(path))
+    sections = {}
+    for name, values in table.items():
+        if name not in SECTIONS:
+            raise ConfigError(f"{_origin(path)}unknown section '{name}'{nearest(name, SECTIONS)}")
+        if not isinstance(values, dict):
+            raise ConfigError(f"{_origin(path)}'{name}' is a section: [{name}] with its settings below was wanted")
+        sections[name] = load_section(SECTIONS[name], name, values)
+    return Settings(**sections)
+
+
+def settings_toml(settings: Settings | None = None) -> str:
+    """Print settings as TOML, each with meaning, unit and source."""
+    chosen = settings or Settings()
+    return "\n".join([_HEADER, *(section_toml(name, getattr(chosen, name)) for name in SECTIONS)])
 
 
 def settings_from(values: Mapping[str, Any]) -> Settings:
@@ -75,10 +88,10 @@ def settings_from(values: Mapping[str, Any]) -> Settings:
     table: dict[str, dict[str, Any]] = {}
     for name, value in values.items():
         section, dot, key = str(name).partition(".")
-        if not dot and not isinstance(value, Mapping):
-            raise ConfigError(f"settings: '{name}' names no section{_full_names(name)}")
+        if section not in SECTIONS or not (dot or isinstance(value, Mapping)):
+            raise ConfigError(f"settings: '{name}' names no section{_full_names(section)}")
         table.setdefault(section, {}).update({key: value} if dot else value)
-    return _built(table, "settings: ")
+    return Settings(**{name: load_section(SECTIONS[name], name, section) for name, section in table.items()})
 
 
 def _full_names(key: str) -> str:
@@ -86,23 +99,6 @@ def _full_names(key: str) -> str:
     names = [section for section, kind in SECTIONS.items() if key in {field.name for field in dataclasses.fields(kind)}]
     meant = " or ".join(f"'{section}.{key}'" for section in names)
     return f"; did you mean {meant}?" if meant else nearest(key, SECTIONS)
-
-
-def _built(table: Mapping[str, Any], origin: str) -> Settings:
-    sections = {}
-    for name, values in table.items():
-        if name not in SECTIONS:
-            raise ConfigError(f"{origin}unknown section '{name}'{nearest(name, SECTIONS)}")
-        if not isinstance(values, dict):
-            raise ConfigError(f"{origin}'{name}' is a section: [{name}] with its settings below was wanted")
-        sections[name] = load_section(SECTIONS[name], name, values)
-    return Settings(**sections)
-
-
-def settings_toml(settings: Settings | None = None) -> str:
-    """Print settings as TOML, each with meaning, unit and source."""
-    chosen = settings or Settings()
-    return "\n".join([_HEADER, *(section_toml(name, getattr(chosen, name)) for name in SECTIONS)])
 
 
 def settings_table(settings: Settings) -> dict[str, dict[str, Any]]:

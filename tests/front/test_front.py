@@ -46,7 +46,8 @@ def test_matrices_are_those_of_roll_pitch_and_yaw() -> None:
     quaternions = 3.0 * se3.quaternions_from_rpy(*rpy.T)
     positions = np.arange(9.0).reshape(3, 3)
     found = Trajectory(np.arange(3), positions, quaternions).T_map_base
-    assert found == pytest.approx(np.array([se3.from_rpy(*a, tuple(p)) for a, p in zip(rpy, positions, strict=True)]))
+    for T, (roll, pitch, yaw), (x, y, z) in zip(found, rpy, positions, strict=True):
+        assert np.allclose(T, se3.from_rpy(roll, pitch, yaw, (x, y, z)), atol=1e-12)
 
 
 def test_the_cloud_is_of_arrays_and_lies_on_the_walls(built: lhdmap.Map, drive: SimulatedDrive) -> None:
