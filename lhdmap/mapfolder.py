@@ -25,10 +25,18 @@ from lhdmap.provenance import file_entry, sha256_of, source_entry
 from lhdmap.trajectory import Trajectory, read_tum, write_tum
 
 FORMAT_VERSION = 1
+LOG_SUFFIXES = (".mcap", ".bag", ".db3", ".clf")
 FRAMES = {
     "map": "gravity-aligned, z up; position and heading of base_link at the first scan are its origin",
     "base_link": "middle of the front axle on the floor, x forward, y left, z up; the poses of the trajectories",
 }
+
+
+def looks_like_log(path: Path) -> bool:
+    """Return whether a path is that of a log, by its name, or by what is in the folder."""
+    if path.is_dir():
+        return (path / "metadata.yaml").is_file() or any(path.glob("*.mcap")) or any(path.glob("*.db3"))
+    return path.name.lower().removesuffix(".gz").removesuffix(".bz2").endswith(LOG_SUFFIXES)
 
 
 class Diagnostics(NamedTuple):
@@ -159,7 +167,8 @@ class MapFolder:
             InputError: there is no map folder, it is partial, or of a newer format.
         """
         if not path.is_dir():
-            found = "there is a file; of a log, lhdmap build-map makes one" if path.exists() else "there is nothing"
+            found = "there is a file" if path.exists() else "there is nothing"
+            found = "there is a log; lhdmap build-map makes a map of it" if looks_like_log(path) else found
             raise InputError(f"{path}: a map folder was wanted, {found}")
         file = path / "map.json"
         if not file.exists() and path.name.endswith(PARTIAL_SUFFIX):

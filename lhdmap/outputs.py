@@ -23,6 +23,7 @@ from lhdmap.interrupts import before_interrupt, undisturbed
 PARTIAL_SUFFIX = ".partial"
 SOFTWARE = {"name": "lhdmap", "version": __version__}
 DESCRIPTIONS = ("map.json", "run.json")
+_KINDS = {"map": "trajectory.tum", "pile": "pile.json", "plan": "plan.json", "workspace": "workspace.json"}
 _MARK = ".lhdmap"  # in a folder that grows: whose it is; locked as long as its run goes on
 
 
@@ -34,6 +35,17 @@ def described(folder: Path) -> Mapping[str, Any] | None:
             if isinstance(found, dict) and dict(found.get("software") or {}).get("name") == SOFTWARE["name"]:
                 return found
     return None
+
+
+def kind_of(folder: Path) -> str | None:
+    """Return what a folder of lhdmap is: `map`, `pile`, `plan`, `workspace`, `demo`, `suite` …; None for any other."""
+    found = described(folder)
+    if found is None:
+        return None
+    for kind, file in _KINDS.items():
+        if "kind" not in found and (folder / file).is_file():
+            return kind
+    return str(found.get("kind", "run"))
 
 
 def free_folder(target: Path, *, force: bool = False, inputs: Sequence[Path] = ()) -> None:

@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import dataclasses
 import difflib
+import math
 import re
 import tomllib
 import types
@@ -80,6 +81,13 @@ def nearest(key: str, known: typing.Iterable[str]) -> str:
         case [name]:
             return f"; did you mean '{name}'?"
     return f"; did you mean one of {', '.join(alike)}?"
+
+
+def figure(value: float) -> str:
+    """Return a figure for a person: `39` for 39.0785, `12.5`, `0.35`."""
+    if not math.isfinite(value) or f"{value:g}" == f"{value:.3g}":
+        return f"{value:g}"
+    return f"{value:.0f}" if abs(value) >= 10.0 else f"{value:.2g}"
 
 
 def near_names(key: str, known: typing.Iterable[str]) -> list[str]:
