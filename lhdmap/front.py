@@ -14,6 +14,7 @@ from lhdmap.errors import InputError, UsageError
 from lhdmap.integration.cloud import Cloud
 from lhdmap.machine import Machine, load_machine
 from lhdmap.mapfolder import Diagnostics, MapFolder
+from lhdmap.outputs import beside
 from lhdmap.trajectory import Trajectory
 
 AnyPath = str | os.PathLike[str]
@@ -144,13 +145,13 @@ def build_map(
         ConfigError: a setting is unknown (the nearest name is given), or has the wrong type or range.
         KeyboardInterrupt: Ctrl-C; what was finished is in `out` + `.partial`.
     """
-    from lhdmap.pipeline.build import BuildRequest, default_target
+    from lhdmap.pipeline.build import BuildRequest
     from lhdmap.pipeline.build import build_map as build
 
     logs = _logs(log)
     request = BuildRequest(
         logs=logs,
-        target=default_target(logs[0]) if out is None else _path(out, "out"),
+        target=beside(logs[0], "map") if out is None else _path(out, "out"),
         settings=_settings(settings),
         topics=dict(topics or {}),
         machine=machine if machine is None or isinstance(machine, Machine) else load_machine(_path(machine, "machine")),

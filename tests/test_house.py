@@ -26,8 +26,8 @@ ROOT = Path(__file__).resolve().parents[1]
 PACKAGE = ROOT / "lhdmap"
 
 FLOORS = [
-    {"errors"},
-    {"messages", "settings", "resources"},
+    {"errors", "interrupts"},
+    {"messages", "settings", "resources", "outputs"},
     {"geometry", "provenance"},
     {"trajectory"},
     {"machine", "mapfolder"},

@@ -6,8 +6,9 @@ import argparse
 from pathlib import Path
 from typing import Any
 
-from lhdmap.cli.build_map import topic_overrides
 from lhdmap.cli.console import Console
+from lhdmap.cli.options import add_output, add_poses, add_settings, add_topics, topic_overrides
+from lhdmap.outputs import beside, free_folder
 
 CLOUD_SUFFIXES = (".ply", ".pcd", ".laz", ".las")
 
@@ -17,13 +18,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "input", type=Path, metavar="LOG|CLOUD", help="log or bag folder, or a cloud (.ply, .pcd, .laz)"
     )
-    parser.add_argument("-o", "--output", type=Path, metavar="DIR", help="folder to make (default: beside the input)")
-    parser.add_argument("--config", type=Path, metavar="FILE.toml", help="settings over the defaults")
-    parser.add_argument(
-        "--set", action="append", default=[], metavar="section.key=value", help="one setting; repeatable"
-    )
-    parser.add_argument("--topic", action="append", default=[], metavar="role=/topic", help="topic of a role")
-    parser.add_argument("--poses", default="", metavar="FILE.tum", help="given poses: a TUM file, or ground-truth")
+    add_output(parser, "folder to make (default: LOG_pile beside the log; of a cloud, none)")
+    add_settings(parser)
+    add_topics(parser)
+    add_poses(parser)
     parser.add_argument("--machine", type=Path, metavar="FILE.toml", help="machine description")
     parser.add_argument(
         "--up", default="z", choices=("x", "y", "z", "-x", "-y", "-z"), help="of a cloud: the axis that points up"
@@ -41,10 +39,12 @@ def run(arguments: argparse.Namespace, console: Console) -> int:
     from lhdmap.report.pile_page import write_pile_report
     from lhdmap.report.pile_recording import write_pile_recording
 
+    target = arguments.output or beside(arguments.input, "pile")
+    free_folder(target, force=arguments.force, inputs=[arguments.input])
     settings = load_settings(arguments.config, arguments.set)
     machine = load_machine(arguments.machine) if arguments.machine else None
     report = identify(arguments.input, settings, arguments.poses, machine, topic_overrides(arguments.topic))
-    with MapFolderWriter(_target(arguments)) as folder:
+    with MapFolderWriter(target, force=arguments.force, inputs=[arguments.input]) as folder:
         values = report.to_json()
         folder.write_json("pile.json", values)
         write_pile_report(report, folder.path / "report.html", f"Ore pile, {arguments.input.name}")
@@ -65,10 +65,12 @@ def _run_cloud(arguments: argparse.Namespace, console: Console) -> int:
     given = [f"--{name}" for name in ("config", "set", "topic", "poses", "machine") if getattr(arguments, name)]
     if given:
         raise UsageError(f"{arguments.input}: {', '.join(given)} concern logs; a cloud takes --up and -o")
+    if arguments.output is not None:
+        free_folder(arguments.output, force=arguments.force, inputs=[arguments.input])
     estimate, more = run_cloud(arguments.input, arguments.up)
     values = estimate_json(estimate) | more
     if arguments.output is not None:
-        with MapFolderWriter(Path(arguments.output)) as folder:
+        with MapFolderWriter(arguments.output, force=arguments.force, inputs=[arguments.input]) as folder:
             folder.write_json("pile.json", values)
             path = folder.complete(MapInfo([arguments.input], {"up": arguments.up}, warnings=estimate.warnings))
         values |= {"folder": str(path)}
@@ -76,13 +78,6 @@ def _run_cloud(arguments: argparse.Namespace, console: Console) -> int:
         console.warn(text)
     console.result(values, _cloud_text(values))
     return 0
-
-
-def _target(arguments: argparse.Namespace) -> Path:
-    if arguments.output is not None:
-        return Path(arguments.output)
-    name = arguments.input.name.split(".")[0]
-    return Path(arguments.input).resolve().parent / f"{name}_pile"
 
 
 def _text(values: dict[str, Any], folder: Path) -> str:

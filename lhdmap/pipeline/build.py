@@ -4,19 +4,21 @@ from __future__ import annotations
 
 import os
 import time
+import warnings
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Literal
 
 from lhdmap.config import Settings, settings_table
-from lhdmap.errors import InputError
+from lhdmap.errors import InputError, LhdmapWarning
 from lhdmap.integration.cloud_io import write_cloud
 from lhdmap.logs.source import LogSource
 from lhdmap.machine import Machine
 from lhdmap.mapfolder import FRAMES, MapFolderWriter, MapInfo
 from lhdmap.messages import Message
+from lhdmap.outputs import free_folder
 from lhdmap.pipeline.beside import Beside, HelperDied, Here
 from lhdmap.pipeline.given import GROUND_TRUTH, given_rows
 from lhdmap.pipeline.inspection import Inspection, Inspector, PileBeside
@@ -28,6 +30,7 @@ from lhdmap.provenance import file_entry, source_entry
 from lhdmap.report.recording import Thinning
 from lhdmap.trajectory import Trajectory
 
+_ASKED = "interrupted: what was read so far is being written; Ctrl-C once more ends at once"
 _BESIDE_FROM_S = 60.0  # a process takes most of a second to start
 Progress = Callable[[Iterable[tuple[str, Message]], float], Iterable[tuple[str, Message]]]
 
@@ -38,6 +41,7 @@ class BuildRequest:
 
     `poses`: given poses for the cloud and the final trajectory (`given.given_rows`); empty: the odometry's.
     `helper`: whether a second process may look for the pile, record and report; what comes out is the same.
+    `force`: replace a map folder that is there. `recorded_as`: names of logs in `map.json`, where they are moved later.
     """
 
     logs: Sequence[Path]
@@ -49,6 +53,7 @@ class BuildRequest:
     poses: str = ""
     helper: bool = False
     force: bool = False
+    recorded_as: Mapping[Path, Path] = field(default_factory=dict)
 
     @property
     def inputs(self) -> Inputs:
@@ -70,13 +75,20 @@ def build_map(request: BuildRequest) -> BuildResult:
     """Read the logs, run the pipeline, write the map folder.
 
     Raises:
+        UsageError: the folder is there already.
         InputError: a log cannot be used, or holds no scan.
+        KeyboardInterrupt: Ctrl-C was pressed; what was finished is kept in the partial folder.
     """
     started = time.monotonic()
+    free_folder(request.target, force=request.force, inputs=request.logs)
     given = given_rows(request.poses, request.logs, request.topics) if request.poses else None
-    with LogSource(list(request.logs), request.topics) as source, MapFolderWriter(request.target) as folder:
+    with (
+        LogSource(list(request.logs), request.topics) as source,
+        MapFolderWriter(request.target, force=request.force, inputs=request.logs) as folder,
+    ):
         hashes, pool = _hash_in_background(request.logs)
-        with pool, _inspector(request, source, folder.path) as inspector:
+        interruption = Interruption()
+        with pool, _inspector(request, source, folder.path) as inspector, interruption.comes_first():
             primary: Literal["front", "points"] = "front" if "front" in source.roles else "points"
             pipeline = MappingPipeline(
                 request.settings,
@@ -85,33 +97,24 @@ def build_map(request: BuildRequest) -> BuildResult:
                 primary,
                 pile=PileBeside(inspector),
             )
-            interrupted = _run(pipeline, source, request.progress)
+            _run(pipeline, source, request.progress, interruption)
             folder.write_odometry(odometry_of(pipeline))  # an interruption of what follows must not lose it
             folder.write_diagnostics(pipeline.records.diagnostics())
             ways = ways_of(pipeline, given)
             folder.write_trajectory(ways.final)
             outcome = Outcome(request.inputs, source, pipeline, ways, started)
             beside_mib = _write(folder, request, source, outcome, inspector)
-        if interrupted:  # what was finished is kept under the partial name
-            raise KeyboardInterrupt
-        known = {path: future.result() for path, future in hashes.items()}
+        known = {path: _entry(request, path, future) for path, future in hashes.items()}
         figures = outcome.summary | cost(started, outcome.duration_s, beside_mib)  # the same in map.json and on screen
         info = MapInfo(request.logs, _options(request), figures, outcome.warnings, _frames(request))
         final = folder.complete(info, known)
     return BuildResult(final, figures | {"map": str(final)}, outcome.warnings, ways.final)
 
 
-def default_target(log: Path) -> Path:
-    """Return the folder beside the log that the map goes to."""
-    name = log.name
-    while "." in name[1:]:
-        name = name[: name.rindex(".")]
-    return log.resolve().parent / f"{name}_map"
-
-
-def _run(pipeline: MappingPipeline, source: LogSource, progress: Progress | None) -> bool:
-    """Send all messages through the stages; return whether Ctrl-C ended it: the stages then finish with what they have."""
-    interruption = Interruption()
+def _run(
+    pipeline: MappingPipeline, source: LogSource, progress: Progress | None, interruption: Interruption
+) -> None:
+    """Send all messages through the stages, until Ctrl-C: the stages then finish with what they have."""
     messages: Iterable[tuple[str, Message]] = source.messages([role for role in ROLES_READ if role in source.roles])
     if progress is not None:
         messages = progress(messages, source.duration_s)
@@ -120,11 +123,12 @@ def _run(pipeline: MappingPipeline, source: LogSource, progress: Progress | None
             pipeline.update(role, message)
             if interruption.asked:
                 break
+    if interruption.asked and len(pipeline.track):
+        warnings.warn(_ASKED, LhdmapWarning, stacklevel=2)
     pipeline.finish()
     if not len(pipeline.track):
         damage = f" ({source.damage[0]})" if source.damage else ""
         raise InputError(f"{source.paths[0]}: no usable scan in it{damage}; lhdmap doctor tells what is wrong")
-    return interruption.asked
 
 
 def _write(
@@ -134,6 +138,7 @@ def _write(
     shown = outcome.report(), outcome.pipeline.machine or Machine(bodies={})
     inspector.tell(Inspection.write, *shown)
     write_cloud(folder.path / "cloud.ply", outcome.cloud)
+    folder.finished(folder.path / "cloud.ply")
     if outcome.pile is not None:
         folder.write_json("pile.json", outcome.pile.to_json())
     try:
@@ -171,9 +176,13 @@ def _sweep_sink(inspector: Inspector) -> Callable[[str, int, Any], None]:
     return take
 
 
-def _hash_in_background(logs: Sequence[Path]) -> tuple[dict[Path, Any], ThreadPoolExecutor]:
+def _hash_in_background(logs: Sequence[Path]) -> tuple[dict[Path, Future[dict[str, Any]]], ThreadPoolExecutor]:
     pool = ThreadPoolExecutor(max_workers=1, thread_name_prefix="hash")
     return {path: pool.submit(source_entry, path) for path in logs}, pool
+
+
+def _entry(request: BuildRequest, path: Path, entry: Future[dict[str, Any]]) -> dict[str, Any]:
+    return entry.result() | {"path": str(request.recorded_as.get(path, path))}
 
 
 def _options(request: BuildRequest) -> dict[str, Any]:
