@@ -27,8 +27,8 @@ PACKAGE = ROOT / "lhdmap"
 
 FLOORS = [
     {"errors"},
-    {"messages", "settings", "resources"},
-    {"geometry", "trajectory", "provenance"},
+    {"messages", "settings", "resources", "interrupts"},
+    {"geometry", "trajectory", "provenance", "outputs"},
     {"machine", "mapfolder"},
     {"kinematics"},
     {"logs", "proprioception", "odometry", "integration"},
