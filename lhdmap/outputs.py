@@ -257,9 +257,13 @@ class OutputFiles:
         return path.with_name(f"partial.{path.name}")
 
     def __enter__(self) -> Self:
-        """Make the folders that the files go to."""
+        """Make the folders that the files go to; raises InputError where that fails."""
         for folder in {path.parent for path in self._paths}:
-            folder.mkdir(parents=True, exist_ok=True)
+            try:
+                folder.mkdir(parents=True, exist_ok=True)
+            except OSError as error:
+                reason = "is a file" if isinstance(error, FileExistsError) else error.strerror
+                raise InputError(f"{folder}: the output folder cannot be made: {reason}") from error
         self._drop()  # what a run that was killed has left
         self._end.enter_context(before_interrupt(self._drop))
         return self

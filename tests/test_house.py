@@ -26,9 +26,9 @@ ROOT = Path(__file__).resolve().parents[1]
 PACKAGE = ROOT / "lhdmap"
 
 FLOORS = [
-    {"errors", "interrupts"},
-    {"messages", "settings", "resources", "outputs"},
-    {"geometry", "provenance"},
+    {"errors"},
+    {"messages", "settings", "resources", "interrupts"},
+    {"geometry", "provenance", "outputs"},
     {"trajectory"},
     {"machine", "mapfolder"},
     {"kinematics"},

@@ -39,12 +39,12 @@ def run(arguments: argparse.Namespace, console: Console) -> int:
     from lhdmap.report.pile_page import write_pile_report
     from lhdmap.report.pile_recording import write_pile_recording
 
-    target = arguments.output or beside(arguments.input, "pile")
-    free_folder(target, force=arguments.force, inputs=[arguments.input])
     settings = load_settings(arguments.config, arguments.set)
     machine = load_machine(arguments.machine) if arguments.machine else None
-    report = identify(arguments.input, settings, arguments.poses, machine, topic_overrides(arguments.topic))
+    topics = topic_overrides(arguments.topic)
+    target = arguments.output or beside(arguments.input, "pile")
     with MapFolderWriter(target, force=arguments.force, inputs=[arguments.input]) as folder:
+        report = identify(arguments.input, settings, arguments.poses, machine, topics)
         values = report.to_json()
         folder.write_json("pile.json", values)
         write_pile_report(report, folder.path / "report.html", f"Ore pile, {arguments.input.name}")

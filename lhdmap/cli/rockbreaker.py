@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING, Any
 from lhdmap.cli.console import Console
 from lhdmap.cli.options import add_common, add_output, add_settings
 from lhdmap.errors import EvaluationShortfall, UsageError
-from lhdmap.outputs import free_folder
 
 if TYPE_CHECKING:
+    from lhdmap.mapfolder import MapFolderWriter
     from lhdmap.messages import FloatArray
     from lhdmap.rockbreaker.collision import Obstacles
     from lhdmap.rockbreaker.machine import Rockbreaker
@@ -102,11 +102,13 @@ class Outcome:
 
 def _run_plan(arguments: argparse.Namespace, console: Console, machine: Rockbreaker) -> int:
     from lhdmap.config import load_settings
+    from lhdmap.mapfolder import MapFolderWriter
 
     settings = load_settings(arguments.config, arguments.set)
-    free_folder(_target(arguments), force=arguments.force, inputs=_sources(arguments))
-    outcome = _plan(arguments, machine, settings.rockbreaker)
-    values = _write(arguments, settings, outcome)
+    sources = _sources(arguments)
+    with MapFolderWriter(_target(arguments), force=arguments.force, inputs=sources) as folder:
+        outcome = _plan(arguments, machine, settings.rockbreaker)
+        values = _write(folder, arguments, settings, outcome)
     failure = None if values["feasible"] else EvaluationShortfall(f"not feasible: {values['reason']['text']}")
     console.result(values, _text(values), failure=failure)
     return 0 if failure is None else failure.exit_code
@@ -230,24 +232,25 @@ def _finite(value: float, option: str) -> float:
     return value
 
 
-def _write(arguments: argparse.Namespace, settings: Any, outcome: Outcome) -> dict[str, Any]:
+def _write(
+    folder: MapFolderWriter, arguments: argparse.Namespace, settings: Any, outcome: Outcome
+) -> dict[str, Any]:
     """Write the folder; return the values with the paths in it."""
     from lhdmap.config import settings_table
-    from lhdmap.mapfolder import MapFolderWriter, MapInfo
+    from lhdmap.mapfolder import MapInfo
     from lhdmap.rockbreaker.table import joined, sampled, write_table
 
-    values = outcome.values
-    target, sources = _target(arguments), _sources(arguments)
-    with MapFolderWriter(target, force=arguments.force, inputs=sources) as folder:
-        rows = None
-        if values["feasible"]:
-            rows = joined([sampled(one, settings.rockbreaker.table_hz) for one in outcome.trajectories])
-            write_table(folder.path / "trajectory.csv", rows)
-        if not arguments.no_pictures:
-            _draw(folder.path, outcome, rows)
-        values |= {"csv": str(target / "trajectory.csv") if rows is not None else None, "folder": str(target)}
-        folder.write_json("plan.json", values)
-        folder.complete(MapInfo(sources, {"rockbreaker": settings_table(settings)["rockbreaker"]}, frames=FRAMES))
+    values, target = outcome.values, _target(arguments)
+    rows = None
+    if values["feasible"]:
+        rows = joined([sampled(one, settings.rockbreaker.table_hz) for one in outcome.trajectories])
+        write_table(folder.path / "trajectory.csv", rows)
+    if not arguments.no_pictures:
+        _draw(folder.path, outcome, rows)
+    values |= {"csv": str(target / "trajectory.csv") if rows is not None else None, "folder": str(target)}
+    folder.write_json("plan.json", values)
+    options = {"rockbreaker": settings_table(settings)["rockbreaker"]}
+    folder.complete(MapInfo(_sources(arguments), options, frames=FRAMES))
     return values
 
 
@@ -299,8 +302,6 @@ def _run_workspace(arguments: argparse.Namespace, console: Console, machine: Roc
 
     at_m = np.array(numbers(arguments.at, 3, "--at")) if arguments.at is not None else None
     target, sources = _target(arguments), [arguments.machine] if arguments.machine else []
-    if not arguments.no_pictures:
-        free_folder(target, force=arguments.force, inputs=sources)
     values = workspace_json(machine, at_m)
     if not arguments.no_pictures:
         with MapFolderWriter(target, force=arguments.force, inputs=sources) as folder:

@@ -88,7 +88,7 @@ def _recording(arguments: argparse.Namespace, folder: Path, console: Console) ->
         if found is not None:
             return found
         if kind_of(path) is not None or (path / "map.json").exists():
-            raise InputError(f"{path}: the folder has no recording (.rrd); make it anew with the command that made it")
+            raise InputError(f"{path}: the folder has no recording.rrd; make it anew with the command that made it")
     return _recorded_log(arguments, folder, console)
 
 
