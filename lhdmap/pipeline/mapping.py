@@ -239,7 +239,8 @@ class MappingPipeline:
             if self.clouds is not None:
                 self._process_cloud(self.clouds, scan, stamp_ns)
             return
-        if _says_nothing(scan, stamp_ns - self._before_ns):
+        in_bunches = self.odometry is not None and self.odometry.clock.bunched
+        if _says_nothing(scan, stamp_ns - self._before_ns) and not (in_bunches and scan.ranges_m.size):
             self.records.add_scan(scan.stamp_ns, max(stamp_ns, self._time_ns + 1))
             return
         self._before_ns = stamp_ns

@@ -120,7 +120,7 @@ def test_a_log_whose_scans_are_all_blind_is_refused_as_by_doctor(
             writer.write(source.roles[role], [message] if isinstance(message, Mount) else message)
     with pytest.raises(InputError, match=r"blind\.mcap: /lidar/front/scan: dead: only 0\.0 % of the beams"):
         build_map(BuildRequest([tmp_path / "blind.mcap"], tmp_path / "map"))
-    with pytest.raises(InputError, match=r"blind\.mcap: its scans hold no hit"):
+    with pytest.raises(InputError, match=r"blind\.mcap: no scan fitted"):
         build_map(BuildRequest([tmp_path / "blind.mcap"], tmp_path / "forced", force=True))
 
 
