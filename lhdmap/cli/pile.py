@@ -90,9 +90,9 @@ def _text(values: dict[str, Any], folder: Path) -> str:
     lines = [f"folder       {folder}", *_measures(values)]
     distance_m = values["distance_at_decision_m"]
     if distance_m is not None:
-        lines.append(f"decided      {distance_m:.1f} m before the toe")
-    elif not values["identified"]:
-        lines.append("decided      no: not identified")
+        lines.append(f"decided      {distance_m:.1f} m before the toe (the foot of the pile)")
+    elif values["status"] not in (None, "none"):
+        lines.append(f"decided      no: it was never sure enough that it is {values['status']}")
     if len(values["piles"]) > 1:
         statuses = ", ".join(one["status"] for one in values["piles"])
         lines.append(f"on the drive {statuses}: in pile.json, piles")
@@ -100,8 +100,7 @@ def _text(values: dict[str, Any], folder: Path) -> str:
 
 
 def _measures(values: dict[str, Any]) -> list[str]:
-    chance = values["probabilities"][values["status"]]
-    lines = [f"status       {values['status']} ({100 * chance:.0f} %)"]
+    lines = [f"status       {_status(values)}"]
     if values["width_m"] is not None:
         lines.append(f"width        {values['width_m']:.2f} m{_deviation(values['width_std_m'], 2)}")
     if values["inclination_deg"] is not None:
@@ -112,6 +111,17 @@ def _measures(values: dict[str, Any]) -> list[str]:
         lines.append(f"volume seen  {values['volume_m3']:.1f} m³{_deviation(values['volume_std_m3'], 1)}")
     lines.extend(f"boulder      {one['size_m']:.1f} m" for one in values["boulders"])
     return lines
+
+
+def _status(values: dict[str, Any]) -> str:
+    """Return the status with what is known of it: its probability, or why there is none."""
+    status, shares = values["status"], values["probabilities"]
+    if status is None:
+        return f"unknown: {values['reason']}"
+    if status == "none" and shares[status] < max(shares.values()):
+        return "none: what lies ahead is not known well enough to be called anything"
+    words = "none: nothing closes the drift" if status == "none" and "piles" in values else status
+    return f"{words} ({100 * shares[status]:.0f} %)"
 
 
 def _over(values: dict[str, Any]) -> str:

@@ -18,13 +18,15 @@ from lhdmap.machine import Machine
 from lhdmap.mapfolder import FRAMES, MapFolderWriter, MapInfo
 from lhdmap.messages import Message
 from lhdmap.pipeline.beside import Beside, HelperDied, Here
+from lhdmap.pipeline.compiling import CompileClock
 from lhdmap.pipeline.given import GROUND_TRUTH, given_rows
-from lhdmap.pipeline.inspection import Inspection, Inspector, PileBeside
+from lhdmap.pipeline.inspection import Inspection, Inspector, PileBeside, Spent, peak_memory_mib
 from lhdmap.pipeline.interruption import Interruption
 from lhdmap.pipeline.mapping import MappingPipeline
 from lhdmap.pipeline.mounts import machine_of
 from lhdmap.pipeline.outcome import ROLES_READ, Inputs, Outcome, cost, odometry_of, ways_of
 from lhdmap.provenance import file_entry, source_entry
+from lhdmap.report.page import fill_in_cost
 from lhdmap.report.recording import Thinning
 from lhdmap.trajectory import Trajectory
 
@@ -52,7 +54,7 @@ class BuildRequest:
     @property
     def inputs(self) -> Inputs:
         """What the map is made of."""
-        return Inputs(self.logs, self.settings, self.topics, self.target.name, bool(self.poses))
+        return Inputs(self.logs, self.settings, self.topics, self.target.name, self.poses)
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,9 +73,9 @@ def build_map(request: BuildRequest) -> BuildResult:
     Raises:
         InputError: a log cannot be used, or holds no scan.
     """
-    started = time.monotonic()
+    started, compiling = time.monotonic(), CompileClock()
     given = given_rows(request.poses, request.logs, request.topics) if request.poses else None
-    with LogSource(list(request.logs), request.topics) as source, MapFolderWriter(request.target) as folder:
+    with compiling, LogSource(list(request.logs), request.topics) as source, MapFolderWriter(request.target) as folder:
         hashes, pool = _hash_in_background(request.logs)
         with pool, _inspector(request, source, folder.path) as inspector:
             primary: Literal["front", "points"] = "front" if "front" in source.roles else "points"
@@ -89,14 +91,17 @@ def build_map(request: BuildRequest) -> BuildResult:
             folder.write_diagnostics(pipeline.records.diagnostics())
             ways = ways_of(pipeline, given)
             folder.write_trajectory(ways.final)
-            outcome = Outcome(request.inputs, source, pipeline, ways, started)
-            beside_mib = _write(folder, request, source, outcome, inspector)
+            outcome = Outcome(request.inputs, source, pipeline, ways)
+            beside = _write(folder, request, source, outcome, inspector)
         if interrupted:  # what was finished is kept under the partial name
             raise KeyboardInterrupt
-        info = MapInfo(request.logs, _options(request), outcome.summary, outcome.warnings, _frames(request))
-        final = folder.complete(info, {path: future.result() for path, future in hashes.items()})
-    summary = outcome.summary | {"map": str(final)} | cost(started, outcome.duration_s, beside_mib)
-    return BuildResult(final, summary, outcome.warnings, ways.final)
+        known = {path: future.result() for path, future in hashes.items()}
+        own = Spent(peak_memory_mib(), compiling.seconds)
+        figures = outcome.summary | cost(started, outcome.duration_s, own, beside)  # the same in map.json, page, on screen
+        fill_in_cost(folder.path / "report.html", figures)
+        info = MapInfo(request.logs, _options(request), figures, outcome.warnings, _frames(request))
+        final = folder.complete(info, known)
+    return BuildResult(final, figures | {"map": str(final)}, outcome.warnings, ways.final)
 
 
 def _run(pipeline: MappingPipeline, source: LogSource, progress: Progress | None) -> bool:
@@ -119,21 +124,21 @@ def _run(pipeline: MappingPipeline, source: LogSource, progress: Progress | None
 
 def _write(
     folder: MapFolderWriter, request: BuildRequest, source: LogSource, outcome: Outcome, inspector: Inspector
-) -> float:
-    """Write the rest of the map but `map.json`; return the memory that a process beside this one took, MiB."""
+) -> Spent:
+    """Write the rest of the map but `map.json`; return what a process beside this one needed."""
     shown = outcome.report(), outcome.pipeline.machine or Machine(bodies={})
     inspector.tell(Inspection.write, *shown)
     write_cloud(folder.path / "cloud.ply", outcome.cloud)
     if outcome.pile is not None:
         folder.write_json("pile.json", outcome.pile.to_json())
     try:
-        peak_mib = inspector.ask(Inspection.peak_memory_mib)
+        spent = inspector.ask(Inspection.spent)
     except HelperDied as error:
         outcome.warnings.append(f"{error}; the recording has no scans in it")
         with _inspection(Here, request, source, folder.path) as here:
             here.ask(Inspection.write, *shown)
-        return 0.0
-    return peak_mib if isinstance(inspector, Beside) else 0.0
+        return Spent()
+    return spent if isinstance(inspector, Beside) else Spent()
 
 
 def _inspector(request: BuildRequest, source: LogSource, folder: Path) -> Inspector:

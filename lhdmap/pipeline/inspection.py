@@ -6,18 +6,27 @@ import resource as process_resource
 import sys
 import threading
 from pathlib import Path
+from typing import NamedTuple
 
 from lhdmap.config import Settings
 from lhdmap.machine import Machine
 from lhdmap.messages import FloatArray
 from lhdmap.pile.result import PileReport
 from lhdmap.pipeline.beside import Beside, Here
+from lhdmap.pipeline.compiling import CompileClock
 from lhdmap.pipeline.pile import PileWatch, PlacedScan
 from lhdmap.report import charts
 from lhdmap.report.data import ReportData
 from lhdmap.report.page import write_report
 from lhdmap.report.pile_recording import add_pile
 from lhdmap.report.recording import RecordingWriter, record_run
+
+
+class Spent(NamedTuple):
+    """What a process has needed: the most memory that it had in RAM (MiB), and how long it compiled (s)."""
+
+    memory_mib: float = 0.0
+    compile_s: float = 0.0
 
 
 class Inspection:
@@ -28,6 +37,7 @@ class Inspection:
         self._pile = PileWatch(settings)
         self._recording = RecordingWriter(folder / "recording.rrd", title, start_ns)
         self._written = False
+        self._compiling = CompileClock().start()
         threading.Thread(target=charts.load, name="charts").start()
 
     def look(self, scan: PlacedScan) -> None:
@@ -51,12 +61,13 @@ class Inspection:
         self._written = True
         write_report(data, self._folder / "report.html")
 
-    def peak_memory_mib(self) -> float:
-        """Return the most memory that the process has had in RAM, MiB."""
-        return peak_memory_mib()
+    def spent(self) -> Spent:
+        """Return what the process has needed."""
+        return Spent(peak_memory_mib(), self._compiling.seconds)
 
     def close(self) -> None:
         """Close the recording; what was recorded before an interruption is kept."""
+        self._compiling.stop()
         if not self._written:
             self._recording.close()
 

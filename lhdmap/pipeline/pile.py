@@ -15,6 +15,10 @@ from lhdmap.pile.figure9_stage import Figure9Stage
 from lhdmap.pile.result import PileReport
 from lhdmap.pile.stage import PileStage, ScanHits
 
+OFF = "no pile was looked for: pile.method is off"
+NO_FRONT = "no pile was looked for: there is no front scanner in the log; lhdmap pile looks in the cloud of a 3D scanner"
+NO_INCLINOMETER = "no pile was looked for: there is no inclinometer in the log"
+
 
 class PlacedScan(NamedTuple):
     """A front scan and where it was taken.
@@ -63,7 +67,9 @@ class PileWatch:
 
     def report(self) -> PileReport:
         """Return what is said of the pile so far."""
-        return PileReport(None, None, method=self._method) if self._stage is None else self._stage.report()
+        if self._stage is None:
+            return PileReport(None, None, method=self._method, reason=OFF)
+        return self._stage.report()
 
 
 @nb.njit(cache=True, nogil=True)
