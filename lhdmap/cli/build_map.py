@@ -109,14 +109,15 @@ def summary_text(summary: dict[str, Any]) -> str:
     """Return the result in words."""
     from lhdmap.report.text import cost_line, duration
 
-    pile = summary["pile"] or summary["pile_reason"]
+    reason = str(summary["pile_reason"]).replace("no pile was looked for", "not looked for")
+    pile = summary["pile"].replace("_", " ") if summary["pile"] else reason
     return "\n".join(
         [
             f"map          {summary['map']}",
             f"report       {Path(summary['map']) / 'report.html'}",
             f"drive        {summary['distance_m']:.1f} m in {duration(summary['duration_s'])}",
             *_ways(summary),
-            f"pile         {pile.replace('_', ' ') if summary['pile'] else pile}",
+            f"pile         {pile}",
             f"run          {cost_line(summary)}",
         ]
     )

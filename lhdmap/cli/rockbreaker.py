@@ -230,7 +230,7 @@ def _write(arguments: argparse.Namespace, settings: Any, outcome: Outcome) -> di
     """Write the folder; return the values with the paths in it."""
     from lhdmap.config import settings_table
     from lhdmap.mapfolder import MapFolderWriter, MapInfo
-    from lhdmap.rockbreaker.table import joined, sampled, write_table
+    from lhdmap.rockbreaker.table import UNITS, joined, sampled, write_table
 
     values = outcome.values
     target = (arguments.output or Path("rockbreaker_plan")).resolve()
@@ -242,9 +242,8 @@ def _write(arguments: argparse.Namespace, settings: Any, outcome: Outcome) -> di
             write_table(folder.path / "trajectory.csv", rows)
         if not arguments.no_pictures:
             _draw(folder.path, outcome, rows)
-        final = folder.path.with_name(folder.path.name.removesuffix(".partial"))
-        values |= {"csv": str(final / "trajectory.csv") if rows is not None else None, "folder": str(final)}
-        folder.write_json("plan.json", values)
+        csv = "trajectory.csv" if rows is not None else None  # a folder may be moved: in it, names only
+        folder.write_json("plan.json", values | {"csv": csv, "csv_columns": UNITS})
         path = folder.complete(
             MapInfo(sources, {"rockbreaker": settings_table(settings)["rockbreaker"]}, frames=FRAMES)
         )

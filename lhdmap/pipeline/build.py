@@ -97,7 +97,9 @@ def build_map(request: BuildRequest) -> BuildResult:
             raise KeyboardInterrupt
         known = {path: future.result() for path, future in hashes.items()}
         own = Spent(peak_memory_mib(), compiling.seconds)
-        figures = outcome.summary | cost(started, outcome.duration_s, own, beside)  # the same in map.json, page, on screen
+        figures = outcome.summary | cost(
+            started, outcome.duration_s, own, beside
+        )  # the same in map.json, page, on screen
         fill_in_cost(folder.path / "report.html", figures)
         info = MapInfo(request.logs, _options(request), figures, outcome.warnings, _frames(request))
         final = folder.complete(info, known)

@@ -56,7 +56,7 @@ class Inspection:
         """Complete the recording and write the report."""
         record_run(self._recording, data, machine)
         if data.pile is not None:
-            add_pile(self._recording, data.pile)
+            add_pile(self._recording, data.pile, said=data.warnings)
         self._recording.close()
         self._written = True
         write_report(data, self._folder / "report.html")

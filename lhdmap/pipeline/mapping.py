@@ -93,7 +93,9 @@ class MappingPipeline:
         self._cloud = cloud
         self.rear = RearScans(self.mounts, self.wheels, machine or _DEFAULT_MACHINE)
         self.has_inclinometer = False
-        self.wheel_sources: Counter[str] = Counter()  # of how many scans wheels told the motion, by the sensors that did
+        self.wheel_sources: Counter[str] = (
+            Counter()
+        )  # of how many scans wheels told the motion, by the sensors that did
         self._newest_ns = self._time_ns = -(2**62)
         self._clock_ns = -(2**62)
         self._scan_ns = (self._clock_ns, self._clock_ns)  # of the newest scan: its stamp, and that made rising

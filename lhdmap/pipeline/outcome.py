@@ -216,7 +216,9 @@ def _moments(pipeline: MappingPipeline) -> tuple[npt.NDArray[np.int64], npt.NDAr
 
 def _topic_rows(source: LogSource, inputs: Inputs) -> list[TopicRow]:
     used = {topic: role for role, topic in source.roles.items()}
-    read = (*_ROLES_PLACED, "ground_truth")[: None if inputs.poses == GROUND_TRUTH else -1] if inputs.poses else ROLES_READ
+    read = (
+        (*_ROLES_PLACED, "ground_truth")[: None if inputs.poses == GROUND_TRUTH else -1] if inputs.poses else ROLES_READ
+    )
     rows = []
     for inventory in source.inventory():
         for topic in inventory.topics.values():

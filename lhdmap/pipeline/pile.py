@@ -16,7 +16,9 @@ from lhdmap.pile.result import PileReport
 from lhdmap.pile.stage import PileStage, ScanHits
 
 OFF = "no pile was looked for: pile.method is off"
-NO_FRONT = "no pile was looked for: there is no front scanner in the log; lhdmap pile looks in the cloud of a 3D scanner"
+NO_FRONT = (
+    "no pile was looked for: there is no front scanner in the log; lhdmap pile looks in the cloud of a 3D scanner"
+)
 NO_INCLINOMETER = "no pile was looked for: there is no inclinometer in the log"
 
 

@@ -45,7 +45,9 @@ TERMS = (
         "of many stretches of the same length.",
         r"mean drift|drift is not corrected|drift between",
     ),
-    Term("drift, the tunnel", "A horizontal tunnel in a mine.", r"(the|a|smooth) drift\b(?! (of|itself|is not|between))"),
+    Term(
+        "drift, the tunnel", "A horizontal tunnel in a mine.", r"(the|a|smooth) drift\b(?! (of|itself|is not|between))"
+    ),
     Term(
         "face",
         "The surface of the pile, or of whatever closes the drift, that the machine looks at.",
@@ -65,7 +67,11 @@ TERMS = (
         "key scan",
         "A scan that is kept, so that its place can be recognised when the machine comes there again.",
     ),
-    Term("limits E_L, E_R", "The left and right end of the pile's toe, at the walls; the width is what lies between.", "E_L"),
+    Term(
+        "limits E_L, E_R",
+        "The left and right end of the pile's toe, at the walls; the width is what lies between.",
+        "E_L",
+    ),
     Term(
         "loop closure",
         "A place that was recognised when the machine came there a second time. It shows the drift since the first time, which is "

@@ -86,7 +86,9 @@ def normals_chart(report: PileReport, pile: PileEstimate) -> Figure:
     axes.grid(visible=False)
     for side in axes.spines.values():
         side.set_visible(False)
-    bar = figure.colorbar(image, cax=axes.inset_axes((1.015, 0.05, 0.018, 0.9)), label="n_y: left wall -1, pile 0, right wall +1")
+    bar = figure.colorbar(
+        image, cax=axes.inset_axes((1.015, 0.05, 0.018, 0.9)), label="n_y: left wall -1, pile 0, right wall +1"
+    )
     bar.ax.grid(visible=False)
     charts.legend_above(axes)
     return figure

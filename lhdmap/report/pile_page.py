@@ -67,7 +67,9 @@ def pile_sections(report: PileReport, *, drawn: bool = False, said: Collection[s
         return unsought_section(pile.reason, warned)
     parts = [markup.section("Ore pile", markup.cards(_figures(report)) + markup.listed(warned, "warning"))]
     if not pile.found or (pile.status == "none" and not drawn):
-        return "".join([*parts, markup.paragraph("No face was found that closes the drift, so there is nothing to draw.")])
+        return "".join(
+            [*parts, markup.paragraph("No face was found that closes the drift, so there is nothing to draw.")]
+        )
     if pile.status == "none":
         words = "What stands ahead is drawn all the same, so that one sees why it is none; face and toe are what a fit made of it."
         parts.append(markup.paragraph(words))

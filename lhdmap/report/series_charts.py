@@ -47,7 +47,7 @@ def deviation_chart(data: ReportData, diagnostics: Diagnostics) -> Figure:
     figure = charts.new_figure(5.0)
     figure.subplots_adjust(hspace=0.22)
     panels = figure.subplots(3, 1, sharex=True)
-    seen = ~np.asarray(diagnostics.degenerate, dtype=bool)
+    seen, given = ~np.asarray(diagnostics.degenerate, dtype=bool), _given(diagnostics)
     rows = (
         ("along, mm", 1e3 * deviations(diagnostics.information_along), charts.FINAL, _MOST_MM),
         ("across, mm", 1e3 * deviations(diagnostics.information_across), charts.ODOMETRY, _MOST_MM),
@@ -55,11 +55,12 @@ def deviation_chart(data: ReportData, diagnostics: Diagnostics) -> Figure:
     )
     time_s = _seconds(diagnostics.stamp_ns, data)
     for axes, (label, values, colour, most) in zip(panels, rows, strict=True):
+        values = np.where(given, np.nan, values)
         top = _top(values, seen, most)
         charts.shade(axes, time_s, diagnostics.degenerate, "a direction was not observed")
         axes.plot(*charts.envelope(time_s, np.minimum(values, 0.985 * top)), color=colour, linewidth=1.0)
         axes.set(ylabel=label, ylim=(0.0, top))
-        axes.yaxis.set_label_coords(-0.055, 0.5)
+        axes.yaxis.set_label_coords(-0.065, 0.5)
     panels[-1].set_xlabel("time since the first scan, s")
     panels[-1].set_xlim(0.0, max(float(_seconds(data.trajectory.stamps_ns[-1:], data)[0]), 1.0))
     charts.legend_above(panels[0])
@@ -70,6 +71,12 @@ def deviations(information: FloatArray) -> FloatArray:
     """Return the standard deviation of each information (M,): one over its root, infinite where there is none."""
     with np.errstate(divide="ignore"):
         return np.where(np.isnan(information), np.nan, 1.0 / np.sqrt(np.maximum(information, 0.0)))
+
+
+def _given(diagnostics: Diagnostics) -> npt.NDArray[np.bool_]:
+    """Return which scans were matched with nothing, as the first one is: information that is alike in all directions is set."""
+    along, across = np.asarray(diagnostics.information_along), np.asarray(diagnostics.information_across)
+    return (along == across) & (across == np.asarray(diagnostics.information_heading)) & (along > 0.0)
 
 
 def _top(values: FloatArray, seen: npt.NDArray[np.bool_], most: float) -> float:

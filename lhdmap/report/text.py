@@ -86,7 +86,9 @@ def missing_parts(data: ReportData) -> list[str]:
     sentences = [] if data.poses else _missing_of_odometry(data)
     if data.cloud is None or not len(data.cloud.points_m):
         sentences.append("No cloud was integrated.")
-    if data.evaluation is None:
+    if data.poses:
+        sentences.append("The map is as accurate as the given poses are.")
+    elif data.evaluation is None:
         sentences.append("No ground truth was given: the accuracy of this map was not measured.")
     return sentences
 
@@ -108,10 +110,16 @@ def _missing_of_odometry(data: ReportData) -> list[str]:
 
 def weak_motion(witness: str) -> str:
     """Return where the motion in a direction comes from that the scans do not show."""
-    return f"motion there came from the {witness} or was carried on" if witness else "motion there was carried on from before"
+    return (
+        f"motion there came from the {witness} or was carried on"
+        if witness
+        else "motion there was carried on from before"
+    )
 
 
 def _processed(s: Summary) -> str:
+    if s.scans_processed == s.scans:
+        return "of the front scanner, all of them matched"
     share = f" ({100 * s.scans_processed / s.scans:.0f} %)" if s.scans else ""
     return (
         f"of the front scanner; {s.scans_processed} of them{share} were matched, the adaptive rate passed over the rest"
