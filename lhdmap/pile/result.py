@@ -109,9 +109,7 @@ class PileReport:
         """What is said of the pile: the last estimate, without measures where it is none; unknown where none was looked for."""
         if self.last is not None:
             return _of_a_pile(self.last.estimate)
-        if self.reason or not self.history:
-            return PileEstimate.unknown(self.reason or "no pile was looked for: no scan has a pose")
-        return PileEstimate()
+        return PileEstimate.unknown(self.reason) if self.reason else PileEstimate()
 
     def to_json(self) -> dict[str, Any]:
         """Return the content of `pile.json`: the last estimate, and when and how far away it was decided.

@@ -18,13 +18,13 @@ from lhdmap.machine import Machine
 from lhdmap.mapfolder import FRAMES, MapFolderWriter, MapInfo
 from lhdmap.messages import Message
 from lhdmap.pipeline.beside import Beside, HelperDied, Here
-from lhdmap.pipeline.compiling import CompileClock
+from lhdmap.pipeline.cost import CompileClock, Spent, cost, peak_memory_mib
 from lhdmap.pipeline.given import GROUND_TRUTH, given_rows
-from lhdmap.pipeline.inspection import Inspection, Inspector, PileBeside, Spent, peak_memory_mib
+from lhdmap.pipeline.inspection import Inspection, Inspector, PileBeside
 from lhdmap.pipeline.interruption import Interruption
 from lhdmap.pipeline.mapping import MappingPipeline
 from lhdmap.pipeline.mounts import machine_of
-from lhdmap.pipeline.outcome import ROLES_READ, Inputs, Outcome, cost, odometry_of, ways_of
+from lhdmap.pipeline.outcome import ROLES_READ, Inputs, Outcome, odometry_of, ways_of
 from lhdmap.provenance import file_entry, source_entry
 from lhdmap.report.page import fill_in_cost
 from lhdmap.report.recording import Thinning

@@ -2,31 +2,22 @@
 
 from __future__ import annotations
 
-import resource as process_resource
-import sys
 import threading
 from pathlib import Path
-from typing import NamedTuple
 
 from lhdmap.config import Settings
 from lhdmap.machine import Machine
 from lhdmap.messages import FloatArray
 from lhdmap.pile.result import PileReport
 from lhdmap.pipeline.beside import Beside, Here
-from lhdmap.pipeline.compiling import CompileClock
+from lhdmap.pipeline.cost import CompileClock, Spent, peak_memory_mib
 from lhdmap.pipeline.pile import PileWatch, PlacedScan
 from lhdmap.report import charts
 from lhdmap.report.data import ReportData
 from lhdmap.report.page import write_report
 from lhdmap.report.pile_recording import add_pile
-from lhdmap.report.recording import RecordingWriter, record_run
-
-
-class Spent(NamedTuple):
-    """What a process has needed: the most memory that it had in RAM (MiB), and how long it compiled (s)."""
-
-    memory_mib: float = 0.0
-    compile_s: float = 0.0
+from lhdmap.report.recording import RecordingWriter
+from lhdmap.report.run_recording import record_run
 
 
 class Inspection:
@@ -88,9 +79,3 @@ class PileBeside:
     def report(self) -> PileReport:
         """Return what it says of the pile."""
         return self._inspector.ask(Inspection.pile)
-
-
-def peak_memory_mib() -> float:
-    """Return the most memory that this process has had in RAM, MiB."""
-    unit = 1024.0**2 if sys.platform == "darwin" else 1024.0
-    return process_resource.getrusage(process_resource.RUSAGE_SELF).ru_maxrss / unit

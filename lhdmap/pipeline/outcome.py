@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import time
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -22,7 +21,6 @@ from lhdmap.pile.result import PileReport
 from lhdmap.pipeline.beside import HelperDied
 from lhdmap.pipeline.given import GROUND_TRUTH
 from lhdmap.pipeline.identify import identify_along
-from lhdmap.pipeline.inspection import Spent
 from lhdmap.pipeline.mapping import MappingPipeline
 from lhdmap.pipeline.pile import NO_FRONT, NO_INCLINOMETER, OFF, PileSink
 from lhdmap.pipeline.said import said_once
@@ -192,20 +190,6 @@ def integrate_again(inputs: Inputs, pipeline: MappingPipeline, rows: Rows) -> Sw
                 sweeps.add_final(role, time_ns, message, track, wheels)
     sweeps.wait(track, wheels)
     return sweeps
-
-
-def cost(started: float, duration_s: float, own: Spent, beside: Spent) -> dict[str, float]:
-    """Return what a run that `started` at a monotonic time has cost, with what this process and one beside it needed.
-
-    `compile_s`: of the time, what went into compiling; two processes compile at the same time, so the longer one counts.
-    """
-    wall_s = max(time.monotonic() - started, 1e-6)
-    return {
-        "wall_s": wall_s,
-        "realtime_factor": duration_s / wall_s,
-        "peak_memory_mib": own.memory_mib + beside.memory_mib,
-        "compile_s": min(max(own.compile_s, beside.compile_s), wall_s),
-    }
 
 
 def _moments(pipeline: MappingPipeline) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.int64]]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import NamedTuple, Protocol
 
 import numba as nb
@@ -19,6 +20,7 @@ OFF = "no pile was looked for: pile.method is off"
 NO_FRONT = (
     "no pile was looked for: there is no front scanner in the log; lhdmap pile looks in the cloud of a 3D scanner"
 )
+NO_SCAN = "no pile was looked for: no scan of the front scanner has a pose"
 NO_INCLINOMETER = "no pile was looked for: there is no inclinometer in the log"
 
 
@@ -71,7 +73,8 @@ class PileWatch:
         """Return what is said of the pile so far."""
         if self._stage is None:
             return PileReport(None, None, method=self._method, reason=OFF)
-        return self._stage.report()
+        report = self._stage.report()
+        return report if report.history or report.piles else replace(report, reason=NO_SCAN)
 
 
 @nb.njit(cache=True, nogil=True)

@@ -80,7 +80,7 @@ TERMS = (
     ),
     Term(
         "lost stretch",
-        "A run of scans that did not fit the map so far. Their poses are carried on from the motion before, so the map may be bent "
+        "Scans in a row that did not fit the map so far. Their poses are carried on from the motion before: the map may be bent "
         "there.",
     ),
     Term(
@@ -117,7 +117,7 @@ TERMS = (
     Term(
         "status of a pile",
         "loadable: can be loaded; too shallow: too flat to fill a bucket; hang up: too steep or overhanging, rock may come down; "
-        "wall: bare rock closes the drift; none: nothing closes it. Unknown (null): nothing was looked for, and a reason says why.",
+        "wall: bare rock closes the drift; none: nothing closes it. Unknown (null): a reason says why.",
         r"Ore pile",
     ),
     Term(

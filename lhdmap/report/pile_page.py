@@ -32,7 +32,7 @@ NORMALS = (
     "The cloud from behind and above the machine. The normal of a surface is the direction that it faces; n_y is the part of it "
     "along the axis y, which points to the left (small axes: x into the pile, y to the left, z up). The left wall faces right "
     "(n_y = -1, blue), the right wall faces left (n_y = +1, red), pile and floor face the machine or the roof (n_y near 0, pale). "
-    "A red and a blue patch side by side on the face are the flanks of something that stands out of it. As Fig. 10 of the paper on "
+    "A red and a blue patch side by side on the face are the flanks of something that stands out. As Fig. 10 of the paper on "
     "autonomous loading."
 )
 CONVERGENCE = "How the estimate came about on the way to the pile, bands of two standard deviations; dashed: where it was decided."
@@ -115,8 +115,8 @@ def _figures(report: PileReport) -> Iterator[tuple[str, str, str]]:
     if report.decision is not None:
         distance, status = f"{report.decision.distance_m:.1f} m", _words(report.decision.estimate)
         meaning = (
-            f"decided {distance} before the toe, the foot of the pile: so far away the machine was when it was sure enough that this "
-            f"is {status}; what it saw later went into the figures"
+            f"decided {distance} before the toe, the foot of the pile: so far away the machine was when it was sure enough that "
+            f"this is {status}; what it saw later went into the figures"
         )
         yield "before the pile", distance, meaning
     elif pile.status != "none":

@@ -21,13 +21,13 @@ from lhdmap.integration.cloud import Cloud
 from lhdmap.machine import Machine
 from lhdmap.mapfolder import Diagnostics
 from lhdmap.messages import Float32Array, FloatArray
-from lhdmap.report.data import ReportData
-from lhdmap.report.recording_layout import RUN_CURVES, blueprint
+from lhdmap.report.recording_layout import RUN_CURVES, blueprint, whole_of
 from lhdmap.settings import setting
 from lhdmap.trajectory import Trajectory
 
 APPLICATION = "lhdmap"
 TIMELINE = "time"
+SCAN = 0xF2F2F2FF
 Stamps = npt.NDArray[np.int64]
 _VIRIDIS = np.array([[59, 82, 139], [33, 145, 140], [94, 201, 98], [253, 231, 37]], dtype=float)
 
@@ -39,14 +39,6 @@ class PathStyle(NamedTuple):
     colour: str
     rgba: int
     label_at: float
-
-
-FINAL_PATH = PathStyle("final path", "blue", 0x2F86C9FF, 0.5)
-GIVEN_PATH = FINAL_PATH._replace(label="path, as given")
-ODOMETRY_PATH = PathStyle("odometry alone", "orange", 0xE69F00FF, 0.25)
-SCAN = 0xF2F2F2FF
-_APART_M = 0.05  # paths that are nearer are one line on screen
-_STRAY = 0.5  # of the map's extent: points that are farther away than this do not count for the view
 
 
 @dataclass(frozen=True, slots=True)
@@ -285,41 +277,3 @@ def _palette() -> npt.NDArray[np.uint32]:
     steps = np.linspace(0, len(_VIRIDIS) - 1, 256)
     r, g, b = (np.interp(steps, range(len(_VIRIDIS)), _VIRIDIS[:, i]).astype(np.uint32) for i in range(3))
     return r << 24 | g << 16 | b << 8 | np.uint32(255)
-
-
-def whole_of(points_m: Float32Array) -> FloatArray:
-    """Return lower and upper corner (2, 3) of points (N, 3): of all of them, unless a few stray ones are far from the rest."""
-    low, high = points_m.min(axis=0).astype(float), points_m.max(axis=0).astype(float)
-    core = np.percentile(points_m[:: max(1, len(points_m) // 20_000)], [0.5, 99.5], axis=0)
-    reach = _STRAY * np.maximum(core[1] - core[0], 5.0)
-    return np.array([np.maximum(low, core[0] - reach), np.minimum(high, core[1] + reach)])
-
-
-def _apart(one: Trajectory, other: Trajectory) -> bool:
-    """Return whether two paths can be told apart on screen."""
-    if one.positions_m.shape != other.positions_m.shape:
-        return True
-    return bool(np.abs(one.positions_m - other.positions_m).max(initial=0.0) > _APART_M)
-
-
-def record_run(writer: RecordingWriter, data: ReportData, machine: Machine) -> None:
-    """Record all that a finished run knows; the scans and texts of the run itself are in `writer` already."""
-    writer.add_motion(data.trajectory, machine)
-    writer.add_path("final", data.trajectory, GIVEN_PATH if data.poses else FINAL_PATH)
-    if data.odometry is not None and _apart(data.odometry, data.trajectory):
-        writer.add_path("odometry", data.odometry, ODOMETRY_PATH)
-    if data.articulation is not None and len(data.articulation.stamps_ns):
-        writer.add_articulation(*data.articulation, machine)
-    if data.cloud is not None:
-        writer.add_cloud(data.cloud)
-    if data.odometry_speed is not None:
-        writer.add_curve("motion/speed/odometry", *data.odometry_speed, 0x2F86C9FF, "odometry, m/s")
-    if data.tachometer_speed is not None:
-        writer.add_curve("motion/speed/tachometer", *data.tachometer_speed, 0xD55E00FF, "tachometer, m/s")
-    if data.diagnostics is not None and len(data.diagnostics.stamp_ns):
-        writer.add_diagnostics(data.diagnostics)
-    slip = data.slip()
-    if slip is not None:
-        writer.add_curve("motion/slip", slip.stamps_ns, 100.0 * slip.share, 0xD55E00FF, "slip, %")
-    for text in data.warnings:
-        writer.add_text(text)

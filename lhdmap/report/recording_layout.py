@@ -8,11 +8,12 @@ from typing import Any
 
 import numpy as np
 
-from lhdmap.messages import FloatArray
+from lhdmap.messages import Float32Array, FloatArray
 
 FIELD_OF_VIEW_RAD = 0.9  # of the viewer, upright
 ASPECT, PLAN_ASPECT = 1.6, 2.5  # of the two views in a window of usual shape
 _MARGIN = 1.06
+_STRAY = 0.5  # of the map's extent: points that are farther away than this do not count for the view
 Curves = tuple[tuple[str, tuple[str, ...]], ...]
 RUN_CURVES: Curves = (
     ("Speed, m/s", ("motion/speed/**",)),
@@ -76,3 +77,11 @@ def eye_of(bounds_m: FloatArray, *, oblique: bool) -> tuple[FloatArray, FloatArr
     high = np.abs(corners @ np.cross(back, right)) / upright
     away = float((np.maximum(across, high) + corners @ back).max())
     return target + _MARGIN * away * back, target
+
+
+def whole_of(points_m: Float32Array) -> FloatArray:
+    """Return lower and upper corner (2, 3) of points (N, 3): of all of them, unless a few stray ones are far from the rest."""
+    low, high = points_m.min(axis=0).astype(float), points_m.max(axis=0).astype(float)
+    core = np.percentile(points_m[:: max(1, len(points_m) // 20_000)], [0.5, 99.5], axis=0)
+    reach = _STRAY * np.maximum(core[1] - core[0], 5.0)
+    return np.array([np.maximum(low, core[0] - reach), np.minimum(high, core[1] + reach)])

@@ -12,7 +12,8 @@ from lhdmap.integration.cloud import Cloud
 from lhdmap.machine import Machine
 from lhdmap.messages import Joints, LaserScan, Mount, Tachometer
 from lhdmap.report.log_recording import LogRecorder
-from lhdmap.report.recording import RecordingSettings, RecordingWriter, record_run
+from lhdmap.report.recording import RecordingSettings, RecordingWriter
+from lhdmap.report.run_recording import record_run
 
 from tests.report.synthetic import START_NS, drive, report_data
 
