@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import heapq
+from collections import deque
 
 import numpy as np
 
@@ -10,6 +11,7 @@ from lhdmap.logs.finding import Finding, Severity
 from lhdmap.logs.stamps import TopicStamps
 
 _SAMPLES = 4096
+_WINDOW = 20  # messages over which bursts even out
 _LONGEST = 50
 _GAP_PERIODS, _GAP_LEAST_S = 4.0, 0.3
 _OFFSET_S, _OFFSET_SPREAD_S = 1.0, 0.5
@@ -22,6 +24,8 @@ class StampWatch:
         self.topic = topic
         self._last_ns: int | None = None
         self._steps: list[int] = []
+        self._spans: list[int] = []
+        self._window: deque[int] = deque(maxlen=_WINDOW + 1)
         self._stride, self.count = 1, 0
         self._longest: list[tuple[int, int]] = []
 
@@ -31,10 +35,13 @@ class StampWatch:
         if last is None:
             return
         step = stamp_ns - last
+        self._window.append(stamp_ns)
         if self.count % self._stride == 0:
             self._steps.append(step)
+            if len(self._window) > _WINDOW:
+                self._spans.append(stamp_ns - self._window[0])
             if len(self._steps) >= _SAMPLES:
-                self._steps, self._stride = self._steps[::2], 2 * self._stride
+                self._steps, self._spans, self._stride = self._steps[::2], self._spans[::2], 2 * self._stride
         self.count += 1
         if len(self._longest) < _LONGEST:
             heapq.heappush(self._longest, (step, last))
@@ -54,7 +61,8 @@ class StampWatch:
         period_s = self.period_s
         if not period_s or period_s <= 0:
             return []
-        usual_s = max(period_s, float(np.mean(self._steps)) / 1e9)  # the mean counts where messages come in bursts
+        in_bursts_s = float(np.median(self._spans)) / 1e9 / _WINDOW if self._spans else 0.0
+        usual_s = max(period_s, in_bursts_s)
         limit_ns = max(_GAP_PERIODS * usual_s, _GAP_LEAST_S) * 1e9
         gaps = [(step, at) for step, at in self._longest if step > limit_ns]
         if not gaps:

@@ -7,15 +7,16 @@ import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, Literal, TypeVar
 
 from lhdmap.config import Settings, settings_table
 from lhdmap.errors import InputError
 from lhdmap.integration.cloud_io import write_cloud
 from lhdmap.logs.source import LogSource
 from lhdmap.machine import Machine
-from lhdmap.mapfolder import FRAMES, MapFolderWriter, MapInfo
+from lhdmap.mapfolder import FRAMES, Diagnostics, MapFolderWriter, MapInfo
 from lhdmap.messages import Message
 from lhdmap.pipeline.beside import Beside, HelperDied, Here
 from lhdmap.pipeline.cost import CompileClock, Spent, cost, peak_memory_mib
@@ -31,6 +32,7 @@ from lhdmap.report.recording import Thinning
 from lhdmap.trajectory import Trajectory
 
 _BESIDE_FROM_S = 60.0  # a process takes most of a second to start
+_Stamped = TypeVar("_Stamped", Trajectory, Diagnostics)
 Progress = Callable[[Iterable[tuple[str, Message]], float], Iterable[tuple[str, Message]]]
 
 
@@ -40,6 +42,7 @@ class BuildRequest:
 
     `poses`: given poses for the cloud and the final trajectory (`given.given_rows`); empty: the odometry's.
     `helper`: whether a second process may look for the pile, record and report; what comes out is the same.
+    `force`: whether a log that the survey calls unusable is tried nevertheless.
     """
 
     logs: Sequence[Path]
@@ -50,11 +53,12 @@ class BuildRequest:
     progress: Progress | None = None
     poses: str = ""
     helper: bool = False
+    force: bool = False
 
     @property
     def inputs(self) -> Inputs:
         """What the map is made of."""
-        return Inputs(self.logs, self.settings, self.topics, self.target.name, self.poses)
+        return Inputs(self.logs, self.settings, self.topics, self.target.name, self.poses, self.force)
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,7 +79,11 @@ def build_map(request: BuildRequest) -> BuildResult:
     """
     started, compiling = time.monotonic(), CompileClock()
     given = given_rows(request.poses, request.logs, request.topics) if request.poses else None
-    with compiling, LogSource(list(request.logs), request.topics) as source, MapFolderWriter(request.target) as folder:
+    with (
+        compiling,
+        LogSource(list(request.logs), request.topics, force=request.force) as source,
+        MapFolderWriter(request.target) as folder,
+    ):
         hashes, pool = _hash_in_background(request.logs)
         with pool, _inspector(request, source, folder.path) as inspector:
             primary: Literal["front", "points"] = "front" if "front" in source.roles else "points"
@@ -87,10 +95,13 @@ def build_map(request: BuildRequest) -> BuildResult:
                 pile=PileBeside(inspector),
             )
             interrupted = _run(pipeline, source, request.progress)
-            folder.write_odometry(odometry_of(pipeline))  # an interruption of what follows must not lose it
-            folder.write_diagnostics(pipeline.records.diagnostics())
+            as_recorded = partial(source.recorded_ns, primary)
+            # An interruption of what follows must not lose it.
+            folder.write_odometry(_stamped(odometry_of(pipeline), as_recorded))
+            folder.write_diagnostics(_stamped(pipeline.records.diagnostics(), as_recorded))
             ways = ways_of(pipeline, given)
-            folder.write_trajectory(ways.final)
+            final = _stamped(ways.final, as_recorded)
+            folder.write_trajectory(final)
             outcome = Outcome(request.inputs, source, pipeline, ways)
             beside = _write(folder, request, source, outcome, inspector)
         if interrupted:  # what was finished is kept under the partial name
@@ -99,11 +110,19 @@ def build_map(request: BuildRequest) -> BuildResult:
         own = Spent(peak_memory_mib(), compiling.seconds)
         figures = outcome.summary | cost(
             started, outcome.duration_s, own, beside
-        )  # the same in map.json, page, on screen
+        )  # the same in page, map.json, on screen
         fill_in_cost(folder.path / "report.html", figures)
-        info = MapInfo(request.logs, _options(request), figures, outcome.warnings, _frames(request))
-        final = folder.complete(info, known)
-    return BuildResult(final, figures | {"map": str(final)}, outcome.warnings, ways.final)
+        path = folder.complete(
+            MapInfo(request.logs, _options(request), figures, outcome.warnings, _frames(request)), known
+        )
+    return BuildResult(path, figures | {"map": str(path)}, outcome.warnings, final)
+
+
+def _stamped(rows: _Stamped, stamps_of: Callable[[Any], Any]) -> _Stamped:
+    """Return poses or diagnostics under the stamps that their scans have in the log."""
+    if isinstance(rows, Trajectory):
+        return rows._replace(stamps_ns=stamps_of(rows.stamps_ns))
+    return rows._replace(stamp_ns=stamps_of(rows.stamp_ns))
 
 
 def _run(pipeline: MappingPipeline, source: LogSource, progress: Progress | None) -> bool:

@@ -42,13 +42,15 @@ _HOLE_S, _HOLE_M = 1.0, 2.0
 
 
 class Inputs(NamedTuple):
-    """What a map is made of: logs, settings, topics by role, title of the map, and the poses that were given (`given_rows`)."""
+    """What a map is made of: logs, settings, topics by role, title of the map; the poses that were given (`given_rows`), and
+    whether bad logs are tried."""
 
     logs: Sequence[Path]
     settings: Settings
     topics: Mapping[str, str]
     title: str
     poses: str = ""
+    force: bool = False
 
 
 class Ways(NamedTuple):
@@ -178,7 +180,7 @@ def integrate_again(inputs: Inputs, pipeline: MappingPipeline, rows: Rows) -> Sw
     sweeps = SweepIntegration(inputs.settings, pipeline.machine, pipeline.mounts, None)
     wheels = WheelOdometry(inputs.settings.wheels, pipeline.machine or Machine())
     track, times, sweep_times = FinalTrack(rows), iter(pipeline.records.times_ns), SweepTimes()
-    with LogSource(list(inputs.logs), inputs.topics) as source:
+    with LogSource(list(inputs.logs), inputs.topics, force=inputs.force) as source:
         for role, message in source.messages(
             [role for role in ("front", "rear", "points", "joints") if role in source.roles]
         ):
