@@ -13,7 +13,7 @@ from numba.core import event
 _EVENT = "numba:compile"  # kernels that come from the cache on disk do not raise it
 
 
-class CompileClock(event.Listener):  # type: ignore[misc]  # numba has no types
+class CompileClock(event.Listener):
     """Counts the seconds in which this process compiled, from `start` to `stop`; a kernel within a kernel counts once."""
 
     def __init__(self) -> None:
@@ -23,12 +23,12 @@ class CompileClock(event.Listener):  # type: ignore[misc]  # numba has no types
 
     def start(self) -> Self:
         """Begin to listen."""
-        event.register(_EVENT, self)
+        event.register(_EVENT, self)  # type: ignore[no-untyped-call]
         return self
 
     def stop(self) -> None:
         """Listen no longer."""
-        event.unregister(_EVENT, self)
+        event.unregister(_EVENT, self)  # type: ignore[no-untyped-call]
 
     def __enter__(self) -> Self:
         return self.start()

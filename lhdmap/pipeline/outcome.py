@@ -42,8 +42,7 @@ _HOLE_S, _HOLE_M = 1.0, 2.0
 
 
 class Inputs(NamedTuple):
-    """What a map is made of: logs, settings, topics by role, title of the map; the poses that were given (`given_rows`), and
-    whether bad logs are tried."""
+    """What a map is made of: logs, settings, topics by role, title of the map, given poses; whether bad logs are tried."""
 
     logs: Sequence[Path]
     settings: Settings

@@ -112,7 +112,8 @@ def _triad(axes: Axes, half_m: float) -> None:
         (start, end), _ = _projected(np.vstack([origin, origin + length * np.array(axis)]))
         arrow = {"arrowstyle": "-|>", "color": charts.INK, "linewidth": 1.4, "shrinkA": 0.0, "shrinkB": 0.0}
         axes.annotate("", end, start, arrowprops=arrow, annotation_clip=False)
-        axes.text(*(end + 0.14 * (end - start)), name, ha="center", va="center", fontsize=10.0)
+        x, y = end + 0.14 * (end - start)
+        axes.text(x, y, name, ha="center", va="center", fontsize=10.0)
 
 
 def _projected(local_m: FloatArray) -> tuple[FloatArray, FloatArray]:

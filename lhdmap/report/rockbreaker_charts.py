@@ -119,7 +119,7 @@ def plan_chart(trajectories: Sequence[Trajectory], machine: Rockbreaker, scene: 
         )
         axes.plot(*way[0, :2], "o", color=COLOURS[number], markersize=9 - 4 * (number > 0))
         axes.plot(*way[-1, :2], "s", color=COLOURS[number], markersize=6)
-        middle, shift = way[len(way) // 2, :2], (14.0, -4.0 - 12.0 * (number == 0))
+        middle, shift = tuple(way[len(way) // 2, :2].tolist()), (14.0, -4.0 - 12.0 * (number == 0))
         words = step_name(number) + _upright(way)
         axes.annotate(words, middle, shift, textcoords="offset points", color=COLOURS[number], fontsize=9.0)
     axes.plot(0.0, 0.0, "^", color=charts.INK, markersize=8, label="swing axis")
@@ -166,8 +166,8 @@ def side_chart(trajectories: Sequence[Trajectory], machine: Rockbreaker, scene: 
             share = (k + 1) / len(theta)
             x, z = np.concatenate([[[0.0, 0.0], [0.0, machine.base.height_m]], joints[:, [0, 2]]]).T
             label = step_name(number) if k + 1 == len(theta) else None
-            look = {"alpha": 0.12 + 0.88 * share**3, "linewidth": 1.0 + 2.0 * share * (number + 1 == len(trajectories))}
-            axes.plot(x, z, color=COLOURS[number], label=label, **look)
+            width, alpha = 1.0 + 2.0 * share * (number + 1 == len(trajectories)), 0.12 + 0.88 * share**3
+            axes.plot(x, z, color=COLOURS[number], label=label, alpha=alpha, linewidth=width)
     axes.set(aspect="equal", xlabel="distance from the swing axis, m", ylabel="z, m")
     charts.legend_above(axes, columns=5)
     return figure
