@@ -24,15 +24,6 @@ COST = {
     "peak_memory_mib": 842.4,
     "compile_s": 0.0,
 }
-    "scans": 300,
-    "scans_processed": 75,
-    "distance_m": 30.0,
-    "wall_s": 60.0,
-    "realtime_factor": 2.0,
-    "peak_memory_mib": 842.4,
-    "compile_s": 0.0,
-    "duration_s": 120.0,
-}
 
 
 @pytest.fixture(scope="module")
