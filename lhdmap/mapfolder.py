@@ -22,6 +22,7 @@ import numpy.typing as npt
 from lhdmap import __version__
 from lhdmap.errors import InputError, UsageError
 from lhdmap.messages import FloatArray
+from lhdmap.names import shown
 from lhdmap.provenance import file_entry, sha256_of, source_entry
 from lhdmap.trajectory import Trajectory, read_tum, write_tum
 
@@ -103,7 +104,8 @@ class MapFolderWriter:
 
         columns = diagnostics._asdict() | {"substitute": pa.array(list(diagnostics.substitute), pa.string())}
         path = self.path / "diagnostics.parquet"
-        pq.write_table(pa.table(columns), path, compression="zstd")
+        with path.open("wb") as file:
+            pq.write_table(pa.table(columns), file, compression="zstd")
         return path
 
     def write_json(self, name: str, values: Mapping[str, Any]) -> Path:
@@ -218,7 +220,8 @@ class MapFolder:
 
         path = self.file("diagnostics.parquet")
         try:
-            table = pq.read_table(path, columns=list(Diagnostics._fields))
+            with path.open("rb") as file:
+                table = pq.read_table(file, columns=list(Diagnostics._fields))
             columns = {name: table.column(name).to_numpy() for name in Diagnostics._fields}
         except (pa.ArrowException, OSError, KeyError) as error:
             raise InputError(f"{path}: not readable as diagnostics ({error})") from error
@@ -258,11 +261,11 @@ def _write_json(path: Path, values: Mapping[str, Any]) -> Path:
 def _plain(value: Any) -> Any:
     """Return numpy values, paths and tuples as what JSON knows; what is not finite as null."""
     if isinstance(value, Mapping):
-        return {str(key): _plain(item) for key, item in value.items()}
+        return {shown(key): _plain(item) for key, item in value.items()}
     if isinstance(value, (list, tuple)):
         return [_plain(item) for item in value]
     if isinstance(value, (np.generic, np.ndarray)):
         return _plain(value.tolist())
     if isinstance(value, float) and not math.isfinite(value):
         return None
-    return value if value is None or isinstance(value, (bool, int, float, str)) else str(value)
+    return value if value is None or isinstance(value, (bool, int, float)) else shown(value)

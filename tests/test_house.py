@@ -27,8 +27,9 @@ PACKAGE = ROOT / "lhdmap"
 
 FLOORS = [
     {"errors"},
-    {"messages", "settings", "resources"},
-    {"geometry", "trajectory", "provenance"},
+    {"messages", "settings", "resources", "names"},
+    {"geometry", "tables", "provenance"},
+    {"trajectory"},
     {"machine", "mapfolder"},
     {"kinematics"},
     {"logs", "proprioception", "odometry", "integration"},

@@ -9,6 +9,7 @@ from typing import Any
 
 from lhdmap.cli.console import Console
 from lhdmap.errors import UsageError
+from lhdmap.names import beside
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -50,7 +51,7 @@ def run(arguments: argparse.Namespace, console: Console) -> int:
 
     request = BuildRequest(
         logs=arguments.logs,
-        target=arguments.output or default_target(arguments.logs[0]),
+        target=arguments.output or beside(arguments.logs[0], "map"),
         settings=load_settings(arguments.config, arguments.set),
         topics=topic_overrides(arguments.topic),
         machine=load_machine(arguments.machine) if arguments.machine else None,
@@ -63,14 +64,6 @@ def run(arguments: argparse.Namespace, console: Console) -> int:
         console.warn(text)
     console.result(result.summary | {"warnings": result.warnings}, summary_text(result.summary))
     return 0
-
-
-def default_target(log: Path) -> Path:
-    """Return the folder beside the log that the map goes to."""
-    name = log.name
-    while "." in name[1:]:
-        name = name[: name.rindex(".")]
-    return log.resolve().parent / f"{name}_map"
 
 
 def topic_overrides(words: Iterable[str]) -> dict[str, str]:

@@ -9,6 +9,8 @@ import time
 from collections.abc import Iterable, Iterator, Mapping
 from typing import Any, TypeVar
 
+from lhdmap.names import shown
+
 T = TypeVar("T")
 _TELLING_SHARE = 0.05  # before that the time is start-up (the first run compiles), and says nothing of the rest
 
@@ -24,21 +26,21 @@ class Console:
     def note(self, text: str) -> None:
         """Print a line of information on standard error."""
         if not self.quiet:
-            print(text, file=sys.stderr)
+            print(shown(text), file=sys.stderr)
 
     def warn(self, text: str) -> None:
         """Print a warning once."""
         if text not in self._warned:
             self._warned.add(text)
-            print(f"warning: {text}", file=sys.stderr)
+            print(f"warning: {shown(text)}", file=sys.stderr)
 
     def error(self, text: str) -> None:
         """Print an error."""
-        print(f"lhdmap: {text}", file=sys.stderr)
+        print(f"lhdmap: {shown(text)}", file=sys.stderr)
 
     def result(self, values: Mapping[str, Any], text: str) -> None:
         """Print the result: the JSON object with `--json`, the text otherwise."""
-        print(json.dumps(_plain(values), allow_nan=False) if self.json else text)
+        print(json.dumps(_plain(values), allow_nan=False) if self.json else shown(text))
 
     def progress(self, items: Iterable[T], *, total: float, label: str, position: Any) -> Iterator[T]:
         """Yield `items`, showing rate and time left: a bar on a terminal, a plain line every 10 s otherwise.
@@ -59,7 +61,7 @@ class _Meter:
     """A progress line that costs nothing between its updates."""
 
     def __init__(self, label: str, total: float, *, terminal: bool) -> None:
-        self._label, self._total, self._terminal = label, max(total, 1e-9), terminal
+        self._label, self._total, self._terminal = shown(label), max(total, 1e-9), terminal
         self._start = self._shown = time.monotonic()
         self._interval = 0.2 if terminal else 10.0
         self._calls = 0
@@ -92,9 +94,11 @@ class _Meter:
 def _plain(value: Any) -> Any:
     """Return the value with numpy scalars and arrays as plain ones and what is not finite as null."""
     if isinstance(value, Mapping):
-        return {str(key): _plain(item) for key, item in value.items()}
+        return {shown(key): _plain(item) for key, item in value.items()}
     if isinstance(value, (list, tuple)):
         return [_plain(item) for item in value]
+    if isinstance(value, str):
+        return shown(value)
     if hasattr(value, "tolist"):
         return _plain(value.tolist())
     if isinstance(value, float) and not math.isfinite(value):

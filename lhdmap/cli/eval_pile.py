@@ -26,8 +26,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         type=Path,
         required=True,
         metavar="T.csv",
-        help="attempt,log,gt_width_m,gt_inclination_deg and optionally gt_status, pred_width_m, pred_inclination_deg; logs "
-        "relative to the file are run unless predictions are given",
+        help="attempt,gt_width_m,gt_inclination_deg and log or pred_width_m,pred_inclination_deg, optionally gt_status; the log "
+        "(relative to the file) of a line without prediction is run",
     )
     parser.add_argument("--config", type=Path, metavar="FILE.toml", help="settings over the defaults")
     parser.add_argument(
@@ -53,8 +53,8 @@ def run(arguments: argparse.Namespace, console: Console) -> int:
     from lhdmap.evaluation.pile_truth import read_pile_truth
 
     truth = read_pile_truth(arguments.truth)
-    runner = None if truth.has_predictions else _runner(arguments)
-    if truth.has_predictions and (arguments.config or arguments.set or arguments.poses or arguments.at != "end"):
+    runner = _runner(arguments) if truth.needs_run else None
+    if runner is None and (arguments.config or arguments.set or arguments.poses or arguments.at != "end"):
         raise UsageError(
             f"{arguments.truth} holds predictions, so no log is run: leave out --config, --set, --poses and --at, or its "
             "columns pred_…"
@@ -93,7 +93,7 @@ def _collect(
             console.warn(f"attempt {row.attempt.name}: {row.problem}")
         elif row.reason:
             console.warn(f"attempt {row.attempt.name}: {row.attempt.log}: no status: {row.reason}")
-        elif runner is not None:
+        elif runner is not None and truth.is_run(row.attempt):
             console.note(
                 f"{len(rows)} of {len(truth.attempts)}: {row.attempt.log}: {row.found.status or 'not identified'}"
             )

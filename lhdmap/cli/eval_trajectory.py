@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import argparse
+import warnings
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from lhdmap.cli.console import Console
-from lhdmap.errors import EvaluationShortfall, UsageError
+from lhdmap.errors import EvaluationShortfall, LhdmapWarning, UsageError
 
 if TYPE_CHECKING:
     from lhdmap.evaluation.metrics import Segment, Statistics
@@ -70,11 +71,18 @@ def run(arguments: argparse.Namespace, console: Console) -> int:
     if arguments.max_relation_m is not None or arguments.max_relation_deg is not None:
         raise UsageError("--max-relation-… needs --truth FILE.relations")
     settings = _settings(arguments)
-    estimate = load_estimate(arguments.estimate, odometry=arguments.odometry)
-    found = evaluate_trajectory(estimate, load_truth(arguments.truth), settings)
+    with warnings.catch_warnings(record=True) as told:
+        warnings.simplefilter("always", LhdmapWarning)
+        estimate = load_estimate(arguments.estimate, odometry=arguments.odometry)
+        truth = load_truth(arguments.truth)
+    read = [str(one.message) for one in told if issubclass(one.category, LhdmapWarning)]
+    for text in read:
+        console.warn(text)
+    found = evaluate_trajectory(estimate, truth, settings)
     for warning in found.warnings:
         console.note(f"note: {warning}")
-    console.result(found.to_json(), trajectory_table(found))
+    values = found.to_json()
+    console.result(values | {"warnings": [*read, *values["warnings"]]}, trajectory_table(found))
     if arguments.plot:
         from lhdmap.report.evaluation_plot import plot_evaluation
 

@@ -8,6 +8,7 @@ from typing import Any
 
 from lhdmap.cli.build_map import topic_overrides
 from lhdmap.cli.console import Console
+from lhdmap.names import beside, name_of
 
 CLOUD_SUFFIXES = (".ply", ".pcd", ".laz", ".las")
 
@@ -15,7 +16,7 @@ CLOUD_SUFFIXES = (".ply", ".pcd", ".laz", ".las")
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options of `lhdmap pile`."""
     parser.add_argument(
-        "input", type=Path, metavar="LOG|CLOUD", help="log or bag folder, or a cloud (.ply, .pcd, .laz)"
+        "input", type=Path, metavar="LOG|CLOUD", help="log or bag folder, or a cloud (.ply, .pcd, .las, .laz)"
     )
     parser.add_argument("-o", "--output", type=Path, metavar="DIR", help="folder to make (default: beside the input)")
     parser.add_argument("--config", type=Path, metavar="FILE.toml", help="settings over the defaults")
@@ -44,11 +45,11 @@ def run(arguments: argparse.Namespace, console: Console) -> int:
     settings = load_settings(arguments.config, arguments.set)
     machine = load_machine(arguments.machine) if arguments.machine else None
     report = identify(arguments.input, settings, arguments.poses, machine, topic_overrides(arguments.topic))
-    with MapFolderWriter(_target(arguments)) as folder:
+    with MapFolderWriter(arguments.output or beside(arguments.input, "pile")) as folder:
         values = report.to_json()
         folder.write_json("pile.json", values)
-        write_pile_report(report, folder.path / "report.html", f"Ore pile, {arguments.input.name}")
-        write_pile_recording(report, folder.path / "pile.rrd", arguments.input.name)
+        write_pile_report(report, folder.path / "report.html", f"Ore pile, {name_of(arguments.input)}")
+        write_pile_recording(report, folder.path / "pile.rrd", name_of(arguments.input))
         path = folder.complete(MapInfo([arguments.input], settings_table(settings), warnings=values["warnings"]))
     for text in values["warnings"]:
         console.warn(text)
@@ -67,6 +68,7 @@ def _run_cloud(arguments: argparse.Namespace, console: Console) -> int:
         raise UsageError(f"{arguments.input}: {', '.join(given)} concern logs; a cloud takes --up and -o")
     estimate, more = run_cloud(arguments.input, arguments.up)
     values = estimate_json(estimate) | more
+    values["reason"] = values["reason"] or None
     if arguments.output is not None:
         with MapFolderWriter(Path(arguments.output)) as folder:
             folder.write_json("pile.json", values)
@@ -76,13 +78,6 @@ def _run_cloud(arguments: argparse.Namespace, console: Console) -> int:
         console.warn(text)
     console.result(values, _cloud_text(values))
     return 0
-
-
-def _target(arguments: argparse.Namespace) -> Path:
-    if arguments.output is not None:
-        return Path(arguments.output)
-    name = arguments.input.name.split(".")[0]
-    return Path(arguments.input).resolve().parent / f"{name}_pile"
 
 
 def _text(values: dict[str, Any], folder: Path) -> str:

@@ -12,6 +12,7 @@ from pathlib import Path
 
 from lhdmap.cli.console import Console
 from lhdmap.errors import InputError, UsageError
+from lhdmap.names import in_utf8, name_of
 
 WINDOW = "1600x1000"
 SCREENSHOT_LIMIT_S = 180.0
@@ -69,7 +70,7 @@ def _recorded_log(arguments: argparse.Namespace, folder: Path, console: Console)
     from lhdmap.logs.source import LogSource
     from lhdmap.report.log_recording import LogRecorder
 
-    target: Path = arguments.output or folder / f"{arguments.path.stem}.rrd"
+    target: Path = arguments.output or folder / "log.rrd"
     if target.exists():
         raise UsageError(f"{target}: is there already; name another file with -o")
     with LogSource(arguments.path, _overrides(arguments.topic)) as source:
@@ -80,7 +81,7 @@ def _recorded_log(arguments: argparse.Namespace, folder: Path, console: Console)
             label="reading",
             position=lambda item: (item[1].stamp_ns - start_ns) / 1e9,
         )
-        recorder = LogRecorder(target, arguments.path.name)
+        recorder = LogRecorder(target, name_of(arguments.path))
         for role, message in messages:
             recorder.update(role, message)
         recorder.finish([*source.damage, *source.warnings])
@@ -113,7 +114,8 @@ def _viewer(*options: str) -> list[str]:
 
 def _open_window(recording: Path) -> int:
     """Run the viewer until its window is closed."""
-    return 0 if subprocess.run(_viewer(str(recording)), check=False).returncode == 0 else InputError.exit_code  # noqa: S603
+    with in_utf8(recording) as opened:
+        return 0 if subprocess.run(_viewer(str(opened)), check=False).returncode == 0 else InputError.exit_code  # noqa: S603
 
 
 def _serve(recording: Path, arguments: argparse.Namespace, console: Console) -> int:
@@ -123,7 +125,10 @@ def _serve(recording: Path, arguments: argparse.Namespace, console: Console) -> 
     console.result({"recording": str(recording), "url": url}, f"open {url}  (Ctrl-C ends)")
     sys.stdout.flush()
     ports = ("--port", str(data_port), "--web-viewer-port", str(arguments.port))
-    with subprocess.Popen(_viewer("--bind", host, "--serve-web", *ports, str(recording))) as viewer:  # noqa: S603
+    with (
+        in_utf8(recording) as opened,
+        subprocess.Popen(_viewer("--bind", host, "--serve-web", *ports, str(opened))) as viewer,  # noqa: S603
+    ):
         try:
             exit_code = viewer.wait()
         finally:  # after Ctrl-C too, nothing serves any more once the command has ended
@@ -141,9 +146,9 @@ def _screenshot(recording: Path, target: Path) -> None:
         InputError: the viewer could not draw.
     """
     target.unlink(missing_ok=True)
-    command = _viewer("--headless", "--screenshot-to", str(target), "--window-size", WINDOW, "-")
     try:
-        with recording.open("rb") as data:
+        with recording.open("rb") as data, in_utf8(target) as drawn:
+            command = _viewer("--headless", "--screenshot-to", str(drawn), "--window-size", WINDOW, "-")
             done = subprocess.run(  # noqa: S603
                 command, stdin=data, capture_output=True, text=True, check=False, timeout=SCREENSHOT_LIMIT_S
             )

@@ -150,7 +150,7 @@ class StatusSummary(NamedTuple):
 
 
 def evaluate_pile(truth: PileTruth, run: Runner | None = None, *, at_decision: bool = False) -> Iterator[PileRow]:
-    """Yield one row an attempt: from the predictions of the file, or by running the logs where there are none.
+    """Yield one row an attempt: from its prediction in the file, or by running its log where it has none.
 
     Args:
         truth: what was read.
@@ -158,7 +158,7 @@ def evaluate_pile(truth: PileTruth, run: Runner | None = None, *, at_decision: b
         at_decision: take the estimate of the moment of decision, not the last one (which is what `pile.json` holds).
     """
     for attempt in truth.attempts:
-        if truth.has_predictions or run is None:
+        if run is None or not truth.is_run(attempt):
             yield PileRow(attempt, attempt.predicted, judged=truth.has_statuses)
             continue
         try:

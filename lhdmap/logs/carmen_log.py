@@ -136,6 +136,18 @@ def _remark(found: CarmenSurvey, lasers: list[str], notes: Findings) -> None:
         if name in found.no_return_m:
             notes.add(f"{name}: {found.no_return_m[name]:g} m stands for no return; ranges count up to "
                       f"{found.range_max_m[name]:g} m")  # fmt: skip
-        if name in ("FLASER", "RLASER") and len(first.ranges_m) % 2 == 0:
-            last_deg = math.degrees(first.angle_min_rad + (len(first.ranges_m) - 1) * first.angle_increment_rad)
-            notes.add(f"{name}: {len(first.ranges_m)} beams for 180 deg: the last beam is taken at {last_deg:+.1f} deg")
+        if name in ("FLASER", "RLASER"):
+            _remark_fov(name, first, notes)
+
+
+def _remark_fov(name: str, first: lines.LaserLine, notes: Findings) -> None:
+    beams, fov_deg = len(first.ranges_m), math.degrees(first.fov_rad)
+    step_deg = math.degrees(first.angle_increment_rad)
+    if not lines.has_known_fov(beams):
+        notes.add(
+            f"{name}: its field of view is a guess: {beams} beams are no scanner that CARMEN knows, {fov_deg:.0f} deg in steps of "
+            f"{step_deg:.3g} are assumed"
+        )
+    elif beams % 2 == 0:
+        last_deg = math.degrees(first.angle_min_rad) + (beams - 1) * step_deg
+        notes.add(f"{name}: {beams} beams for {fov_deg:.0f} deg: the last beam is taken at {last_deg:+.4g} deg")

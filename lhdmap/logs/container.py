@@ -24,9 +24,10 @@ class Contents(NamedTuple):
 
 
 class Container(Protocol):
-    """An open file of messages."""
+    """An open file of messages; `remarks`: what is odd but usable in how they are stored."""
 
     format: str
+    remarks: Findings
 
     def contents(self) -> Contents:
         """Return the table of contents; where the file has none that can be trusted, read through it once."""
@@ -47,6 +48,9 @@ class BlockFile(ABC):
     _contents: Contents | None
     _damage: Findings
     _set_back: bool | None = None
+
+    def __init__(self) -> None:
+        self.remarks = Findings()
 
     def contents(self) -> Contents:
         """Return channels, counts and log times, from the index where it is whole."""

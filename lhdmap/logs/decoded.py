@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 from collections.abc import Collection, Iterator, Mapping
+from functools import partial
 from pathlib import Path
 from types import TracebackType
 from typing import NamedTuple, Self
@@ -14,10 +15,13 @@ import numpy.typing as npt
 from lhdmap.errors import InputError
 from lhdmap.logs.base import RUN, Channel, RawMessage, TopicInfo, run_stride, span_s
 from lhdmap.logs.clock import ClockStep, LogClock, Timed
+from lhdmap.logs.cloud_times import CloudTimes
 from lhdmap.logs.container import Container, Contents, OpenContainer
 from lhdmap.logs.cursor import Cursor
 from lhdmap.logs.decoders import DECODERS, LASER_SCAN, UNSTAMPED_TYPES, Decoder, ground_truth, scan_numbers, transforms
 from lhdmap.logs.findings import Findings
+from lhdmap.logs.kinds import of_one_type
+from lhdmap.logs.pointcloud import point_cloud
 from lhdmap.logs.stamp_clocks import Sample, StampClocks, find_clocks
 from lhdmap.logs.stamps import StampKeeper, TopicStamps
 from lhdmap.logs.topics import is_ground_truth
@@ -40,6 +44,7 @@ class DecodedLog:
         self._skipped = Findings()
         self._keeper = StampKeeper()
         self._clocks: StampClocks | None = None
+        self._cloud_times: dict[str, CloudTimes] = {}
 
     def __enter__(self) -> Self:
         """Open the log; raises InputError where it is not usable."""
@@ -61,8 +66,9 @@ class DecodedLog:
 
     @property
     def remarks(self) -> list[str]:
-        """What was odd in the stamps."""
-        return self._keeper.warnings()
+        """What was odd in the file, its topics and the times in it."""
+        clouds = [line for topic, times in self._cloud_times.items() for line in times.remarks(topic)]
+        return [*self._need().remarks.lines(), *self._typed()[1], *self._keeper.warnings(), *clouds]
 
     @property
     def stamps(self) -> dict[str, TopicStamps]:
@@ -94,14 +100,15 @@ class DecodedLog:
         return span_s(self.start_ns, self.end_ns)
 
     def topics(self) -> dict[str, TopicInfo]:
-        """Return the topics by name; channels of one topic are added up."""
-        found: dict[str, TopicInfo] = {}
+        """Return the topics by name; channels of one topic and type are added up, of several types one is chosen."""
+        return self._typed()[0]
+
+    def _typed(self) -> tuple[dict[str, TopicInfo], list[str]]:
         contents = self._contents()
-        for number, channel in contents.channels.items():
-            before = found[channel.topic].count or 0 if channel.topic in found else 0
-            count = before + contents.counts.get(number, 0)
-            found[channel.topic] = TopicInfo(channel.topic, channel.type_name, count)
-        return found
+        return of_one_type(
+            TopicInfo(channel.topic, channel.type_name, contents.counts.get(number, 0))
+            for number, channel in contents.channels.items()
+        )
 
     def raw(self, topics: Collection[str] | None = None) -> Iterator[RawMessage]:
         """Yield the messages of `topics` (all by default) as they are stored, in log-time order."""
@@ -113,7 +120,7 @@ class DecodedLog:
         """Return the `angle_max` of the first LaserScan of `topic`, None where there is none."""
         for channel, _, data in self.raw({topic}):
             if channel.type_name != LASER_SCAN or channel.encoding not in _ENCODINGS:
-                return None
+                continue
             try:
                 return scan_numbers(Cursor(data, channel.encoding))[2][1]
             except InputError:
@@ -134,7 +141,7 @@ class DecodedLog:
 
     def records(self, topics: Collection[str] | None = None) -> Iterator[Record]:
         """Yield the decoded messages of `topics` (all that can be decoded by default) in log-time order."""
-        known = self._plans(topics)
+        known = self._with_times(self._plans(topics))
         self._keeper = keeper = StampKeeper(self._stamp_clocks(), LogClock())
         self._skipped = Findings()
         for topic, log_ns, message, stamped in keeper.clock.steady(self._stream(known)):
@@ -184,8 +191,22 @@ class DecodedLog:
 
     def _plans(self, topics: Collection[str] | None) -> dict[int, _Plan]:
         """Return how to decode the channels of `topics` (all by default) that can be decoded."""
-        plans = {number: self._plan(channel) for number, channel in self._chosen(topics).items()}
+        kinds = {name: info.type_name for name, info in self.topics().items()}
+        chosen = {
+            n: channel for n, channel in self._chosen(topics).items() if channel.type_name == kinds[channel.topic]
+        }
+        plans = {number: self._plan(channel) for number, channel in chosen.items()}
         return {number: plan for number, plan in plans.items() if plan is not None}
+
+    def _with_times(self, plans: dict[int, _Plan]) -> dict[int, _Plan]:
+        """Let the clouds of each topic share what is known of their times."""
+        self._cloud_times = {plan.topic: CloudTimes() for plan in plans.values() if plan.decoder is point_cloud}
+        return {
+            number: plan._replace(decoder=partial(point_cloud, times=self._cloud_times[plan.topic]))
+            if plan.decoder is point_cloud
+            else plan
+            for number, plan in plans.items()
+        }
 
     def _plan(self, channel: Channel) -> _Plan | None:
         truth = channel.topic in self.truth_topics or is_ground_truth(channel.topic)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+from collections.abc import Sequence
 
 import numpy as np
 import numpy.typing as npt
@@ -33,7 +34,11 @@ def _channel_says(times_ns: IntArray) -> bool | None:
     if len(falls) > max(_FALLS_LEAST, _FALLS_SHARE * len(times_ns)):
         return False
     split = [piece for piece in np.split(times_ns, falls + 1) if len(piece) >= _FEWEST_IN_PIECE]
-    pieces = sorted((int(piece[0]), int(piece[-1])) for piece in split)
     usual = float(np.median(steps[steps >= 0])) if (steps >= 0).any() else 0.0
-    apart = np.array([after[0] - before[1] for before, after in itertools.pairwise(pieces)])
-    return bool((apart < 0).any() or (apart > max(_GAP_STEPS * usual, _GAP_NS)).any())
+    return not pieces_fit([(int(piece[0]), int(piece[-1])) for piece in split], usual)
+
+
+def pieces_fit(pieces: Sequence[tuple[int, int]], usual_ns: float = 0.0) -> bool:
+    """Return whether pieces (first and last log time), sorted by time, make one recording: no overlap, and no long gap."""
+    apart = np.array([after[0] - before[1] for before, after in itertools.pairwise(sorted(pieces))])
+    return not ((apart < 0).any() or (apart > max(_GAP_STEPS * usual_ns, _GAP_NS)).any())

@@ -5,7 +5,6 @@ from __future__ import annotations
 import heapq
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import ExitStack
-from dataclasses import replace
 from operator import itemgetter
 from pathlib import Path
 from types import TracebackType
@@ -19,6 +18,7 @@ from lhdmap.logs.base import LogReader, TopicInfo
 from lhdmap.logs.finding import Severity
 from lhdmap.logs.formats import open_log
 from lhdmap.logs.inventory import Inventory, take_inventory
+from lhdmap.logs.kinds import of_one_type
 from lhdmap.logs.survey import Survey, take_survey, transform_topics
 from lhdmap.logs.topics import assign_topics, missing_scanner
 from lhdmap.messages import Message
@@ -102,7 +102,8 @@ class LogSource:
         found = [finding for finding in self.survey.findings if finding.severity in told]
         lines = [f"{self.paths[0]}: {finding.topic}: {finding.text}; {finding.advice}" for finding in found]
         lines += [f"{self.paths[0]}: {line}" for line in self.survey.frames.remarks]
-        return lines + [f"{reader.path}: {line}" for reader in self._readers for line in reader.remarks]
+        lines += [f"{reader.path}: {line}" for reader in self._readers for line in reader.remarks]
+        return lines + (self._typed()[1] if len(self._readers) > 1 else [])
 
     @property
     def start_ns(self) -> int | None:
@@ -121,15 +122,11 @@ class LogSource:
         return 0.0 if start is None or end is None else (end - start) / 1e9
 
     def topics(self) -> dict[str, TopicInfo]:
-        """Return the topics of all files together, counts added up."""
-        found: dict[str, TopicInfo] = {}
-        for reader in self._readers:
-            for name, info in reader.topics().items():
-                before = found.get(name)
-                if before is not None and before.type_name != info.type_name:
-                    raise InputError(f"{reader.path}: {name} is {info.type_name}, in another file {before.type_name}")
-                found[name] = info if before is None else replace(info, count=_sum(before.count, info.count))
-        return found
+        """Return the topics of all files together, counts added up; of several types of a topic one is chosen."""
+        return self._typed()[0]
+
+    def _typed(self) -> tuple[dict[str, TopicInfo], list[str]]:
+        return of_one_type(info for reader in self._readers for info in reader.topics().values())
 
     def messages(self, roles: Collection[str] | None = None) -> Iterator[tuple[str, Message]]:
         """Yield (role, message) of the wanted roles (all that the log fills by default) in log-time order.
@@ -148,7 +145,13 @@ class LogSource:
 
     def _measured(self, wanted: Mapping[str, str]) -> Iterator[tuple[str, Message]]:
         """Yield role and message of the wanted topics, scans as they were meant."""
-        streams = [reader.records(set(wanted)) for reader in self._readers]
+        kinds = {topic: info.type_name for topic, info in self.topics().items()}
+        streams = [
+            reader.records(
+                {name for name, info in reader.topics().items() if name in wanted and info.type_name == kinds[name]}
+            )
+            for reader in self._readers
+        ]
         merged = streams[0] if len(streams) == 1 else heapq.merge(*streams, key=itemgetter(1))
         for topic, _, raw in merged:
             message = self.survey.repaired(topic, raw)
@@ -180,7 +183,3 @@ class LogSource:
 
     def _names(self) -> str:
         return ", ".join(str(path) for path in self.paths)
-
-
-def _sum(first: int | None, second: int | None) -> int | None:
-    return None if first is None or second is None else first + second

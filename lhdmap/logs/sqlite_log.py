@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import sqlite3
 from collections.abc import Collection, Iterator
 from pathlib import Path
@@ -10,13 +11,12 @@ from urllib.parse import quote
 from lhdmap.errors import InputError
 from lhdmap.logs.base import Channel
 from lhdmap.logs.blocks import MAX_TIME_NS
-from lhdmap.logs.compression import decompress
+from lhdmap.logs.compression import inflated
 from lhdmap.logs.container import Contents
 from lhdmap.logs.findings import Findings
 from lhdmap.logs.sqlite_salvage import Salvage
 
 MAGIC = b"SQLite format 3\0"
-_ZSTD_MAGIC = b"\x28\xb5\x2f\xfd"
 _MAX_MESSAGE_BYTES = 256 << 20
 # What the sqlite3 module raises for a damaged file (names in the schema that are no text among it).
 _DAMAGED = (sqlite3.Error, UnicodeDecodeError, OverflowError)
@@ -32,7 +32,7 @@ class SqliteFile:
     format = "ROS 2 bag (sqlite3)"
 
     def __init__(self, path: Path, damage: Findings) -> None:
-        self._path, self._damage = path, damage
+        self._path, self._damage, self.remarks = path, damage, Findings()
         with path.open("rb") as file:
             header = file.read(100)
         if not header.startswith(MAGIC):
@@ -68,13 +68,13 @@ class SqliteFile:
                 for rowid, topic, time_ns, data in self._database.execute(_MESSAGES):
                     last = (time_ns, rowid)
                     if topic in keep and _valid(time_ns, data):
-                        yield time_ns, topic, self._inflated(data)
+                        yield time_ns, topic, inflated(data)
             except _DAMAGED as error:
                 self._damage.add(f"the database is damaged ({error}): its pages are searched for messages")
             else:
                 return
         for time_ns, topic, data in self._need_salvage().messages(keep, after=last):
-            yield time_ns, topic, self._inflated(data)
+            yield time_ns, topic, inflated(data)
 
     def close(self) -> None:
         """Close the file."""
@@ -82,11 +82,6 @@ class SqliteFile:
             self._database.close()
         if self._salvage is not None:
             self._salvage.close()
-
-    def _inflated(self, data: bytes) -> bytes:
-        if not data.startswith(_ZSTD_MAGIC):
-            return data
-        return decompress(data, "zstd", _MAX_MESSAGE_BYTES + 1)[0]
 
     def _start_salvage(self) -> None:
         self._salvage = Salvage(self._path)
@@ -103,7 +98,9 @@ def _connect(path: Path) -> sqlite3.Connection:
     log = path.with_name(path.name + "-wal")
     immutable = "" if log.exists() and log.stat().st_size else "&immutable=1"
     try:
-        database = sqlite3.connect(f"file:{quote(str(path))}?mode=ro{immutable}", uri=True, check_same_thread=False)
+        database = sqlite3.connect(
+            f"file:{quote(os.fsencode(path))}?mode=ro{immutable}", uri=True, check_same_thread=False
+        )
     except sqlite3.Error as error:
         raise InputError(f"{path}: the database cannot be opened ({error})") from error
     database.text_factory = lambda raw: raw.decode("utf-8", "replace")

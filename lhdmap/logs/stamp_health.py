@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import heapq
-from collections import deque
 
 import numpy as np
 
@@ -11,7 +10,7 @@ from lhdmap.logs.finding import Finding, Severity
 from lhdmap.logs.stamps import TopicStamps
 
 _SAMPLES = 4096
-_WINDOW = 20  # messages over which bursts even out
+_LEFT_OUT, _LEFT_OUT_SHARE = 3, 0.02  # of the longest steps: pauses, and clocks that were set
 _LONGEST = 50
 _GAP_PERIODS, _GAP_LEAST_S = 4.0, 0.3
 _OFFSET_S, _OFFSET_SPREAD_S = 1.0, 0.5
@@ -24,8 +23,6 @@ class StampWatch:
         self.topic = topic
         self._last_ns: int | None = None
         self._steps: list[int] = []
-        self._spans: list[int] = []
-        self._window: deque[int] = deque(maxlen=_WINDOW + 1)
         self._stride, self.count = 1, 0
         self._longest: list[tuple[int, int]] = []
 
@@ -35,13 +32,10 @@ class StampWatch:
         if last is None:
             return
         step = stamp_ns - last
-        self._window.append(stamp_ns)
         if self.count % self._stride == 0:
             self._steps.append(step)
-            if len(self._window) > _WINDOW:
-                self._spans.append(stamp_ns - self._window[0])
             if len(self._steps) >= _SAMPLES:
-                self._steps, self._spans, self._stride = self._steps[::2], self._spans[::2], 2 * self._stride
+                self._steps, self._stride = self._steps[::2], 2 * self._stride
         self.count += 1
         if len(self._longest) < _LONGEST:
             heapq.heappush(self._longest, (step, last))
@@ -57,12 +51,16 @@ class StampWatch:
         """Return what is to be said; `start_ns`: where the log begins."""
         return [*self._gaps(start_ns), *self._order(seen), *self._offset(seen)]
 
+    def _mean_s(self) -> float:
+        """Return the mean time between messages without the longest ones."""
+        kept = len(self._steps) - max(_LEFT_OUT, int(_LEFT_OUT_SHARE * len(self._steps)))
+        return float(np.mean(np.sort(self._steps)[:kept])) / 1e9 if kept > 0 else 0.0
+
     def _gaps(self, start_ns: int) -> list[Finding]:
         period_s = self.period_s
         if not period_s or period_s <= 0:
             return []
-        in_bursts_s = float(np.median(self._spans)) / 1e9 / _WINDOW if self._spans else 0.0
-        usual_s = max(period_s, in_bursts_s)
+        usual_s = max(period_s, self._mean_s())  # the mean counts where messages come in bursts
         limit_ns = max(_GAP_PERIODS * usual_s, _GAP_LEAST_S) * 1e9
         gaps = [(step, at) for step, at in self._longest if step > limit_ns]
         if not gaps:

@@ -26,6 +26,7 @@ from lhdmap.pipeline.interruption import Interruption
 from lhdmap.pipeline.mapping import MappingPipeline
 from lhdmap.pipeline.mounts import machine_of
 from lhdmap.pipeline.outcome import ROLES_READ, Inputs, Outcome, odometry_of, ways_of
+from lhdmap.pipeline.refusal import require_a_map
 from lhdmap.provenance import file_entry, source_entry
 from lhdmap.report.page import fill_in_cost
 from lhdmap.report.recording import Thinning
@@ -100,6 +101,8 @@ def build_map(request: BuildRequest) -> BuildResult:
             folder.write_odometry(_stamped(odometry_of(pipeline), as_recorded))
             folder.write_diagnostics(_stamped(pipeline.records.diagnostics(), as_recorded))
             ways = ways_of(pipeline, given)
+            if given is None and not interrupted:
+                require_a_map(source.paths[0], pipeline.records, ways.rows)
             final = _stamped(ways.final, as_recorded)
             folder.write_trajectory(final)
             outcome = Outcome(request.inputs, source, pipeline, ways)
@@ -108,13 +111,10 @@ def build_map(request: BuildRequest) -> BuildResult:
             raise KeyboardInterrupt
         known = {path: future.result() for path, future in hashes.items()}
         own = Spent(peak_memory_mib(), compiling.seconds)
-        figures = outcome.summary | cost(
-            started, outcome.duration_s, own, beside
-        )  # the same in page, map.json, on screen
+        figures = outcome.summary | cost(started, outcome.duration_s, own, beside)  # one for page, map.json and screen
         fill_in_cost(folder.path / "report.html", figures)
-        path = folder.complete(
-            MapInfo(request.logs, _options(request), figures, outcome.warnings, _frames(request)), known
-        )
+        info = MapInfo(request.logs, _options(request), figures, outcome.warnings, _frames(request))
+        path = folder.complete(info, known)
     return BuildResult(path, figures | {"map": str(path)}, outcome.warnings, final)
 
 

@@ -54,6 +54,7 @@ _WARM_SCANS, _FEWEST_WARM_SCANS, _WARM_NS = 50, 6, 1_500_000_000
 _TILTED = 0.01  # rise of the scan plane ahead (m/m)
 _PATIENCE_SCANS = 3  # after a pause of the whole log, wheels may come within as many scans before they count as silent
 _QUEUE_SCANS = 2000  # a sensor that stops must not hold back scans without bound
+_MOMENT_NS = 5_000_000
 _EARLY = 10_000  # inclinations that wait for their mount at most
 
 
@@ -93,10 +94,8 @@ class MappingPipeline:
         self._cloud = cloud
         self.rear = RearScans(self.mounts, self.wheels, machine or _DEFAULT_MACHINE)
         self.has_inclinometer = False
-        self.wheel_sources: Counter[str] = (
-            Counter()
-        )  # of how many scans wheels told the motion, by the sensors that did
-        self._newest_ns = self._time_ns = -(2**62)
+        self.wheel_sources: Counter[str] = Counter()  # scans that wheels told the motion of, by sensor
+        self._newest_ns = self._time_ns = self._before_ns = -(2**62)
         self._clock_ns = -(2**62)
         self._scan_ns = (self._clock_ns, self._clock_ns)  # of the newest scan: its stamp, and that made rising
         self._disordered = False
@@ -108,7 +107,7 @@ class MappingPipeline:
 
     def update(self, role: str, message: Message) -> None:
         """Take one message of the log."""
-        if isinstance(message, LaserScan):
+        if isinstance(message, (LaserScan, PointCloud)):
             message = self._sweep_times.checked(role, message)
         match message:
             case LaserScan() | PointCloud() if role == self._primary:
@@ -207,7 +206,9 @@ class MappingPipeline:
         """Start the odometry with the speed that a dry run over the first scans finds."""
         waiting = [first, *list(self._waiting)[: _WARM_SCANS - 1]]
         inputs, before_ns = [], self._time_ns
-        for scan, time_ns in ((scan, time_ns) for scan, time_ns in waiting if isinstance(scan, LaserScan)):
+        for scan, time_ns in waiting:
+            if not isinstance(scan, LaserScan) or _says_nothing(scan, time_ns - before_ns):
+                continue
             inputs.append(self._input(scan, before_ns, time_ns + half_sweep_ns(scan)))
             before_ns = time_ns + half_sweep_ns(scan)
         return self._odometry(starting_velocity(self._odometry, inputs))
@@ -239,6 +240,10 @@ class MappingPipeline:
             if self.clouds is not None:
                 self._process_cloud(self.clouds, scan, stamp_ns)
             return
+        if _says_nothing(scan, stamp_ns - self._before_ns):
+            self.records.add_scan(scan.stamp_ns, max(stamp_ns, self._time_ns + 1))
+            return
+        self._before_ns = stamp_ns
         if self.odometry is None:
             self.odometry = self._begin((scan, stamp_ns))
             if self._sees_again(scan, stamp_ns):
@@ -334,6 +339,11 @@ class MappingPipeline:
             stamp_ns, match_, step.information, step.substitute, (step.degenerate, step.lost), slip
         )
         self.records.add_motion(time_ns, speed_mps, wheel_mps, self.wheels.articulation_at(time_ns))
+
+
+def _says_nothing(scan: LaserScan, after_ns: int) -> bool:
+    """Return whether a scan is none: without beams, or without a hit a moment after another one."""
+    return not scan.ranges_m.size or (after_ns < _MOMENT_NS and not bool((scan.ranges_m < scan.range_max_m).any()))
 
 
 def own_boxes(machine: Machine | None, margin_m: float) -> FloatArray:

@@ -17,12 +17,14 @@ from lhdmap.integration.cloud import Cloud
 from lhdmap.logs.source import LogSource
 from lhdmap.machine import Machine
 from lhdmap.messages import Joints, LaserScan, PointCloud
+from lhdmap.names import name_of
 from lhdmap.pile.result import PileReport
 from lhdmap.pipeline.beside import HelperDied
 from lhdmap.pipeline.given import GROUND_TRUTH
 from lhdmap.pipeline.identify import identify_along
 from lhdmap.pipeline.mapping import MappingPipeline
 from lhdmap.pipeline.pile import NO_FRONT, NO_INCLINOMETER, OFF, PileSink
+from lhdmap.pipeline.refusal import key_scans_remark
 from lhdmap.pipeline.said import said_once
 from lhdmap.pipeline.sweep_times import SweepTimes
 from lhdmap.pipeline.sweeps import SweepIntegration
@@ -156,7 +158,7 @@ class Outcome:
             pile_reason=self.pile_reason,
             warnings=self.warnings,
             settings_text=settings_toml(inputs.settings),
-            provenance={"log": ", ".join(path.name for path in inputs.logs)} | _given(inputs),
+            provenance={"log": ", ".join(name_of(path) for path in inputs.logs)} | _given(inputs),
             poses=_poses_name(inputs),
         )
         if inputs.poses:  # what the scans say of the motion took no part
@@ -187,7 +189,7 @@ def integrate_again(inputs: Inputs, pipeline: MappingPipeline, rows: Rows) -> Sw
                 wheels.update(message)
             elif isinstance(message, (LaserScan, PointCloud)):
                 time_ns = next(times, message.stamp_ns) if role == "front" else message.stamp_ns
-                message = sweep_times.checked(role, message) if isinstance(message, LaserScan) else message
+                message = sweep_times.checked(role, message)
                 sweeps.add_final(role, time_ns, message, track, wheels)
     sweeps.wait(track, wheels)
     return sweeps
@@ -214,7 +216,7 @@ def _topic_rows(source: LogSource, inputs: Inputs) -> list[TopicRow]:
 
 
 def _poses_name(inputs: Inputs) -> str:
-    return inputs.poses if inputs.poses in ("", GROUND_TRUTH) else Path(inputs.poses).name
+    return inputs.poses if inputs.poses in ("", GROUND_TRUTH) else name_of(Path(inputs.poses))
 
 
 def _given(inputs: Inputs) -> dict[str, str]:
@@ -253,6 +255,7 @@ def _remarks(pipeline: MappingPipeline) -> list[str]:
         remarks.append(
             f"odometry: in {100 * share:.0f} % of the scans a direction is weakly observed (smooth walls, or too far away?)"
         )
+    remarks += key_scans_remark(pipeline.records)
     gap_s = float(np.diff(pipeline.records.times_ns).max(initial=0.0)) * 1e-9
     if gap_s > _GAP_S:
         remarks.append(

@@ -70,6 +70,11 @@ class ScanRecords:
         return int(np.count_nonzero(lost[1:] & ~lost[:-1]))
 
     @property
+    def all_lost(self) -> bool:
+        """Whether none of the scans after the first could be placed."""
+        return len(self._lost) > 1 and all(self._lost[1:])
+
+    @property
     def degenerate_share(self) -> float:
         """Share of processed scans with an unobserved direction."""
         return float(np.mean([row[5] for row in self._rows])) if self._rows else 0.0

@@ -70,7 +70,7 @@ TERMS = (
     Term(
         "limits E_L, E_R",
         "The left and right end of the pile's toe, at the walls; the width is what lies between.",
-        "E_L",
+        r"\bE_L\b",
     ),
     Term(
         "loop closure",

@@ -6,12 +6,14 @@ import html
 from collections.abc import Iterable, Sequence
 from importlib import resources
 
+from lhdmap.names import shown
+
 
 def document(title: str, body: str) -> str:
     """Return a whole page with the style in it; `body` is markup, `title` is text."""
     style = resources.files("lhdmap.report").joinpath("style.css").read_text(encoding="utf-8")
     title = html.escape(title)
-    return (
+    return shown(
         f'<!DOCTYPE html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n<title>{title}</title>\n'
         '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
         f"<style>\n{style}</style>\n</head>\n<body>\n<h1>{title}</h1>\n{body}</body>\n</html>\n"

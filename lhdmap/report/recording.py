@@ -21,6 +21,7 @@ from lhdmap.integration.cloud import Cloud
 from lhdmap.machine import Machine
 from lhdmap.mapfolder import Diagnostics
 from lhdmap.messages import Float32Array, FloatArray
+from lhdmap.names import in_utf8, shown
 from lhdmap.report.recording_layout import RUN_CURVES, blueprint, whole_of
 from lhdmap.settings import setting
 from lhdmap.trajectory import Trajectory
@@ -133,7 +134,7 @@ class RecordingWriter:
     def add_text(self, text: str, stamp_ns: int | None = None, level: str = "WARN") -> None:
         """Record a line of the text log; one without a stamp stands at the start."""
         self._at(self._start_ns if stamp_ns is None else stamp_ns)
-        self._stream.log("log", self._rr.TextLog(text, level=level))
+        self._stream.log("log", self._rr.TextLog(shown(text), level=level))
 
     def add_shape(self, entity: str, shape: Any) -> None:
         """Record something that is there all the time."""
@@ -265,8 +266,10 @@ def _open(path: Path, title: str, start_ns: int) -> tuple[Any, Any]:
     """Return the module of Rerun, and a stream into the file."""
     import rerun as rr
 
+    title = shown(title)
     stream = rr.RecordingStream(APPLICATION, recording_id=f"{title} {start_ns}")
-    stream.save(path)
+    with in_utf8(path) as written:  # it is open from here on
+        stream.save(written)
     stream.send_recording_name(title)
     stream.log("map", rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
     return rr, stream

@@ -102,3 +102,23 @@ def test_a_drift_that_goes_on_is_none_and_nothing_else(tmp_path: Path, capsys: p
     assert "none: nothing closes the drift (" in text
     assert "decided" not in text
     assert "width" not in text
+
+
+def test_the_cloud_of_a_grizzly_gets_no_status(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    cloud = str(tmp_path / "g.ply")
+    assert main(["simulate", "grizzly", "--seed", "3", "-o", cloud, "--quiet"]) == 0
+    capsys.readouterr()
+    values, _ = found(["pile", cloud, "-o", str(tmp_path / "out")], capsys)
+    assert values["status"] is None
+    assert values["probabilities"] is None
+    assert "no drift is seen around it" in values["reason"]
+    assert all(values[name] is None for name in ("width_m", "inclination_deg", "volume_m3", "center_m"))
+    written = json.loads((tmp_path / "out" / "pile.json").read_text(encoding="utf-8"))
+    assert written["status"] is None
+    assert main(["pile", cloud, "--quiet"]) == 0
+    told = capsys.readouterr()
+    assert "unknown: the largest face stands at 8" in told.out
+    assert "%" not in told.out
+    assert "nan" not in told.out
+    assert "volume" not in told.out
+    assert told.err == ""
