@@ -30,8 +30,8 @@ $(STAMP): pyproject.toml
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[dev]'
 	@rm -f $(VENV)/.made-from-* && touch $@
 
-demo: $(STAMP) ## Simulate the sample drive, build its map, evaluate it: demo/
-	$(BIN)/lhdmap demo --output demo
+demo: $(STAMP) ## Simulate the sample drive, build its map, evaluate it: demo/ (anew each time)
+	$(BIN)/lhdmap demo --output demo --force
 
 test: $(STAMP) ## Run all tests
 	$(BIN)/python -m pytest -n $(JOBS)

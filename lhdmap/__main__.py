@@ -1,5 +1,6 @@
 """`python -m lhdmap`."""
 
-from lhdmap.cli.main import entry_point
+from lhdmap.cli.start import entry_point
 
-entry_point()
+if __name__ == "__main__":
+    entry_point()

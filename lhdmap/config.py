@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import tomllib
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -59,24 +59,58 @@ def load_settings(path: Path | None = None, assignments: Iterable[str] = ()) -> 
     Raises:
         ConfigError: the file cannot be read, or a section, key or value is wrong.
     """
-    table = _read(path) if path is not None else {}
+    table: dict[str, dict[str, Any]] = {}
+    for name, values in (_read(path) if path is not None else {}).items():
+        _check(name, values, f"{path}: ")
+        table[name] = values
     for assignment in assignments:
         section, key, value = _parsed(assignment)
+        _check(section, {key: value}, "")
         table.setdefault(section, {})[key] = value
-    sections = {}
-    for name, values in table.items():
+    return Settings(**{name: load_section(SECTIONS[name], name, values) for name, values in table.items()})
+
+
+def section_names(sections: Iterable[str]) -> list[str]:
+    """Return the names of sections, each checked.
+
+    Raises:
+        ConfigError: one is unknown.
+    """
+    for name in sections:
         if name not in SECTIONS:
-            raise ConfigError(f"{_origin(path)}unknown section '{name}'{nearest(name, SECTIONS)}")
-        if not isinstance(values, dict):
-            raise ConfigError(f"{_origin(path)}'{name}' is a section: [{name}] with its settings below was wanted")
-        sections[name] = load_section(SECTIONS[name], name, values)
-    return Settings(**sections)
+            raise ConfigError(f"unknown section '{name}'{nearest(name, SECTIONS)}")
+    return list(dict.fromkeys(sections))
 
 
-def settings_toml(settings: Settings | None = None) -> str:
-    """Print settings as TOML, each with meaning, unit and source."""
+def setting_names() -> list[str]:
+    """Return all settings as `section.key`."""
+    return [f"{name}.{key}" for name, section in SECTIONS.items() for key in _keys(section)]
+
+
+def settings_toml(settings: Settings | None = None, sections: Iterable[str] = ()) -> str:
+    """Print settings as TOML, each with meaning, unit and source; of some sections alone, where they are named."""
     chosen = settings or Settings()
-    return "\n".join([_HEADER, *(section_toml(name, getattr(chosen, name)) for name in SECTIONS)])
+    named = list(sections)
+    texts = [section_toml(name, getattr(chosen, name)) for name in named or SECTIONS]
+    return "\n".join(texts if named else [_HEADER, *texts])
+
+
+def settings_from(values: Mapping[str, Any]) -> Settings:
+    """Return the defaults with these over them: `{"odometry.method": "range_flow"}` or `{"odometry": {"method": …}}`.
+
+    Raises:
+        ConfigError: a section, key or value is wrong.
+    """
+    table: dict[str, dict[str, Any]] = {}
+    for name, value in values.items():
+        section, dot, key = str(name).partition(".")
+        if not (dot or isinstance(value, Mapping)):
+            near = [one for one in setting_names() if one.endswith(f".{name}")]
+            raise ConfigError(f"settings: '{name}' is in no section{nearest(section, near or SECTIONS)}")
+        part = {key: value} if dot else dict(value)
+        _check(section, part, "settings: ")
+        table.setdefault(section, {}).update(part)
+    return Settings(**{name: load_section(SECTIONS[name], name, part) for name, part in table.items()})
 
 
 def settings_table(settings: Settings) -> dict[str, dict[str, Any]]:
@@ -101,12 +135,34 @@ def _parsed(assignment: str) -> tuple[str, str, Any]:
     name, equals, text = assignment.partition("=")
     section, dot, key = name.strip().partition(".")
     if not (equals and dot and section and key):
-        raise ConfigError(f"--set {assignment}: section.key=value was wanted, e.g. odometry.method=range_flow")
+        near = [one for one in setting_names() if name.strip() and one.endswith(f".{name.strip()}")]
+        example = f"did you mean {near[0]}={text or '…'}?" if near else "e.g. odometry.method=range_flow"
+        raise ConfigError(f"--set {assignment}: section.key=value was wanted, {example}")
     try:
         return section, key, tomllib.loads(f"value = {text}")["value"]
     except tomllib.TOMLDecodeError:
         return section, key, text.strip()
 
 
-def _origin(path: Path | None) -> str:
-    return f"{path}: " if path is not None else ""
+def _check(name: str, values: Any, origin: str) -> None:
+    """Refuse a section that is unknown or wrong in itself; `origin` says where it stands.
+
+    Raises:
+        ConfigError: it is; where the key is known in another section, that one is named.
+    """
+    if name not in SECTIONS:
+        raise ConfigError(f"{origin}unknown section '{name}'{nearest(name, SECTIONS)}")
+    if not isinstance(values, dict):
+        raise ConfigError(f"{origin}'{name}' is a section: [{name}] with its settings below was wanted")
+    for key in values:
+        elsewhere = [f"{other}.{key}" for other, section in SECTIONS.items() if key in _keys(section)]
+        if elsewhere and f"{name}.{key}" not in elsewhere:
+            raise ConfigError(f"{origin}unknown setting '{name}.{key}'{nearest(key, elsewhere)}")
+    try:
+        load_section(SECTIONS[name], name, values)
+    except ConfigError as error:
+        raise ConfigError(f"{origin}{error}") from error
+
+
+def _keys(section: Any) -> list[str]:
+    return [field.name for field in dataclasses.fields(section)]

@@ -1,13 +1,12 @@
-"""The map folder: written under a partial name, renamed when complete, never over another one; and its reader.
+"""The map folder: written under a partial name, renamed when complete, over another one only with `force`; and its reader.
 
 `MapFolderWriter` is a context manager. Each `write_…` leaves a whole file; `complete` hashes all files, writes
 `map.json` and renames the folder. Left without `complete` (an error, Ctrl-C), the folder keeps its partial name, and
-what was finished stays in it.
+what was finished stays in it; without anything finished it is removed.
 """
 
 from __future__ import annotations
 
-import itertools
 import json
 import math
 from collections.abc import Mapping, Sequence
@@ -19,19 +18,26 @@ from typing import Any, NamedTuple, Self
 import numpy as np
 import numpy.typing as npt
 
-from lhdmap import __version__
-from lhdmap.errors import InputError, UsageError
+from lhdmap.errors import InputError
 from lhdmap.messages import FloatArray
 from lhdmap.names import shown
+from lhdmap.outputs import PARTIAL_SUFFIX, SOFTWARE, OutputFolder
 from lhdmap.provenance import file_entry, sha256_of, source_entry
 from lhdmap.trajectory import Trajectory, read_tum, write_tum
 
 FORMAT_VERSION = 1
-PARTIAL_SUFFIX = ".partial"
+LOG_SUFFIXES = (".mcap", ".bag", ".db3", ".clf")
 FRAMES = {
     "map": "gravity-aligned, z up; position and heading of base_link at the first scan are its origin",
     "base_link": "middle of the front axle on the floor, x forward, y left, z up; the poses of the trajectories",
 }
+
+
+def looks_like_log(path: Path) -> bool:
+    """Return whether a path is that of a log, by its name, or by what is in the folder."""
+    if path.is_dir():
+        return (path / "metadata.yaml").is_file() or any(path.glob("*.mcap")) or any(path.glob("*.db3"))
+    return path.name.lower().removesuffix(".gz").removesuffix(".bz2").endswith(LOG_SUFFIXES)
 
 
 class Diagnostics(NamedTuple):
@@ -68,18 +74,15 @@ class MapInfo:
 class MapFolderWriter:
     """Writes one map folder; `path` is where it grows, `complete` returns where it ended."""
 
-    def __init__(self, target: Path) -> None:
-        """Make the partial folder for `target`, or for `target-2`, `target-3`, … where that name is taken.
+    def __init__(self, target: Path, *, force: bool = False, inputs: Sequence[Path] = ()) -> None:
+        """Make the partial folder for `target`; `inputs` are what the map is made of, and never replaced.
 
         Raises:
-            UsageError: the target is no name of a folder to make.
+            UsageError: the target is no name of a folder to make, or is there already, and must not be replaced.
             InputError: the folder cannot be made.
         """
-        if target.name in ("", ".."):
-            raise UsageError(f"-o {target}: the name of a folder to make was wanted")
-        self._target = target
-        self.path = self._make()
-        self.completed: Path | None = None
+        self._folder = OutputFolder(target, force=force, inputs=inputs)
+        self.path = self._folder.path
 
     def __enter__(self) -> Self:
         return self
@@ -87,7 +90,13 @@ class MapFolderWriter:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        """Keep the partial folder as it is: what was finished is kept."""
+        """Keep the partial folder as it is, if something in it was finished."""
+        self._folder.__exit__(kind, error, trace)
+
+    def finished(self, path: Path) -> Path:
+        """Note that a file of the folder is whole, and return its path: it is kept if the run ends before its time."""
+        self._folder.finished.append(path.name)
+        return path
 
     def write_trajectory(self, trajectory: Trajectory) -> Path:
         """Write `trajectory.tum`: base_link in map, final, one line for each scan of the front scanner."""
@@ -106,11 +115,11 @@ class MapFolderWriter:
         path = self.path / "diagnostics.parquet"
         with path.open("wb") as file:
             pq.write_table(pa.table(columns), file, compression="zstd")
-        return path
+        return self.finished(path)
 
     def write_json(self, name: str, values: Mapping[str, Any]) -> Path:
         """Write another JSON file of the contract (`pile.json`, `topology.geojson`)."""
-        return _write_json(self.path / name, values)
+        return self.finished(_write_json(self.path / name, values))
 
     def complete(self, info: MapInfo, source_hashes: Mapping[Path, Any] | None = None) -> Path:
         """Write `map.json`, rename the folder and return its final path.
@@ -118,16 +127,18 @@ class MapFolderWriter:
         `source_hashes` are those of `source_entry`, where the caller has them already (they are slow for large logs).
 
         Raises:
+            UsageError: the name was taken meanwhile.
             InputError: a source cannot be read, or the folder cannot be renamed.
         """
         known = source_hashes or {}
         entries = [known[path] if path in known else source_entry(path) for path in info.sources]
-        files = {path.name: file_entry(path) for path in sorted(self.path.iterdir()) if path.is_file()}
+        names = sorted(path for path in self.path.iterdir() if path.is_file() and not path.name.startswith("."))
+        files = {path.name: file_entry(path) for path in names}
         _write_json(
             self.path / "map.json",
             {
                 "format_version": FORMAT_VERSION,
-                "software": {"name": "lhdmap", "version": __version__},
+                "software": SOFTWARE,
                 "options": info.options,
                 "sources": entries,
                 "frames": info.frames,
@@ -136,39 +147,11 @@ class MapFolderWriter:
                 "warnings": list(info.warnings),
             },
         )
-        self.completed = self._rename()
-        return self.completed
+        return self._folder.complete()
 
     def _write_tum(self, name: str, trajectory: Trajectory) -> Path:
         write_tum(self.path / name, trajectory)
-        return self.path / name
-
-    def _make(self) -> Path:
-        for name in _numbered(self._target.name):
-            path = self._target.with_name(name + PARTIAL_SUFFIX)
-            if self._target.with_name(name).exists():
-                continue
-            try:
-                path.mkdir(parents=True)
-            except FileExistsError:
-                continue
-            except OSError as error:
-                raise InputError(f"{path}: the output folder cannot be made: {error.strerror}") from error
-            return path
-        raise AssertionError("the numbers do not end")
-
-    def _rename(self) -> Path:
-        """Give the folder the first free name; another run may have taken the one that was free at the start."""
-        for name in _numbered(self._target.name):
-            path = self._target.with_name(name)
-            if path.exists():
-                continue
-            try:
-                return self.path.rename(path)
-            except OSError as error:
-                if not path.exists():
-                    raise InputError(f"{self.path}: cannot be renamed to {path.name}: {error.strerror}") from error
-        raise AssertionError("the numbers do not end")
+        return self.finished(self.path / name)
 
 
 class MapFolder:
@@ -186,7 +169,9 @@ class MapFolder:
             InputError: there is no map folder, it is partial, or of a newer format.
         """
         if not path.is_dir():
-            raise InputError(f"{path}: a map folder was wanted, there is {'a file' if path.exists() else 'nothing'}")
+            found = "there is a file" if path.exists() else "there is nothing"
+            found = "there is a log; lhdmap build-map makes a map of it" if looks_like_log(path) else found
+            raise InputError(f"{path}: a map folder was wanted, {found}")
         file = path / "map.json"
         if not file.exists() and path.name.endswith(PARTIAL_SUFFIX):
             raise InputError(f"{path}: this map was interrupted before it was complete; run build-map again")
@@ -246,10 +231,6 @@ class MapFolder:
             for name, entry in recorded.items()
             if not (self.path / name).is_file() or sha256_of(self.path / name) != entry["sha256"]
         ]
-
-
-def _numbered(name: str) -> itertools.chain[str]:
-    return itertools.chain([name], (f"{name}-{number}" for number in itertools.count(2)))
 
 
 def _write_json(path: Path, values: Mapping[str, Any]) -> Path:

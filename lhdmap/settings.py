@@ -13,6 +13,8 @@ from __future__ import annotations
 
 import dataclasses
 import difflib
+import math
+import re
 import tomllib
 import types
 import typing
@@ -23,6 +25,8 @@ from typing import Any, TypeVar
 from lhdmap.errors import ConfigError, InputError
 
 T = TypeVar("T")
+_MOST_NAMES = 6
+_ALIKE, _AS_GOOD = 0.6, 0.08  # likeness of two names, 0 to 1: from where on it counts, and how far behind the best
 
 
 def setting(
@@ -68,10 +72,40 @@ def read_toml(path: Path, kind: str) -> dict[str, Any]:
 
 
 def nearest(key: str, known: typing.Iterable[str]) -> str:
-    """Return `; did you mean 'x'?` for the known name most like `key`, or the list of names where none is alike."""
-    names = sorted(known)
-    alike = difflib.get_close_matches(key, names, n=1)
-    return f"; did you mean '{alike[0]}'?" if alike else f"; known: {', '.join(names)}"
+    """Return `; did you mean …?` with the known names that are most like `key`, or the list of names where none is alike."""
+    names = list(dict.fromkeys(known))
+    alike = near_names(key, names)
+    match alike:
+        case []:
+            return f"; known: {', '.join(sorted(names))}"
+        case [name]:
+            return f"; did you mean '{name}'?"
+    return f"; did you mean one of {', '.join(alike)}?"
+
+
+def figure(value: float) -> str:
+    """Return a figure for a person: `39` for 39.0785, `12.5`, `0.35`."""
+    if not math.isfinite(value) or f"{value:g}" == f"{value:.3g}":
+        return f"{value:g}"
+    return f"{value:.0f}" if abs(value) >= 10.0 else f"{value:.2g}"
+
+
+def near_names(key: str, known: typing.Iterable[str]) -> list[str]:
+    """Return the known names that `key` may stand for: those that begin with it or have it as a part, else those spelt alike."""
+    names, wanted = list(known), _words(key)
+    text = "_".join(wanted)
+    starts = [name for name in names if len(text) > 1 and "_".join(_words(name)).startswith(text)]
+    parts = [name for name in names if name not in starts and wanted and set(wanted) <= set(_words(name))]
+    if starts or parts:
+        return (sorted(starts, key=len) + parts)[:_MOST_NAMES]
+    likeness = {name: difflib.SequenceMatcher(None, text, "_".join(_words(name))).ratio() for name in names}
+    best = max(likeness.values(), default=0.0)
+    near = [name for name, ratio in likeness.items() if ratio >= max(_ALIKE, best - _AS_GOOD)]
+    return sorted(near, key=lambda name: -likeness[name])[:_MOST_NAMES]
+
+
+def _words(name: str) -> list[str]:
+    return [part for part in re.split(r"[^a-z0-9]+", name.lower()) if part]
 
 
 def _checked(path: str, value: Any, hint: Any, field: dataclasses.Field[Any]) -> Any:
@@ -82,8 +116,22 @@ def _checked(path: str, value: Any, hint: Any, field: dataclasses.Field[Any]) ->
     for item in value if isinstance(value, tuple) else (value,):
         low, high = meta.get("minimum"), meta.get("maximum")
         if isinstance(item, (int, float)) and ((low is not None and item < low) or (high is not None and item > high)):
-            raise ConfigError(f"{path} = {value!r} is outside [{low}, {high}] {meta['unit']}")
+            raise ConfigError(
+                f"{path} = {_told(value)} is outside its range: {_range(low, high, meta['unit'])} was wanted"
+            )
     return value
+
+
+def _told(value: Any) -> str:
+    return f"{value:g}" if isinstance(value, float) else _toml(value)
+
+
+def _range(low: float | None, high: float | None, unit: str) -> str:
+    """Return a range for a person: `0 m or more`."""
+    after = "" if unit == "-" else f" {unit}"
+    if high is None:
+        return f"{low:g}{after} or more"
+    return f"{high:g}{after} or less" if low is None else f"{low:g} to {high:g}{after}"
 
 
 def _converted(path: str, value: Any, hint: Any) -> Any:

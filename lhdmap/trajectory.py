@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from lhdmap.errors import LhdmapWarning
+from lhdmap.geometry import se3
 from lhdmap.messages import FloatArray
 from lhdmap.tables.pose_table import read_pose_table
 from lhdmap.tables.stamps import stamp_ns
@@ -23,6 +24,11 @@ class Trajectory(NamedTuple):
     stamps_ns: npt.NDArray[np.int64]
     positions_m: FloatArray
     quaternions_xyzw: FloatArray
+
+    @property
+    def T_map_base(self) -> FloatArray:  # noqa: N802  # frames in the name
+        """The poses as matrices, shape (N, 4, 4): they take points from `base_link` to `map`."""
+        return se3.from_quaternions(self.quaternions_xyzw, self.positions_m)
 
 
 def write_tum(path: Path, trajectory: Trajectory) -> None:

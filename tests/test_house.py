@@ -27,8 +27,8 @@ PACKAGE = ROOT / "lhdmap"
 
 FLOORS = [
     {"errors"},
-    {"messages", "settings", "resources", "names"},
-    {"geometry", "tables", "provenance"},
+    {"messages", "settings", "resources", "names", "interrupts"},
+    {"geometry", "tables", "provenance", "outputs"},
     {"trajectory"},
     {"machine", "mapfolder"},
     {"kinematics"},
@@ -38,6 +38,7 @@ FLOORS = [
     {"report"},
     {"config"},
     {"pipeline"},
+    {"front"},
     {"cli"},
     {"__main__"},
 ]

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from lhdmap.cli.console import Console
-from lhdmap.errors import UsageError
+from lhdmap.cli.options import add_output, add_poses, add_settings, add_topics, topic_overrides
 from lhdmap.names import beside
 
 
@@ -17,22 +17,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "logs", nargs="+", type=Path, metavar="LOG", help="log file or bag folder; several are one drive"
     )
-    parser.add_argument("-o", "--output", type=Path, metavar="DIR", help="map folder to make (default: beside the log)")
-    parser.add_argument(
-        "--config", type=Path, metavar="FILE.toml", help="settings over the defaults (lhdmap config prints them)"
-    )
-    parser.add_argument(
-        "--set", action="append", default=[], metavar="section.key=value", help="one setting; repeatable"
-    )
-    parser.add_argument(
-        "--topic", action="append", default=[], metavar="role=/topic", help="topic of a role, e.g. front=/scan"
-    )
-    parser.add_argument(
-        "--poses",
-        default="",
-        metavar="FILE.tum",
-        help="integrate with given poses: a TUM file, or ground-truth for those in the log",
-    )
+    add_output(parser, "map folder to make (default: LOG_map beside the log)")
+    add_settings(parser)
+    add_topics(parser)
+    add_poses(parser)
     parser.add_argument(
         "--machine", type=Path, metavar="FILE.toml", help="machine description (dimensions, bodies, mounts)"
     )
@@ -58,27 +46,13 @@ def run(arguments: argparse.Namespace, console: Console) -> int:
         progress=progress_of(console),
         poses=arguments.poses,
         helper=not arguments.one_process,
+        force=arguments.force,
     )
     result = build_map(request)
     for text in result.warnings:
         console.warn(text)
     console.result(result.summary | {"warnings": result.warnings}, summary_text(result.summary))
     return 0
-
-
-def topic_overrides(words: Iterable[str]) -> dict[str, str]:
-    """Return topics by role from `role=/topic` words.
-
-    Raises:
-        UsageError: a word has no `=`.
-    """
-    found = {}
-    for word in words:
-        role, equals, topic = word.partition("=")
-        if not (role and equals and topic):
-            raise UsageError(f"--topic {word}: role=/topic was wanted, e.g. front=/scan")
-        found[role] = topic
-    return found
 
 
 def progress_of(console: Console) -> Any:

@@ -9,6 +9,7 @@ import time
 from collections.abc import Iterable, Iterator, Mapping
 from typing import Any, TypeVar
 
+from lhdmap.errors import LhdmapError
 from lhdmap.names import shown
 
 T = TypeVar("T")
@@ -18,10 +19,15 @@ _TELLING_SHARE = 0.05  # before that the time is start-up (the first run compile
 class Console:
     """Prints for one command run; with `json` the standard output holds one JSON object and nothing else."""
 
+    current: Console | None = None  # of the command that runs: Ctrl-C prints through it
+
     def __init__(self, *, json: bool = False, quiet: bool = False) -> None:
         self.json = json
         self.quiet = quiet
         self._warned: set[str] = set()
+        self._values: dict[str, Any] = {}
+        self._printed = False
+        Console.current = self
 
     def note(self, text: str) -> None:
         """Print a line of information on standard error."""
@@ -34,13 +40,37 @@ class Console:
             self._warned.add(text)
             print(f"warning: {shown(text)}", file=sys.stderr)
 
-    def error(self, text: str) -> None:
-        """Print an error."""
-        print(f"lhdmap: {shown(text)}", file=sys.stderr)
+    def usage(self, text: str) -> None:
+        """Print how a command is called, before the error that says what is wrong with the call."""
+        print(shown(text), file=sys.stderr)
 
-    def result(self, values: Mapping[str, Any], text: str) -> None:
-        """Print the result: the JSON object with `--json`, the text otherwise."""
-        print(json.dumps(_plain(values), allow_nan=False) if self.json else shown(text))
+    def result(
+        self, values: Mapping[str, Any], text: str, *, failure: LhdmapError | None = None, at_once: bool = False
+    ) -> None:
+        """Print the result: the text, or with `--json` the object, when the command ends (`at_once` where it goes on).
+
+        `failure`: why the exit code is not 0, for the object alone; the text says it in its own way.
+        """
+        self._values |= _plain(values)
+        if failure is not None:
+            self._values |= failure_of(failure.kind, str(failure), failure.exit_code)
+        if not self.json:
+            print(shown(text))
+        if at_once:
+            self.close()
+            sys.stdout.flush()
+
+    def fail(self, kind: str, text: str, exit_code: int) -> None:
+        """Print an error; with `--json` the object has it, beside what was found before."""
+        print(f"lhdmap: {shown(text)}", file=sys.stderr)
+        self._values |= failure_of(kind, text, exit_code)
+        self.close()
+
+    def close(self) -> None:
+        """Print the JSON object, once."""
+        if self.json and self._values and not self._printed:
+            self._printed = True
+            print(json.dumps(self._values, allow_nan=False))
 
     def progress(self, items: Iterable[T], *, total: float, label: str, position: Any) -> Iterator[T]:
         """Yield `items`, showing rate and time left: a bar on a terminal, a plain line every 10 s otherwise.
@@ -55,6 +85,11 @@ class Console:
             meter.at(position(item))
             yield item
         meter.close()
+
+
+def failure_of(kind: str, message: str, exit_code: int) -> dict[str, Any]:
+    """Return what `--json` prints of a failure."""
+    return {"error": {"kind": kind, "message": message, "exit_code": exit_code}}
 
 
 class _Meter:

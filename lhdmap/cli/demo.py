@@ -12,6 +12,8 @@ from typing import TYPE_CHECKING, Any
 
 from lhdmap.cli.build_map import progress_of
 from lhdmap.cli.console import Console
+from lhdmap.cli.options import add_output, add_settings
+from lhdmap.outputs import free_folder
 
 if TYPE_CHECKING:
     from lhdmap.messages import Record
@@ -22,19 +24,8 @@ FIRST_RUN = "the first run compiles the inner loops: up to a minute more than th
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options of `lhdmap demo`."""
-    parser.add_argument(
-        "-o",
-        "--output",
-        type=Path,
-        metavar="DIR",
-        help="folder to make (default: lhdmap_demo here, or the next free name)",
-    )
-    parser.add_argument(
-        "--config", type=Path, metavar="FILE.toml", help="settings over the defaults (lhdmap config prints them)"
-    )
-    parser.add_argument(
-        "--set", action="append", default=[], metavar="section.key=value", help="one setting; repeatable"
-    )
+    add_output(parser, "folder to make (default: lhdmap_demo here)")
+    add_settings(parser)
 
 
 def run(arguments: argparse.Namespace, console: Console) -> int:
@@ -45,8 +36,10 @@ def run(arguments: argparse.Namespace, console: Console) -> int:
     started = time.monotonic()
     settings = load_settings(arguments.config, arguments.set)
     watcher = Watcher(console.note, _simulation_progress(console), progress_of(console))
+    target = arguments.output or Path("lhdmap_demo")
+    free_folder(target, force=arguments.force)
     console.note(FIRST_RUN)
-    demo = run_demo(arguments.output or Path("lhdmap_demo"), settings, watcher)
+    demo = run_demo(target, settings, watcher, force=arguments.force)
     for text in demo.built.warnings:
         console.warn(text)
     wall_s = time.monotonic() - started

@@ -9,7 +9,8 @@ from pathlib import Path
 from typing import Any
 
 from lhdmap.cli.console import Console
-from lhdmap.errors import InputError, UsageError
+from lhdmap.cli.options import add_topics, topic_overrides
+from lhdmap.errors import InputError
 from lhdmap.logs.base import LogReader
 from lhdmap.logs.finding import Finding, Severity
 from lhdmap.logs.health import Examination, Verdict, examine
@@ -25,14 +26,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the command's arguments."""
     parser.epilog = "Exit code: 0 all logs are usable (remarks included), 3 one is not."
     parser.add_argument("logs", nargs="+", type=Path, metavar="LOG", help="log file or ROS 2 bag folder")
-    parser.add_argument(
-        "--topic", action="append", default=[], metavar="ROLE=TOPIC", help="name a topic by role, e.g. front=/scan"
-    )
+    add_topics(parser)
 
 
 def run(arguments: argparse.Namespace, console: Console) -> int:
     """Examine each log, print the outcome, return the exit code."""
-    overrides = _overrides(arguments.topic)
+    overrides = topic_overrides(arguments.topic)
 
     def progress(reader: LogReader, records: Iterator[Record]) -> Iterator[Record]:
         start_ns = reader.start_ns or 0
@@ -44,16 +43,19 @@ def run(arguments: argparse.Namespace, console: Console) -> int:
 
     outcomes = [examine(path, overrides, progress) for path in arguments.logs]
     text = "\n\n".join("\n".join(_lines(outcome)) for outcome in outcomes)
-    console.result({"logs": [_plain(outcome) for outcome in outcomes]}, text)
-    return InputError.exit_code if any(outcome.verdict is Verdict.UNUSABLE for outcome in outcomes) else 0
+    failure = _failure(outcomes)
+    console.result({"logs": [_plain(outcome) for outcome in outcomes]}, text, failure=failure)
+    return 0 if failure is None else failure.exit_code
 
 
-def _overrides(options: list[str]) -> dict[str, str]:
-    pairs = [option.partition("=") for option in options]
-    for option, (role, _, topic) in zip(options, pairs, strict=True):
-        if not role or not topic:
-            raise UsageError(f"--topic {option}: ROLE=TOPIC was wanted, for example --topic front=/scan")
-    return {role: topic for role, _, topic in pairs}
+def _failure(outcomes: list[Examination]) -> InputError | None:
+    """Return why the exit code is 3, None where all logs are usable."""
+    for outcome in outcomes:
+        if outcome.verdict is Verdict.UNUSABLE:
+            fatal = [finding.text for finding in outcome.findings if finding.severity is Severity.FATAL]
+            text = "; ".join(fatal) or str(outcome.verdict)
+            return InputError(text if text.startswith(str(outcome.path)) else f"{outcome.path}: {text}")
+    return None
 
 
 def _lines(outcome: Examination) -> list[str]:

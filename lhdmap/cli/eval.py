@@ -10,6 +10,7 @@ import argparse
 import importlib
 
 from lhdmap.cli.console import Console
+from lhdmap.cli.options import add_common
 
 SUBJECTS = {
     "pile": "width, inclination and status of piles, as in Table 6 of the autonomous loading paper",
@@ -24,7 +25,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     for name, summary in SUBJECTS.items():
         sub = subjects.add_parser(name, help=summary, description=summary[0].upper() + summary[1:] + ".")
         _module(name).add_arguments(sub)
-        _add_common(sub)
+        add_common(sub, again=True)
 
 
 def run(arguments: argparse.Namespace, console: Console) -> int:
@@ -34,9 +35,3 @@ def run(arguments: argparse.Namespace, console: Console) -> int:
 
 def _module(name: str):  # type: ignore[no-untyped-def]  # a module has no type of its own
     return importlib.import_module("lhdmap.cli.eval_" + name)
-
-
-def _add_common(parser: argparse.ArgumentParser) -> None:
-    """Take the common options behind the subject, too; without a default, so that those before it are kept."""
-    for flag in ("--json", "--quiet", "--debug"):
-        parser.add_argument(flag, action="store_true", default=argparse.SUPPRESS, help=argparse.SUPPRESS)

@@ -7,7 +7,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from lhdmap.cli.console import Console
+from lhdmap.cli.options import add_settings, suggest
 from lhdmap.errors import EvaluationShortfall, InputError, UsageError
+from lhdmap.interrupts import before_interrupt
 
 if TYPE_CHECKING:
     from lhdmap.evaluation.pile import ErrorSummary, PileEvaluation, PileRow, Runner
@@ -29,11 +31,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="attempt,gt_width_m,gt_inclination_deg and log or pred_width_m,pred_inclination_deg, optionally gt_status; the log "
         "(relative to the file) of a line without prediction is run",
     )
-    parser.add_argument("--config", type=Path, metavar="FILE.toml", help="settings over the defaults")
-    parser.add_argument(
-        "--set", action="append", default=[], metavar="section.key=value", help="one setting; repeatable"
+    add_settings(parser)
+    suggest(
+        parser.add_argument("--poses", default="", metavar="ground-truth", help="run the logs with the poses in them"),
+        "ground-truth",
     )
-    parser.add_argument("--poses", default="", metavar="ground-truth", help="run the logs with the poses in them")
     parser.add_argument(
         "--at",
         choices=("end", "decision"),
@@ -60,14 +62,23 @@ def run(arguments: argparse.Namespace, console: Console) -> int:
             "columns pred_…"
         )
     rows: list[PileRow] = []
-    try:
-        _collect(rows, truth, runner, console, at_decision=arguments.at == "decision")
-    except KeyboardInterrupt:
-        found = PileEvaluation(tuple(rows), was_run=True)
+
+    def shown() -> PileEvaluation:
+        found = PileEvaluation(tuple(rows), was_run=runner is not None)
         console.result(found.to_json(), pile_table(found))
-        raise
-    found = PileEvaluation(tuple(rows), was_run=runner is not None)
-    console.result(found.to_json(), pile_table(found))
+        return found
+
+    def interrupted() -> None:
+        if rows:
+            shown()
+
+    with before_interrupt(interrupted):
+        try:
+            _collect(rows, truth, runner, console, at_decision=arguments.at == "decision")
+        except KeyboardInterrupt:
+            interrupted()
+            raise
+    found = shown()
     _check(arguments, found)
     return 0
 

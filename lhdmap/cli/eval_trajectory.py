@@ -8,7 +8,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from lhdmap.cli.console import Console
+from lhdmap.cli.options import add_force
 from lhdmap.errors import EvaluationShortfall, LhdmapWarning, UsageError
+from lhdmap.outputs import OutputFiles, free_files
 
 if TYPE_CHECKING:
     from lhdmap.evaluation.metrics import Segment, Statistics
@@ -51,6 +53,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--tolerance", type=float, metavar="S", help="largest stamp difference (0.02, relations 0.001)")
     parser.add_argument("--planar", action="store_true", help="compare x, y and heading only")
     parser.add_argument("--plot", type=Path, metavar="PNG", help="draw paths and errors (.png, .svg, .pdf)")
+    add_force(parser)
     limits = parser.add_argument_group("limits: exit code 1 where the estimate is worse")
     limits.add_argument("--max-ape-m", type=float, metavar="X", help="root mean square of the absolute error")
     limits.add_argument("--max-translation-pct", type=float, metavar="X", help="of each segment length")
@@ -71,6 +74,8 @@ def run(arguments: argparse.Namespace, console: Console) -> int:
     if arguments.max_relation_m is not None or arguments.max_relation_deg is not None:
         raise UsageError("--max-relation-… needs --truth FILE.relations")
     settings = _settings(arguments)
+    if arguments.plot:
+        free_files([arguments.plot], force=arguments.force, inputs=[arguments.estimate, arguments.truth])
     with warnings.catch_warnings(record=True) as told:
         warnings.simplefilter("always", LhdmapWarning)
         estimate = load_estimate(arguments.estimate, odometry=arguments.odometry)
@@ -86,7 +91,8 @@ def run(arguments: argparse.Namespace, console: Console) -> int:
     if arguments.plot:
         from lhdmap.report.evaluation_plot import plot_evaluation
 
-        plot_evaluation(found, arguments.plot)
+        with OutputFiles(arguments.plot, force=arguments.force) as files:
+            plot_evaluation(found, files.at(arguments.plot))
         console.note(f"plot: {arguments.plot}")
     _check(_trajectory_shortfalls(arguments, found))
     return 0

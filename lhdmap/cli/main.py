@@ -1,4 +1,4 @@
-"""Entry point of `lhdmap`: finds the command, runs it, turns errors into one or two lines and an exit code.
+"""`main`: finds the command, runs it, turns errors into one or two lines and an exit code.
 
 A command is a module `lhdmap.cli.NAME` with `add_arguments(parser)` and `run(arguments, console) -> int`. Only the one that
 is called is imported, so that `lhdmap --help` is quick.
@@ -7,127 +7,139 @@ is called is imported, so that `lhdmap --help` is quick.
 from __future__ import annotations
 
 import argparse
-import gc
+import errno
 import importlib
-import os
 import sys
 import traceback
 import warnings
 from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING
 
 from lhdmap import __version__
-from lhdmap.errors import LhdmapError, LhdmapWarning
-
-if TYPE_CHECKING:
-    from lhdmap.cli.console import Console
+from lhdmap.cli.console import Console
+from lhdmap.cli.interrupt import EXIT_INTERRUPTED, told
+from lhdmap.cli.options import add_common
+from lhdmap.cli.parser import CommandLineError, Parser
+from lhdmap.errors import LhdmapError, LhdmapWarning, kept_with
 
 COMMANDS = {
     "demo": "generate the sample drive, build its map, evaluate it, write report and recording",
     "doctor": "what is in a log and what is wrong with it",
     "build-map": "the main job: log in, map folder out",
+    "info": "what is in a map or run folder, in ten lines",
+    "view": "open a map, log or run in Rerun",
     "pile": "find and measure the ore pile at the end of a drive",
     "rockbreaker": "plan trajectories of a rockbreaker over its grizzly",
     "simulate": "write a simulated log and its truth",
     "eval": "compare results with ground truth",
-    "view": "open a map, log or run in Rerun",
     "config": "print the settings with unit and source",
+    "completion": "print the tab completion for bash, zsh or fish",
 }
-EXIT_USAGE, EXIT_INPUT, EXIT_INTERRUPTED = 2, 3, 4
+EXIT_USAGE, EXIT_INPUT = 2, 3
+_COMMON = ("--json", "--quiet", "--debug")
 INSTALL_HINT = "on Debian, open3d needs: apt-get install libegl1 libgl1 libx11-6 libusb-1.0-0; all else comes with pip"
 FAULT_HINT = "please report it with the output of the same command and --debug"
+_HINTS = {
+    **dict.fromkeys((errno.ENOSPC, errno.EDQUOT), "; make room, or name another place with -o"),
+    **dict.fromkeys(
+        (errno.EACCES, errno.EPERM, errno.EROFS), "; name another place with -o, or get the right to write"
+    ),
+}
 
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run one command line and return its exit code: 0 done, 1 fell short, 2 usage, 3 input, 4 interrupted."""
-    words = list(sys.argv[1:] if argv is None else argv)
-    name = next((word for word in words if not word.startswith("-")), "")
+    words = _command_first(list(sys.argv[1:] if argv is None else argv))
+    console = Console(json="--json" in words, quiet="--quiet" in words)
     try:
-        parser = _parser(name if name in COMMANDS else "")
+        parser = command_parser(words[:1])
         arguments = parser.parse_args(words)
-    except SystemExit as stop:
-        return int(stop.code or 0)
-    if not getattr(arguments, "command", None):
+        if getattr(arguments, "command", None):
+            return _run(arguments, console)
+        if console.json:
+            parser.error("a command was wanted")
         parser.print_help()
-        return EXIT_USAGE
-    return _run(arguments)
+    except SystemExit as stop:  # after --help and --version
+        return int(stop.code or 0)
+    except KeyboardInterrupt as error:
+        console.fail("interrupted", told(kept_with(error)), EXIT_INTERRUPTED)
+        return EXIT_INTERRUPTED
+    except CommandLineError as error:
+        console.usage(error.usage)
+        console.fail(error.kind, str(error), error.exit_code)
+    return EXIT_USAGE
 
 
 def entry_point() -> None:
-    """Console script: `main` with the process's exit code."""
-    for threads in (
-        "OMP_NUM_THREADS",
-        "OPENBLAS_NUM_THREADS",
-    ):  # libraries' thread pools wait for each other: one thread each
-        os.environ.setdefault(threads, "1")
-    gc.set_threshold(100_000, 20, 20)  # the libraries' hundreds of thousands of lasting objects are walked less often
-    exit_code = main()
-    if exit_code == EXIT_INTERRUPTED:
-        # Where Ctrl-C met Python inside a compiled library, the interpreter would end by the signal and not with our code.
-        sys.stdout.flush()
-        sys.stderr.flush()
-        os._exit(exit_code)
-    sys.exit(exit_code)
+    """Run the program: for console scripts that were made before `lhdmap.cli.start`."""
+    from lhdmap.cli.start import entry_point as start
+
+    start()
 
 
-def _parser(chosen: str) -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(
-        prog="lhdmap", description="From a scanner log of a load-haul-dump machine to a map."
-    )
+def command_parser(chosen: Sequence[str]) -> Parser:
+    """Return the parser, with the options of the `chosen` commands alone: their modules are imported."""
+    parser = Parser(prog="lhdmap", description="From a scanner log of a load-haul-dump machine to a map.")
     parser.add_argument("--version", action="version", version=f"lhdmap {__version__}")
     commands = parser.add_subparsers(dest="command", metavar="COMMAND", title="commands")
     for name, summary in COMMANDS.items():
         sub = commands.add_parser(name, help=summary, description=summary[0].upper() + summary[1:] + ".")
-        if name == chosen:
+        if name in chosen:
             _module(name).add_arguments(sub)
-            _add_common(sub)
+            add_common(sub)
     return parser
+
+
+def _command_first(words: list[str]) -> list[str]:
+    """Return the words with common options that stand before the command behind it: `lhdmap --json doctor LOG`."""
+    count = next((k for k, word in enumerate(words) if word not in _COMMON), len(words))
+    return [*words[count : count + 1], *words[:count], *words[count + 1 :]]
 
 
 def _module(name: str):  # type: ignore[no-untyped-def]  # a module has no type of its own
     return importlib.import_module("lhdmap.cli." + name.replace("-", "_"))
 
 
-def _add_common(parser: argparse.ArgumentParser) -> None:
-    group = parser.add_argument_group("common options")
-    group.add_argument(
-        "--json", action="store_true", help="one JSON object on standard output, all else on standard error"
-    )
-    group.add_argument("--quiet", action="store_true", help="no progress and no notes; warnings and errors stay")
-    group.add_argument("--debug", action="store_true", help="show the traceback of an error")
-
-
-def _run(arguments: argparse.Namespace) -> int:
-    from lhdmap.cli.console import Console
-
-    console = Console(json=arguments.json, quiet=arguments.quiet)
+def _run(arguments: argparse.Namespace, console: Console) -> int:
     try:
         with warnings.catch_warnings():
             warnings.showwarning = _shower(console, everything=arguments.debug)
-            return int(_module(arguments.command).run(arguments, console))
-    except KeyboardInterrupt:
-        console.error("interrupted; what was finished is kept")
-        return EXIT_INTERRUPTED
+            exit_code = int(_module(arguments.command).run(arguments, console))
+            console.close()
+            return exit_code
+    except (KeyboardInterrupt, CommandLineError):
+        raise
     except BrokenPipeError:
         return 0
     except Exception as error:  # noqa: BLE001  # the last resort: a fault of lhdmap is told in two lines as well
         if arguments.debug:
             traceback.print_exc()
-        text, exit_code = _told(error)
-        console.error(text)
+        kind, text, exit_code = _told(error)
+        kept = "".join(f"; what was finished is kept in {path}" for path in kept_with(error)[-1:])
+        console.fail(kind, text + kept, exit_code)
         return exit_code
 
 
-def _told(error: Exception) -> tuple[str, int]:
-    """Return what a person is told of an error, and the exit code."""
+def _told(error: Exception) -> tuple[str, str, int]:
+    """Return the kind of an error, what a person is told of it, and the exit code."""
     match error:
         case LhdmapError():
-            return str(error), error.exit_code
-        case OSError() | MemoryError():
-            return f"{type(error).__name__}: {error}", EXIT_INPUT
+            return error.kind, str(error), error.exit_code
+        case OSError():
+            return "system", _system_text(error), EXIT_INPUT
+        case MemoryError():
+            return "system", f"not enough memory: {error}".rstrip(": "), EXIT_INPUT
         case ImportError():
-            return f"the installation is not complete: {error}\n{INSTALL_HINT}", EXIT_INPUT
-    return f"a fault in lhdmap, not in what you asked for: {type(error).__name__}: {error}\n{FAULT_HINT}", EXIT_INPUT
+            return "installation", f"the installation is not complete: {error}\n{INSTALL_HINT}", EXIT_INPUT
+    text = f"a fault in lhdmap, not in what you asked for: {type(error).__name__}: {error}\n{FAULT_HINT}"
+    return "fault", text, EXIT_INPUT
+
+
+def _system_text(error: OSError) -> str:
+    """Return in one line what the operating system refused, and where."""
+    number = error.errno if error.errno is not None else errno.ENOSPC if "No space left" in str(error) else 0
+    where = "" if error.filename is None else f"{error.filename}: "
+    reason = error.strerror or " ".join(str(error).split()) or type(error).__name__
+    return f"{where}{reason}{_HINTS.get(number, '')}"
 
 
 def _shower(console: Console, *, everything: bool) -> Callable[..., None]:

@@ -6,9 +6,10 @@ import argparse
 from pathlib import Path
 from typing import Any
 
-from lhdmap.cli.build_map import topic_overrides
 from lhdmap.cli.console import Console
+from lhdmap.cli.options import add_output, add_poses, add_settings, add_topics, topic_overrides
 from lhdmap.names import beside, name_of
+from lhdmap.outputs import free_folder
 
 CLOUD_SUFFIXES = (".ply", ".pcd", ".laz", ".las")
 
@@ -18,13 +19,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "input", type=Path, metavar="LOG|CLOUD", help="log or bag folder, or a cloud (.ply, .pcd, .las, .laz)"
     )
-    parser.add_argument("-o", "--output", type=Path, metavar="DIR", help="folder to make (default: beside the input)")
-    parser.add_argument("--config", type=Path, metavar="FILE.toml", help="settings over the defaults")
-    parser.add_argument(
-        "--set", action="append", default=[], metavar="section.key=value", help="one setting; repeatable"
-    )
-    parser.add_argument("--topic", action="append", default=[], metavar="role=/topic", help="topic of a role")
-    parser.add_argument("--poses", default="", metavar="FILE.tum", help="given poses: a TUM file, or ground-truth")
+    add_output(parser, "folder to make (default: LOG_pile beside the log; of a cloud, none)")
+    add_settings(parser)
+    add_topics(parser)
+    add_poses(parser)
     parser.add_argument("--machine", type=Path, metavar="FILE.toml", help="machine description")
     parser.add_argument(
         "--up", default="z", choices=("x", "y", "z", "-x", "-y", "-z"), help="of a cloud: the axis that points up"
@@ -44,8 +42,10 @@ def run(arguments: argparse.Namespace, console: Console) -> int:
 
     settings = load_settings(arguments.config, arguments.set)
     machine = load_machine(arguments.machine) if arguments.machine else None
-    report = identify(arguments.input, settings, arguments.poses, machine, topic_overrides(arguments.topic))
-    with MapFolderWriter(arguments.output or beside(arguments.input, "pile")) as folder:
+    topics = topic_overrides(arguments.topic)
+    target = arguments.output or beside(arguments.input, "pile")
+    with MapFolderWriter(target, force=arguments.force, inputs=[arguments.input]) as folder:
+        report = identify(arguments.input, settings, arguments.poses, machine, topics)
         values = report.to_json()
         folder.write_json("pile.json", values)
         write_pile_report(report, folder.path / "report.html", f"Ore pile, {name_of(arguments.input)}")
@@ -66,11 +66,13 @@ def _run_cloud(arguments: argparse.Namespace, console: Console) -> int:
     given = [f"--{name}" for name in ("config", "set", "topic", "poses", "machine") if getattr(arguments, name)]
     if given:
         raise UsageError(f"{arguments.input}: {', '.join(given)} concern logs; a cloud takes --up and -o")
+    if arguments.output is not None:
+        free_folder(arguments.output, force=arguments.force, inputs=[arguments.input])
     estimate, more = run_cloud(arguments.input, arguments.up)
     values = estimate_json(estimate) | more
     values["reason"] = values["reason"] or None
     if arguments.output is not None:
-        with MapFolderWriter(Path(arguments.output)) as folder:
+        with MapFolderWriter(arguments.output, force=arguments.force, inputs=[arguments.input]) as folder:
             folder.write_json("pile.json", values)
             path = folder.complete(MapInfo([arguments.input], {"up": arguments.up}, warnings=estimate.warnings))
         values |= {"folder": str(path)}

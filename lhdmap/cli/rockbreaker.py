@@ -9,9 +9,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from lhdmap.cli.console import Console
-from lhdmap.errors import UsageError
+from lhdmap.cli.options import add_common, add_output, add_settings
+from lhdmap.errors import EvaluationShortfall, UsageError
 
 if TYPE_CHECKING:
+    from lhdmap.mapfolder import MapFolderWriter
     from lhdmap.messages import FloatArray
     from lhdmap.rockbreaker.collision import Obstacles
     from lhdmap.rockbreaker.machine import Rockbreaker
@@ -25,7 +27,6 @@ TASKS = {
 }
 MINUS = "A point that begins with a minus is given with an equals sign: --to=-0.5,2,-1."
 CLOUDS = (".ply", ".pcd", ".laz", ".las")
-EXIT_INFEASIBLE = 1
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -34,15 +35,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     for name, summary in TASKS.items():
         sub = tasks.add_parser(name, help=summary, description=summary[0].upper() + summary[1:] + ".", epilog=MINUS)
         sub.add_argument("--machine", type=Path, metavar="FILE.toml", help="the machine (default: the paper's Table 1)")
-        sub.add_argument(
-            "-o", "--output", type=Path, metavar="DIR", help=f"folder to make (default: rockbreaker_{name})"
-        )
+        add_output(sub, f"folder to make (default: rockbreaker_{name} here)")
         sub.add_argument(
             "--no-pictures", action="store_true", help="no report and no recording: the figures and the table only"
         )
         (_add_plan if name == "plan" else _add_workspace)(sub)
-        for flag in ("--json", "--quiet", "--debug"):
-            sub.add_argument(flag, action="store_true", default=argparse.SUPPRESS, help=argparse.SUPPRESS)
+        add_common(sub, again=True)
 
 
 def _add_plan(parser: argparse.ArgumentParser) -> None:
@@ -75,12 +73,7 @@ def _add_plan(parser: argparse.ArgumentParser) -> None:
         metavar="FILE",
         help="boxes (.toml) or a cloud not to touch; repeatable",
     )
-    parser.add_argument(
-        "--config", type=Path, metavar="FILE.toml", help="settings over the defaults, section [rockbreaker]"
-    )
-    parser.add_argument(
-        "--set", action="append", default=[], metavar="rockbreaker.key=value", help="one setting; repeatable"
-    )
+    add_settings(parser, ["rockbreaker"])
 
 
 def _add_workspace(parser: argparse.ArgumentParser) -> None:
@@ -109,12 +102,25 @@ class Outcome:
 
 def _run_plan(arguments: argparse.Namespace, console: Console, machine: Rockbreaker) -> int:
     from lhdmap.config import load_settings
+    from lhdmap.mapfolder import MapFolderWriter
 
     settings = load_settings(arguments.config, arguments.set)
-    outcome = _plan(arguments, machine, settings.rockbreaker)
-    values = _write(arguments, settings, outcome)
-    console.result(values, _text(values))
-    return 0 if values["feasible"] else EXIT_INFEASIBLE
+    sources = _sources(arguments)
+    with MapFolderWriter(_target(arguments), force=arguments.force, inputs=sources) as folder:
+        outcome = _plan(arguments, machine, settings.rockbreaker)
+        values = _write(folder, arguments, settings, outcome)
+    failure = None if values["feasible"] else EvaluationShortfall(f"not feasible: {values['reason']['text']}")
+    console.result(values, _text(values), failure=failure)
+    return 0 if failure is None else failure.exit_code
+
+
+def _target(arguments: argparse.Namespace) -> Path:
+    return Path(arguments.output or f"rockbreaker_{arguments.task}").absolute()
+
+
+def _sources(arguments: argparse.Namespace) -> list[Path]:
+    paths = (arguments.machine, arguments.config, arguments.cloud, *arguments.obstacles)
+    return [path for path in paths if path]
 
 
 def _plan(arguments: argparse.Namespace, machine: Rockbreaker, settings: RockbreakerSettings) -> Outcome:
@@ -226,28 +232,25 @@ def _finite(value: float, option: str) -> float:
     return value
 
 
-def _write(arguments: argparse.Namespace, settings: Any, outcome: Outcome) -> dict[str, Any]:
+def _write(folder: MapFolderWriter, arguments: argparse.Namespace, settings: Any, outcome: Outcome) -> dict[str, Any]:
     """Write the folder; return the values with the paths in it."""
     from lhdmap.config import settings_table
-    from lhdmap.mapfolder import MapFolderWriter, MapInfo
+    from lhdmap.mapfolder import MapInfo
     from lhdmap.rockbreaker.table import UNITS, joined, sampled, write_table
 
-    values = outcome.values
-    target = (arguments.output or Path("rockbreaker_plan")).resolve()
-    sources = [path for path in (arguments.machine, arguments.config, arguments.cloud, *arguments.obstacles) if path]
-    with MapFolderWriter(target) as folder:
-        rows = None
-        if values["feasible"]:
-            rows = joined([sampled(one, settings.rockbreaker.table_hz) for one in outcome.trajectories])
-            write_table(folder.path / "trajectory.csv", rows)
-        if not arguments.no_pictures:
-            _draw(folder.path, outcome, rows)
-        csv = "trajectory.csv" if rows is not None else None  # a folder may be moved: in it, names only
-        folder.write_json("plan.json", values | {"csv": csv, "csv_columns": UNITS})
-        path = folder.complete(
-            MapInfo(sources, {"rockbreaker": settings_table(settings)["rockbreaker"]}, frames=FRAMES)
-        )
-    return values | {"csv": str(path / "trajectory.csv") if rows is not None else None, "folder": str(path)}
+    values, target = outcome.values, _target(arguments)
+    rows = None
+    if values["feasible"]:
+        rows = joined([sampled(one, settings.rockbreaker.table_hz) for one in outcome.trajectories])
+        write_table(folder.path / "trajectory.csv", rows)
+    if not arguments.no_pictures:
+        _draw(folder.path, outcome, rows)
+    csv = None if rows is None else "trajectory.csv"
+    folder.write_json("plan.json", values | {"csv": csv, "csv_columns": UNITS})  # it may be moved: names only
+    values |= {"csv": None if csv is None else str(target / csv), "folder": str(target)}
+    options = {"rockbreaker": settings_table(settings)["rockbreaker"]}
+    folder.complete(MapInfo(_sources(arguments), options, frames=FRAMES))
+    return values
 
 
 FRAMES = {"base": "origin on the swing axis, x along the grizzly's middle, y left, z up"}
@@ -297,17 +300,16 @@ def _run_workspace(arguments: argparse.Namespace, console: Console, machine: Roc
     from lhdmap.rockbreaker.reach import workspace_json
 
     at_m = np.array(numbers(arguments.at, 3, "--at")) if arguments.at is not None else None
+    target, sources = _target(arguments), [arguments.machine] if arguments.machine else []
     values = workspace_json(machine, at_m)
-    target = (arguments.output or Path("rockbreaker_workspace")).resolve()
     if not arguments.no_pictures:
-        with MapFolderWriter(target) as folder:
+        with MapFolderWriter(target, force=arguments.force, inputs=sources) as folder:
             folder.write_json("workspace.json", values)
             write_workspace_report(folder.path / "report.html", machine, values, at_m)
-            values["folder"] = str(
-                folder.complete(MapInfo([arguments.machine] if arguments.machine else [], frames=FRAMES))
-            )
-    console.result(values, _workspace_text(values))
-    return 0 if values["reached"] is not False else EXIT_INFEASIBLE
+            values["folder"] = str(folder.complete(MapInfo(sources, frames=FRAMES)))
+    failure = EvaluationShortfall("the tip cannot be there") if values["reached"] is False else None
+    console.result(values, _workspace_text(values), failure=failure)
+    return 0 if failure is None else failure.exit_code
 
 
 def _workspace_text(values: dict[str, Any]) -> str:

@@ -9,7 +9,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from lhdmap.cli.console import Console
+from lhdmap.cli.options import add_output, suggest
 from lhdmap.errors import UsageError
+from lhdmap.outputs import free_files
+from lhdmap.settings import figure, near_names, nearest
 
 if TYPE_CHECKING:
     from lhdmap.messages import Record
@@ -22,17 +25,22 @@ DUST_SHARE, MIXED_PIXEL_SHARE, DROP_OUT_SHARE = 0.03, 0.5, 0.01
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command's arguments; an option that is not given keeps the scenario's value."""
-    parser.add_argument(
-        "scenario", metavar="SCENARIO", help="'drift', 'pile', 'grizzly' (a cloud, not a log), or a scenario file"
+    suggest(
+        parser.add_argument(
+            "scenario", metavar="SCENARIO", help="'drift', 'pile', 'grizzly' (a cloud, not a log), or a scenario file"
+        ),
+        *BUILT_IN,
+        "files",
     )
-    parser.add_argument(
-        "-o", "--output", type=Path, metavar="LOG", help="log to write (default: a new name in this folder)"
-    )
+    add_output(parser, "log to write (default: its name and seed in this folder, drift_seed0.mcap)", "LOG")
     parser.add_argument("--seed", type=int, help="same seed, same log to the bit (default 0)")
     parser.add_argument(
         "--mesh", type=Path, metavar="PLY", help="also write the drift's surface as a mesh, in the frame map"
     )
-    parser.add_argument("--machine", metavar="TOML", help="machine file (default: the 11-t loader of the papers)")
+    suggest(
+        parser.add_argument("--machine", metavar="TOML", help="machine file (default: the 11-t loader of the papers)"),
+        "files",
+    )
     parser.add_argument(
         "--no-truth", action="store_true", help="no /ground_truth/odometry in the log (the .truth.tum stays)"
     )
@@ -94,15 +102,15 @@ def run(arguments: argparse.Namespace, console: Console) -> int:
     if arguments.suite is not None:
         return _run_suite(arguments, console)
     scenario = scenario_of(arguments)
-    log = arguments.output or _free_name(_stem(arguments, scenario), scenario.seed)
+    log = arguments.output or Path(f"{_stem(arguments, scenario)}_seed{scenario.seed}.mcap")
 
     def progress(records: Iterator[Record], duration_s: float) -> Iterator[Record]:
         return _shown(records, console, duration_s)
 
     console.note(
-        f"simulating {scenario.drive.distance_m:g} m at {scenario.drive.speed_kmh:g} km/h, seed {scenario.seed}"
+        f"simulating {figure(scenario.drive.distance_m)} m at {figure(scenario.drive.speed_kmh)} km/h, seed {scenario.seed}"
     )
-    drive = simulate_drift(scenario, log, mesh_path=arguments.mesh, progress=progress)
+    drive = simulate_drift(scenario, log, mesh_path=arguments.mesh, progress=progress, force=arguments.force)
     values = {
         "log": str(drive.log),
         "truth": str(drive.truth_file),
@@ -132,18 +140,16 @@ def run(arguments: argparse.Namespace, console: Console) -> int:
 def _run_grizzly(arguments: argparse.Namespace, console: Console) -> int:
     """Write the cloud of a grizzly with rocks on it, for `lhdmap rockbreaker plan --cloud`; return the exit code."""
     from lhdmap.rockbreaker.machine import load_rockbreaker
-    from lhdmap.simulation.grizzly import scene_json, simulate_grizzly, write_scene
+    from lhdmap.simulation.grizzly import scene_json, simulate_grizzly, truth_path, write_scene
 
     machine = load_rockbreaker(Path(arguments.machine) if arguments.machine else None)
     seed = arguments.seed or 0
     path = arguments.output or Path(f"grizzly-{seed}.ply")
     if seed < 0:
         raise UsageError(f"--seed {seed}: 0 or more was wanted")
-    if path.exists():
-        raise UsageError(f"{path} exists already: another name is wanted (-o)")
-    path.parent.mkdir(parents=True, exist_ok=True)
+    free_files([path, truth_path(path)], force=arguments.force)
     scene = simulate_grizzly(machine, seed)
-    truth = write_scene(path, machine, scene)
+    truth = write_scene(path, machine, scene, force=arguments.force)
     told = scene_json(machine, scene)
     values = {"cloud": str(path), "truth": str(truth), "points": len(scene.points_m)} | told
     large = sum(one["oversize"] for one in told["rocks"])
@@ -166,7 +172,7 @@ def _run_suite(arguments: argparse.Namespace, console: Console) -> int:
     def told(name: str, done: int, of: int) -> None:
         console.note(f"{done} of {of}: {name}")
 
-    table = write_suite(scenes, folder, jobs=arguments.jobs, told=told)
+    table = write_suite(scenes, folder, jobs=arguments.jobs, told=told, force=arguments.force)
     console.result(
         {"folder": str(folder), "truth": str(table), "scenes": len(scenes)}, f"{len(scenes)} scenes: {table}"
     )
@@ -185,7 +191,10 @@ def scenario_of(arguments: argparse.Namespace) -> DriftScenario:
 
     path = Path(arguments.scenario)
     if arguments.scenario not in BUILT_IN and not path.is_file():
-        raise UsageError(f"'{arguments.scenario}': one of {', '.join(BUILT_IN)} or a scenario file was wanted")
+        raise UsageError(
+            f"'{arguments.scenario}': a scenario file or one of {', '.join(BUILT_IN)} was wanted"
+            f"{_meant(arguments.scenario)}"
+        )
     scenario = _built_in(arguments) if arguments.scenario in BUILT_IN else load_scenario(path)
     top, sections = _overrides(arguments)
     for name, values in sections.items():
@@ -193,6 +202,10 @@ def scenario_of(arguments: argparse.Namespace) -> DriftScenario:
         checked = load_section(SECTIONS[name], name, values)
         scenario = replace(scenario, **{name: replace(current, **{key: getattr(checked, key) for key in values})})
     return replace(scenario, **top)
+
+
+def _meant(word: str) -> str:
+    return nearest(word, BUILT_IN) if near_names(word, BUILT_IN) else ""
 
 
 def _built_in(arguments: argparse.Namespace) -> DriftScenario:
@@ -277,15 +290,6 @@ def _stem(arguments: argparse.Namespace, scenario: DriftScenario) -> str:
     if arguments.scenario not in BUILT_IN:
         return Path(arguments.scenario).stem.removesuffix(".scenario")
     return "drift" if scenario.pile is None else f"pile_{scenario.pile.variant}"
-
-
-def _free_name(stem: str, seed: int) -> Path:
-    """Return a log name in the current folder that does not exist yet."""
-    log, number = Path(f"{stem}_seed{seed}.mcap"), 1
-    while log.exists() or log.with_suffix(".truth.tum").exists() or log.with_suffix(".scenario.toml").exists():
-        number += 1
-        log = Path(f"{stem}_seed{seed}_{number}.mcap")
-    return log
 
 
 def _shown(records: Iterator[Record], console: Console, total_s: float) -> Iterator[Record]:

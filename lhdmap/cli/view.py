@@ -1,26 +1,36 @@
-"""`lhdmap view PATH`: opens a map folder, a recording or a log in the Rerun viewer, a browser, or as a picture."""
+"""`lhdmap view PATH`: opens a map or run folder, a recording or a log in the Rerun viewer, a browser, or as a picture."""
 
 from __future__ import annotations
 
 import argparse
-import importlib.util
+import contextlib
 import os
+import shutil
+import socket
 import subprocess
 import sys
 import tempfile
+import time
+from collections.abc import Iterator
 from pathlib import Path
 
 from lhdmap.cli.console import Console
+from lhdmap.cli.options import add_output, add_topics, topic_overrides
+from lhdmap.cli.viewer import check_recording, started, viewer
 from lhdmap.errors import InputError, UsageError
+from lhdmap.interrupts import before_interrupt
 from lhdmap.names import in_utf8, name_of
+from lhdmap.outputs import OutputFiles, described, free_files, kind_of
 
 WINDOW = "1600x1000"
 SCREENSHOT_LIMIT_S = 180.0
+_SERVER_LIMIT_S = 30.0
+RECORDINGS = ("recording.rrd", "pile.rrd")
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the options of `lhdmap view`."""
-    parser.add_argument("path", type=Path, help="map folder, recording (.rrd) or log")
+    parser.add_argument("path", type=Path, metavar="PATH", help="map or run folder, recording (.rrd) or log")
     how = parser.add_mutually_exclusive_group()
     how.add_argument("--web", action="store_true", help="serve to a browser on this machine until interrupted")
     how.add_argument("--screenshot", type=Path, metavar="PNG", help="no window: write a picture of the viewer")
@@ -30,8 +40,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--port", type=int, default=9090, help="with --web, port of the page; the data is on the next one"
     )
-    parser.add_argument("--topic", action="append", default=[], metavar="ROLE=TOPIC", help="of a log, as in build-map")
-    parser.add_argument("-o", "--output", type=Path, metavar="RRD", help="of a log, keep the recording in this file")
+    add_topics(parser, "of a log, as in build-map")
+    add_output(parser, "of a log, keep the recording in this file", "RRD")
 
 
 def run(arguments: argparse.Namespace, console: Console) -> int:
@@ -40,14 +50,29 @@ def run(arguments: argparse.Namespace, console: Console) -> int:
         raise InputError(f"{arguments.path}: no such file or folder; a map folder, a .rrd file or a log was wanted")
     if not (arguments.web or arguments.screenshot or _has_display()):
         raise UsageError("no display was found (DISPLAY is not set); use --web for a browser, or --screenshot OUT.png")
-    with tempfile.TemporaryDirectory(prefix="lhdmap-") as folder:
-        recording = _recording(arguments, Path(folder), console)
+    new = [path for path in (arguments.output, arguments.screenshot) if path is not None]
+    free_files(new, force=arguments.force, inputs=[arguments.path])
+    with _temporary_folder() as folder:
+        recording = _recording(arguments, folder, console)
+        check_recording(recording)
         if arguments.screenshot:
-            _screenshot(recording, arguments.screenshot)
+            _screenshot(recording, arguments.screenshot, force=arguments.force)
             values = {"recording": str(recording), "screenshot": str(arguments.screenshot)}
             console.result(values, f"screenshot: {arguments.screenshot}")
             return 0
         return _serve(recording, arguments, console) if arguments.web else _open_window(recording)
+
+
+@contextlib.contextmanager
+def _temporary_folder() -> Iterator[Path]:
+    """Make a folder that is gone afterwards, after Ctrl-C too."""
+    with tempfile.TemporaryDirectory(prefix="lhdmap-", ignore_cleanup_errors=True) as name:
+
+        def end() -> None:
+            shutil.rmtree(name, ignore_errors=True)
+
+        with before_interrupt(end):
+            yield Path(name)
 
 
 def _recording(arguments: argparse.Namespace, folder: Path, console: Console) -> Path:
@@ -57,13 +82,26 @@ def _recording(arguments: argparse.Namespace, folder: Path, console: Console) ->
         InputError: there is nothing to show at the path.
     """
     path: Path = arguments.path
-    if path.suffix == ".rrd":
+    if path.suffix == ".rrd" and path.is_file():
         return path
-    if path.is_dir() and ((path / "map.json").exists() or (path / "recording.rrd").exists()):
-        if not (path / "recording.rrd").is_file():
-            raise InputError(f"{path}: the map folder has no recording.rrd; run build-map again")
-        return path / "recording.rrd"
+    if path.is_dir():
+        found = recording_of(path)
+        if found is not None:
+            return found
+        if kind_of(path) is not None or (path / "map.json").exists():
+            raise InputError(f"{path}: the folder has no recording.rrd; make it anew with the command that made it")
     return _recorded_log(arguments, folder, console)
+
+
+def recording_of(folder: Path) -> Path | None:
+    """Return the recording in a map or run folder, or in the map of a run; None where there is none."""
+    inner = [folder / str(name) for name in [(described(folder) or {}).get("map")] if name]
+    for place in (folder, *inner):
+        known = [place / name for name in RECORDINGS if (place / name).is_file()]
+        found = known or sorted(place.glob("*.rrd"))
+        if found:
+            return found[0]
+    return None
 
 
 def _recorded_log(arguments: argparse.Namespace, folder: Path, console: Console) -> Path:
@@ -71,9 +109,10 @@ def _recorded_log(arguments: argparse.Namespace, folder: Path, console: Console)
     from lhdmap.report.log_recording import LogRecorder
 
     target: Path = arguments.output or folder / "log.rrd"
-    if target.exists():
-        raise UsageError(f"{target}: is there already; name another file with -o")
-    with LogSource(arguments.path, _overrides(arguments.topic)) as source:
+    with (
+        OutputFiles(target, force=arguments.force, inputs=[arguments.path]) as files,
+        LogSource(arguments.path, topic_overrides(arguments.topic)) as source,
+    ):
         start_ns = source.start_ns or 0
         messages = console.progress(
             source.messages(),
@@ -81,19 +120,12 @@ def _recorded_log(arguments: argparse.Namespace, folder: Path, console: Console)
             label="reading",
             position=lambda item: (item[1].stamp_ns - start_ns) / 1e9,
         )
-        recorder = LogRecorder(target, name_of(arguments.path))
+        recorder = LogRecorder(files.at(target), name_of(arguments.path))
         for role, message in messages:
             recorder.update(role, message)
         recorder.finish([*source.damage, *source.warnings])
     console.note(f"{recorder.scans} scans recorded, ten a second; build-map makes a map of them")
     return target
-
-
-def _overrides(pairs: list[str]) -> dict[str, str]:
-    named = dict(pair.split("=", 1) for pair in pairs if "=" in pair)
-    if len(named) != len(pairs):
-        raise UsageError(f"--topic {' '.join(pairs)}: ROLE=TOPIC was wanted, e.g. --topic front=/scan")
-    return named
 
 
 def _has_display() -> bool:
@@ -102,58 +134,73 @@ def _has_display() -> bool:
     return bool(os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY"))
 
 
-def _viewer(*options: str) -> list[str]:
-    """Return the command line of the viewer that comes with the package rerun-sdk: its program, else its module."""
-    spec = importlib.util.find_spec("rerun_cli")
-    for folder in (spec.submodule_search_locations or []) if spec else []:
-        program = Path(folder) / ("rerun.exe" if sys.platform == "win32" else "rerun")
-        if program.is_file():
-            return [str(program), *options]
-    return [sys.executable, "-m", "rerun", *options]
-
-
 def _open_window(recording: Path) -> int:
     """Run the viewer until its window is closed."""
-    with in_utf8(recording) as opened:
-        return 0 if subprocess.run(_viewer(str(opened)), check=False).returncode == 0 else InputError.exit_code  # noqa: S603
-
-
-def _serve(recording: Path, arguments: argparse.Namespace, console: Console) -> int:
-    """Serve the viewer and the recording until interrupted."""
-    host, data_port = arguments.bind, arguments.port + 1
-    url = f"http://{host}:{arguments.port}/?url=rerun%2Bhttp://{host}:{data_port}/proxy"
-    console.result({"recording": str(recording), "url": url}, f"open {url}  (Ctrl-C ends)")
-    sys.stdout.flush()
-    ports = ("--port", str(data_port), "--web-viewer-port", str(arguments.port))
-    with (
-        in_utf8(recording) as opened,
-        subprocess.Popen(_viewer("--bind", host, "--serve-web", *ports, str(opened))) as viewer,  # noqa: S603
-    ):
-        try:
-            exit_code = viewer.wait()
-        finally:  # after Ctrl-C too, nothing serves any more once the command has ended
-            viewer.kill()
-            viewer.wait()
+    with in_utf8(recording) as opened, started(viewer(str(opened))) as process:
+        exit_code = process.wait()
     if exit_code != 0:
-        raise InputError(f"the web viewer ended with code {exit_code}; is port {arguments.port} in use? see --port")
+        raise InputError(f"the viewer ended with code {exit_code}; --web shows the recording in a browser")
     return 0
 
 
-def _screenshot(recording: Path, target: Path) -> None:
+def _serve(recording: Path, arguments: argparse.Namespace, console: Console) -> int:
+    """Serve the viewer and the recording until interrupted; the last line that is printed is the address alone."""
+    host, data_port = arguments.bind, arguments.port + 1
+    url = f"http://{host}:{arguments.port}/?url=rerun%2Bhttp://{host}:{data_port}/proxy"
+    for port in (arguments.port, data_port):
+        if _answers(host, port):
+            raise UsageError(f"port {port} is in use; --port names another, the one after it must be free too")
+    ports = ("--port", str(data_port), "--web-viewer-port", str(arguments.port))
+    with (
+        in_utf8(recording) as opened,
+        tempfile.TemporaryFile("w+") as said,
+        started(viewer("--bind", host, "--serve-web", *ports, str(opened)), stdout=said, stderr=said) as process,
+    ):
+        _wait_for(process, host, arguments.port)
+        if process.poll() is None:
+            console.note("open this address in a browser; Ctrl-C ends")
+            console.result({"recording": str(recording), "url": url}, url, at_once=True)
+        exit_code = process.wait()
+        said.seek(0)
+        last = (said.read().strip().splitlines() or ["no message"])[-1]
+    if exit_code != 0:
+        raise InputError(f"the web viewer ended with code {exit_code} ({last}); is the port in use? see --port")
+    return 0
+
+
+def _wait_for(process: subprocess.Popen[str], host: str, port: int) -> None:
+    """Wait until the page is served, or the viewer has ended."""
+    until = time.monotonic() + _SERVER_LIMIT_S
+    while process.poll() is None and time.monotonic() < until and not _answers(host, port):
+        time.sleep(0.05)
+
+
+def _answers(host: str, port: int) -> bool:
+    try:
+        with socket.create_connection((host if host not in ("0.0.0.0", "::") else "127.0.0.1", port), timeout=1.0):  # noqa: S104
+            return True
+    except OSError:
+        return False
+
+
+def _screenshot(recording: Path, target: Path, *, force: bool) -> None:
     """Write a picture of the viewer; the recording goes in by standard input, so that all of it is there in time.
 
     Raises:
         InputError: the viewer could not draw.
     """
-    target.unlink(missing_ok=True)
-    try:
-        with recording.open("rb") as data, in_utf8(target) as drawn:
-            command = _viewer("--headless", "--screenshot-to", str(drawn), "--window-size", WINDOW, "-")
-            done = subprocess.run(  # noqa: S603
-                command, stdin=data, capture_output=True, text=True, check=False, timeout=SCREENSHOT_LIMIT_S
-            )
-    except subprocess.TimeoutExpired:
-        raise InputError(f"{recording}: no picture after {SCREENSHOT_LIMIT_S:.0f} s; try --web") from None
-    if done.returncode != 0 or not target.is_file():
-        last = (done.stderr.strip().splitlines() or ["no message"])[-1]
-        raise InputError(f"{recording}: the viewer could not draw ({last}); on Debian it needs mesa-vulkan-drivers")
+    with (
+        OutputFiles(target, force=force) as files,
+        recording.open("rb") as data,
+        in_utf8(files.at(target)) as drawn,
+    ):
+        picture = files.at(target)
+        command = viewer("--headless", "--screenshot-to", str(drawn), "--window-size", WINDOW, "-")
+        with started(command, stdin=data, stdout=subprocess.PIPE, stderr=subprocess.PIPE) as process:
+            try:
+                _, errors = process.communicate(timeout=SCREENSHOT_LIMIT_S)
+            except subprocess.TimeoutExpired:
+                raise InputError(f"{recording}: no picture after {SCREENSHOT_LIMIT_S:.0f} s; try --web") from None
+        if process.returncode != 0 or not picture.is_file():
+            last = (errors.strip().splitlines() or ["no message"])[-1]
+            raise InputError(f"{recording}: the viewer could not draw ({last}); on Debian it needs mesa-vulkan-drivers")

@@ -15,6 +15,7 @@ import numpy as np
 from lhdmap.errors import InputError, LhdmapWarning
 from lhdmap.evaluation.ordering import file_in_order
 from lhdmap.geometry.se3 import quaternions_from_rpy
+from lhdmap.mapfolder import looks_like_log
 from lhdmap.messages import GroundTruth
 from lhdmap.trajectory import Trajectory, read_tum, seconds_to_ns
 
@@ -33,8 +34,12 @@ def load_estimate(path: Path, *, odometry: bool = False) -> Trajectory:
     Raises:
         InputError: there is none at `path`.
     """
+    name = "odometry.tum" if odometry else "trajectory.tum"
+    if path.exists() and looks_like_log(path) and not (path / name).is_file():
+        raise InputError(
+            f"{path}: is a log, a map folder or a TUM file was wanted; lhdmap build-map makes a map of it, then name that folder"
+        )
     if path.is_dir():
-        name = "odometry.tum" if odometry else "trajectory.tum"
         if not (path / name).is_file():
             raise InputError(f"{path}: a map folder with {name} was wanted, the folder has none")
         return read_tum(path / name)

@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
 
 from lhdmap.messages import Float32Array, FloatArray
+
+if TYPE_CHECKING:
+    from open3d.geometry import PointCloud
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,3 +48,12 @@ class Cloud:
     def with_normals(self, normals: Float32Array, curvature: Float32Array) -> Cloud:
         """Return the same cloud with these normals, shape (N, 3), and curvatures, shape (N,)."""
         return replace(self, normals=normals, curvature=curvature)
+
+    def to_open3d(self) -> PointCloud:
+        """Return an `open3d.geometry.PointCloud` with points and, where they are known, normals; both are copied."""
+        import open3d as o3d
+
+        cloud = o3d.geometry.PointCloud(o3d.utility.Vector3dVector(self.points_m.astype(np.float64)))
+        if self.normals is not None:
+            cloud.normals = o3d.utility.Vector3dVector(self.normals.astype(np.float64))
+        return cloud

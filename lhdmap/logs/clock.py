@@ -116,16 +116,18 @@ class LogClock:
         return False
 
     def _step_ns(self, held: list[Timed]) -> int:
-        """Return by how much the clock was set: a scan comes a period after the one before it, and nothing before its time."""
+        """Return by how much the clock was set: a message comes a period after the one before it, and nothing before its time.
+
+        A scanner's messages tell it, where there is one.
+        """
         assert self._last_ns is not None  # noqa: S101
         most_ns = held[0].log_time_ns - self._last_ns
-        found = [most_ns]
-        for one in held:
-            period_ns = self._period_ns(one.topic)
-            if period_ns and isinstance(one.message, (LaserScan, PointCloud)):
-                found.append(one.log_time_ns - self._times[one.topic][-1] - period_ns)
-                break
-        return min(found)
+        known = [one for one in held if self._period_ns(one.topic)]
+        scans = [one for one in known if isinstance(one.message, (LaserScan, PointCloud))]
+        by_period = [
+            one.log_time_ns - self._times[one.topic][-1] - (self._period_ns(one.topic) or 0) for one in (scans or known)
+        ]
+        return min([most_ns, *by_period[:1]])
 
     def _period_ns(self, topic: str) -> int | None:
         """Return the usual time between messages of a topic, None where too few came."""

@@ -18,6 +18,7 @@ from lhdmap.logs.packed import SUFFIXES as PACKED
 from lhdmap.logs.packed import PackedFile
 from lhdmap.logs.sqlite_log import MAGIC as SQLITE_MAGIC
 from lhdmap.logs.sqlite_log import SqliteFile
+from lhdmap.outputs import described, kind_of
 
 Opener = Callable[[Path], LogReader]
 
@@ -76,9 +77,20 @@ def open_log(path: Path | str) -> LogReader:
     path = Path(path)
     if not path.exists():
         raise InputError(f"{path}: no such file or folder")
+    if path.is_dir() and (kind := kind_of(path)) is not None:
+        raise InputError(
+            f"{path}: is a {kind} folder of lhdmap and no log: lhdmap info tells what is in it{_its_log(path)}"
+        )
     if path.is_file() and not path.stat().st_size:
         raise InputError(f"{path}: the file is empty; {WANTED}")
     return _opener(path)(path)
+
+
+def _its_log(folder: Path) -> str:
+    """Return, as the end of a sentence, which log a folder of lhdmap holds or was made from."""
+    found = described(folder) or {}
+    logs = [str(folder / found["log"])] if "log" in found else [one["path"] for one in found.get("sources", [])]
+    return f"; its log: {', '.join(logs)}" if logs else ""
 
 
 def _opener(path: Path) -> Opener:

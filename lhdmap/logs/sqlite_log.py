@@ -8,12 +8,15 @@ from collections.abc import Collection, Iterator
 from pathlib import Path
 from urllib.parse import quote
 
+import numpy as np
+
 from lhdmap.errors import InputError
 from lhdmap.logs.base import Channel
 from lhdmap.logs.blocks import MAX_TIME_NS
 from lhdmap.logs.compression import inflated
 from lhdmap.logs.container import Contents
 from lhdmap.logs.findings import Findings
+from lhdmap.logs.order import clock_was_set_back
 from lhdmap.logs.sqlite_salvage import Salvage
 
 MAGIC = b"SQLite format 3\0"
@@ -24,6 +27,8 @@ _PAGE_SIZE, _PAGE_COUNT, _CHANGE_COUNTER, _VALID_FOR = slice(16, 18), slice(28, 
 _TOPICS = "SELECT id, name, type, serialization_format FROM topics"
 _COUNTS = "SELECT topic_id, COUNT(*), MIN(timestamp), MAX(timestamp) FROM messages GROUP BY topic_id"
 _MESSAGES = "SELECT id, topic_id, timestamp, data FROM messages ORDER BY timestamp, id"
+_AS_WRITTEN = "SELECT id, topic_id, timestamp, data FROM messages ORDER BY id"
+_TIMES = "SELECT timestamp, topic_id FROM messages ORDER BY id"
 
 
 class SqliteFile:
@@ -40,6 +45,7 @@ class SqliteFile:
         self._database: sqlite3.Connection | None = None
         self._salvage: Salvage | None = None
         self._contents: Contents | None = None
+        self._set_back: bool | None = None
         if _is_cut(header, path.stat().st_size):
             damage.add(f"cut off at byte {path.stat().st_size}: the end of the database is missing")
             self._start_salvage()
@@ -59,13 +65,13 @@ class SqliteFile:
         return self._contents
 
     def messages(self, wanted: Collection[int]) -> Iterator[tuple[int, int, bytes]]:
-        """Yield log time, topic id and bytes in log-time order."""
+        """Yield log time, topic id and bytes in log-time order; in the order of writing where the clock was set back."""
         self.contents()
         keep = frozenset(wanted)
         last = (-1, -1)
         if self._database is not None and self._salvage is None:
             try:
-                for rowid, topic, time_ns, data in self._database.execute(_MESSAGES):
+                for rowid, topic, time_ns, data in self._database.execute(self._query()):
                     last = (time_ns, rowid)
                     if topic in keep and _valid(time_ns, data):
                         yield time_ns, topic, inflated(data)
@@ -75,6 +81,15 @@ class SqliteFile:
                 return
         for time_ns, topic, data in self._need_salvage().messages(keep, after=last):
             yield time_ns, topic, inflated(data)
+
+    def _query(self) -> str:
+        """Return how to ask for the messages."""
+        assert self._database is not None  # noqa: S101  # asked for where there is one
+        if self._set_back is None:
+            rows = [row for row in self._database.execute(_TIMES) if all(isinstance(value, int) for value in row)]
+            times, topics = np.array(rows, dtype=np.int64).reshape(-1, 2).T
+            self._set_back = clock_was_set_back(times, topics)
+        return _AS_WRITTEN if self._set_back else _MESSAGES
 
     def close(self) -> None:
         """Close the file."""

@@ -14,11 +14,13 @@ import signal
 import threading
 import traceback
 from collections.abc import Callable
+from multiprocessing import resource_tracker
 from multiprocessing.connection import Connection
 from types import TracebackType
 from typing import Any, Concatenate, Generic, ParamSpec, Protocol, Self, TypeVar
 
 from lhdmap.errors import LhdmapError
+from lhdmap.interrupts import undisturbed
 
 
 class HelperDied(LhdmapError):
@@ -81,7 +83,9 @@ class Beside(Generic[T]):
         self._process = context.Process(
             target=_serve, args=(theirs_in, theirs_out, make, args, kwargs), name="lhdmap-beside", daemon=True
         )
-        self._process.start()
+        resource_tracker.ensure_running()  # it lets signals through when it starts
+        with undisturbed():  # the new process is deaf to Ctrl-C from its first moment: this side decides what is kept
+            self._process.start()
         theirs_in.close()
         theirs_out.close()
         self._told: list[bytes] = []
@@ -164,7 +168,7 @@ def _serve(
     orders: Connection, answers: Connection, make: Callable[..., Served], args: tuple[Any, ...], kwargs: dict[str, Any]
 ) -> None:
     """Make the object and do what is ordered until the other side closes the pipe, or is gone."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C reaches both: the other side decides what is kept
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # where signals cannot be held back (see above)
     served, failure = _tried(make, *args, **kwargs)
     with contextlib.suppress(EOFError):
         while True:

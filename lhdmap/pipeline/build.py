@@ -4,20 +4,22 @@ from __future__ import annotations
 
 import os
 import time
+import warnings
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
 from typing import Any, Literal, TypeVar
 
 from lhdmap.config import Settings, settings_table
-from lhdmap.errors import InputError
+from lhdmap.errors import InputError, LhdmapWarning
 from lhdmap.integration.cloud_io import write_cloud
 from lhdmap.logs.source import LogSource
 from lhdmap.machine import Machine
 from lhdmap.mapfolder import FRAMES, Diagnostics, MapFolderWriter, MapInfo
 from lhdmap.messages import Message
+from lhdmap.outputs import free_folder
 from lhdmap.pipeline.beside import Beside, HelperDied, Here
 from lhdmap.pipeline.cost import CompileClock, Spent, cost, peak_memory_mib
 from lhdmap.pipeline.given import GROUND_TRUTH, given_rows
@@ -32,6 +34,7 @@ from lhdmap.report.page import fill_in_cost
 from lhdmap.report.recording import Thinning
 from lhdmap.trajectory import Trajectory
 
+_ASKED = "interrupted: what was read so far is being written; Ctrl-C once more ends at once"
 _BESIDE_FROM_S = 60.0  # a process takes most of a second to start
 _Stamped = TypeVar("_Stamped", Trajectory, Diagnostics)
 Progress = Callable[[Iterable[tuple[str, Message]], float], Iterable[tuple[str, Message]]]
@@ -43,7 +46,8 @@ class BuildRequest:
 
     `poses`: given poses for the cloud and the final trajectory (`given.given_rows`); empty: the odometry's.
     `helper`: whether a second process may look for the pile, record and report; what comes out is the same.
-    `force`: whether a log that the survey calls unusable is tried nevertheless.
+    `force`: replace a map folder that is there, and try a log that the survey calls unusable. `recorded_as`: names of logs in
+    `map.json`, where they are moved later.
     """
 
     logs: Sequence[Path]
@@ -55,6 +59,7 @@ class BuildRequest:
     poses: str = ""
     helper: bool = False
     force: bool = False
+    recorded_as: Mapping[Path, Path] = field(default_factory=dict)
 
     @property
     def inputs(self) -> Inputs:
@@ -76,17 +81,21 @@ def build_map(request: BuildRequest) -> BuildResult:
     """Read the logs, run the pipeline, write the map folder.
 
     Raises:
+        UsageError: the folder is there already.
         InputError: a log cannot be used, or holds no scan.
+        KeyboardInterrupt: Ctrl-C was pressed; what was finished is kept in the partial folder.
     """
     started, compiling = time.monotonic(), CompileClock()
+    free_folder(request.target, force=request.force, inputs=request.logs)
     given = given_rows(request.poses, request.logs, request.topics) if request.poses else None
     with (
         compiling,
         LogSource(list(request.logs), request.topics, force=request.force) as source,
-        MapFolderWriter(request.target) as folder,
+        MapFolderWriter(request.target, force=request.force, inputs=request.logs) as folder,
     ):
         hashes, pool = _hash_in_background(request.logs)
-        with pool, _inspector(request, source, folder.path) as inspector:
+        interruption = Interruption()
+        with pool, _inspector(request, source, folder.path) as inspector, interruption.comes_first():
             primary: Literal["front", "points"] = "front" if "front" in source.roles else "points"
             pipeline = MappingPipeline(
                 request.settings,
@@ -95,21 +104,19 @@ def build_map(request: BuildRequest) -> BuildResult:
                 primary,
                 pile=PileBeside(inspector),
             )
-            interrupted = _run(pipeline, source, request.progress)
+            _run(pipeline, source, request.progress, interruption)
             as_recorded = partial(source.recorded_ns, primary)
             # An interruption of what follows must not lose it.
             folder.write_odometry(_stamped(odometry_of(pipeline), as_recorded))
             folder.write_diagnostics(_stamped(pipeline.records.diagnostics(), as_recorded))
             ways = ways_of(pipeline, given)
-            if given is None and not interrupted:
+            if given is None and not interruption.asked:
                 require_a_map(source.paths[0], pipeline.records, ways.rows)
             final = _stamped(ways.final, as_recorded)
             folder.write_trajectory(final)
             outcome = Outcome(request.inputs, source, pipeline, ways)
             beside = _write(folder, request, source, outcome, inspector)
-        if interrupted:  # what was finished is kept under the partial name
-            raise KeyboardInterrupt
-        known = {path: future.result() for path, future in hashes.items()}
+        known = {path: _entry(request, path, future) for path, future in hashes.items()}
         own = Spent(peak_memory_mib(), compiling.seconds)
         figures = outcome.summary | cost(started, outcome.duration_s, own, beside)  # one for page, map.json and screen
         fill_in_cost(folder.path / "report.html", figures)
@@ -125,9 +132,8 @@ def _stamped(rows: _Stamped, stamps_of: Callable[[Any], Any]) -> _Stamped:
     return rows._replace(stamp_ns=stamps_of(rows.stamp_ns))
 
 
-def _run(pipeline: MappingPipeline, source: LogSource, progress: Progress | None) -> bool:
-    """Send all messages through the stages; return whether Ctrl-C ended it: the stages then finish with what they have."""
-    interruption = Interruption()
+def _run(pipeline: MappingPipeline, source: LogSource, progress: Progress | None, interruption: Interruption) -> None:
+    """Send all messages through the stages, until Ctrl-C: the stages then finish with what they have."""
     messages: Iterable[tuple[str, Message]] = source.messages([role for role in ROLES_READ if role in source.roles])
     if progress is not None:
         messages = progress(messages, source.duration_s)
@@ -136,11 +142,12 @@ def _run(pipeline: MappingPipeline, source: LogSource, progress: Progress | None
             pipeline.update(role, message)
             if interruption.asked:
                 break
+    if interruption.asked and len(pipeline.track):
+        warnings.warn(_ASKED, LhdmapWarning, stacklevel=2)
     pipeline.finish()
     if not len(pipeline.track):
         damage = f" ({source.damage[0]})" if source.damage else ""
         raise InputError(f"{source.paths[0]}: no usable scan in it{damage}; lhdmap doctor tells what is wrong")
-    return interruption.asked
 
 
 def _write(
@@ -150,6 +157,7 @@ def _write(
     shown = outcome.report(), outcome.pipeline.machine or Machine(bodies={})
     inspector.tell(Inspection.write, *shown)
     write_cloud(folder.path / "cloud.ply", outcome.cloud)
+    folder.finished(folder.path / "cloud.ply")
     if outcome.pile is not None:
         folder.write_json("pile.json", outcome.pile.to_json())
     try:
@@ -187,9 +195,13 @@ def _sweep_sink(inspector: Inspector) -> Callable[[str, int, Any], None]:
     return take
 
 
-def _hash_in_background(logs: Sequence[Path]) -> tuple[dict[Path, Any], ThreadPoolExecutor]:
+def _hash_in_background(logs: Sequence[Path]) -> tuple[dict[Path, Future[dict[str, Any]]], ThreadPoolExecutor]:
     pool = ThreadPoolExecutor(max_workers=1, thread_name_prefix="hash")
     return {path: pool.submit(source_entry, path) for path in logs}, pool
+
+
+def _entry(request: BuildRequest, path: Path, entry: Future[dict[str, Any]]) -> dict[str, Any]:
+    return entry.result() | {"path": str(request.recorded_as.get(path, path))}
 
 
 def _options(request: BuildRequest) -> dict[str, Any]:

@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-import itertools
 import json
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from lhdmap.config import Settings
-from lhdmap.errors import InputError
 from lhdmap.evaluation.trajectory import TrajectoryEvaluation, evaluate_trajectory
+from lhdmap.outputs import OutputFolder
 from lhdmap.pipeline.build import BuildRequest, BuildResult, Progress, build_map
 from lhdmap.resources import resource
 from lhdmap.simulation.drive import Progress as SimulationProgress
@@ -41,47 +40,57 @@ class Demo:
     plot_file: Path
 
 
-def run_demo(target: Path, settings: Settings | None = None, watcher: Watcher | None = None) -> Demo:
-    """Make the folder `target` (or `target-2`, … where that is taken) with the drive, its map and its evaluation.
+def run_demo(
+    target: Path, settings: Settings | None = None, watcher: Watcher | None = None, *, force: bool = False
+) -> Demo:
+    """Make the folder `target` with the drive, its map and its evaluation; with `force` over an earlier one, at the end.
 
     Raises:
-        InputError: the folder cannot be made.
+        UsageError: the folder is there already.
+        InputError: it cannot be made.
     """
+    watcher = watcher or Watcher()
+    with OutputFolder(target, force=force) as folder:
+        demo = _demo(folder, settings or Settings(), watcher)
+        folder.describe("demo", {"log": demo.drive.log.name, "map": demo.built.folder.name})
+        return _moved(demo, folder.complete())
+
+
+def _demo(folder: OutputFolder, settings: Settings, watcher: Watcher) -> Demo:
+    """Run the three steps in the folder that grows."""
     from lhdmap.report.evaluation_plot import plot_evaluation
 
-    watcher = watcher or Watcher()
-    say = watcher.say or _silent
-    folder = new_folder(target)
+    say, path = watcher.say or _silent, folder.path
     scenario = load_scenario(resource(SCENARIO))
     say(f"1/3 simulate: {scenario.drive.distance_m:g} m of drift at {scenario.drive.speed_kmh:g} km/h, 2 scanners")
-    drive = simulate_drift(scenario, folder / "drive.mcap", progress=watcher.simulate)
+    drive = simulate_drift(scenario, path / "drive.mcap", progress=watcher.simulate)
+    folder.finished.append("drive.mcap")
     say("2/3 build-map: from the log alone, its ground truth is not read")
-    request = BuildRequest([drive.log], folder / "drive_map", settings or Settings(), progress=watcher.build)
+    known_as = {drive.log: folder.target / drive.log.name}
+    request = BuildRequest([drive.log], path / "drive_map", settings, progress=watcher.build, recorded_as=known_as)
     built = build_map(request)
     say("3/3 eval: the map's trajectory against the truth of the simulation")
     evaluation = evaluate_trajectory(built.trajectory, drive.truth)
-    evaluation_file, plot_file = folder / "evaluation.json", folder / "evaluation.png"
+    evaluation_file, plot_file = path / "evaluation.json", path / "evaluation.png"
     evaluation_file.write_text(json.dumps(evaluation.to_json(), indent=2) + "\n", encoding="utf-8")
     plot_evaluation(evaluation, plot_file)
-    return Demo(folder, drive, built, evaluation, evaluation_file, plot_file)
+    return Demo(path, drive, built, evaluation, evaluation_file, plot_file)
+
+
+def _moved(demo: Demo, folder: Path) -> Demo:
+    """Return the demo with its files in the folder that it has come to."""
+    drive, built = demo.drive, demo.built
+    log, truth, scenario = (folder / path.name for path in (drive.log, drive.truth_file, drive.scenario_file))
+    target = folder / built.folder.name
+    return Demo(
+        folder,
+        replace(drive, log=log, truth_file=truth, scenario_file=scenario),
+        replace(built, folder=target, summary=built.summary | {"map": str(target)}),
+        demo.evaluation,
+        folder / demo.evaluation_file.name,
+        folder / demo.plot_file.name,
+    )
 
 
 def _silent(text: str) -> None:
     """Say nothing."""
-
-
-def new_folder(target: Path) -> Path:
-    """Make the folder `target`, or `target-2`, `target-3`, … where that name is taken; return it.
-
-    Raises:
-        InputError: it cannot be made.
-    """
-    for path in itertools.chain([target], (target.with_name(f"{target.name}-{n}") for n in itertools.count(2))):
-        try:
-            path.mkdir(parents=True)
-        except FileExistsError:
-            continue
-        except OSError as error:
-            raise InputError(f"{path}: the output folder cannot be made: {error.strerror}") from error
-        return path
-    raise AssertionError("the numbers do not end")

@@ -2,39 +2,59 @@
 
 from __future__ import annotations
 
+import contextlib
 import signal
 import threading
+from collections.abc import Iterator
 from types import FrameType, TracebackType
-from typing import Self
+from typing import Any, Self
+
+from lhdmap.interrupts import GIVE_WAY
 
 
 class Interruption:
-    """While entered, the first Ctrl-C only sets `asked`; a second one raises KeyboardInterrupt at once.
+    """While entered, the first Ctrl-C only sets `asked`; a second one does at once what it would have done without this.
 
-    Raised wherever the program happens to be, it would leave locks of the compiler held (llvmlite's), and the thread that
-    integrates would wait for them for ever. Outside of the main thread, or where the caller handles the signal, nothing changes.
+    Raised wherever the program happens to be, KeyboardInterrupt would leave locks of the compiler held (llvmlite's), and the thread
+    that integrates would wait for them for ever. Outside of the main thread, or where the caller handles the signal, nothing changes.
     """
 
     def __init__(self) -> None:
         self.asked = False
-        self._replaced = False
+        self._before: Any = None
 
     def __enter__(self) -> Self:
         """Take over the signal where it is Python's own to handle."""
-        in_main = threading.current_thread() is threading.main_thread()
-        if in_main and signal.getsignal(signal.SIGINT) is signal.default_int_handler:
+        before = signal.getsignal(signal.SIGINT)
+        if threading.current_thread() is threading.main_thread() and before in GIVE_WAY:
+            self._before = before
             signal.signal(signal.SIGINT, self._ask)
-            self._replaced = True
         return self
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         """Give the signal back."""
-        if self._replaced:
-            signal.signal(signal.SIGINT, signal.default_int_handler)
+        if self._before is not None:
+            signal.signal(signal.SIGINT, self._before)
 
-    def _ask(self, _number: int, _frame: FrameType | None) -> None:
+    @contextlib.contextmanager
+    def comes_first(self) -> Iterator[None]:
+        """Within, a run that was asked to end ends as interrupted, whatever went wrong after that with the little there is.
+
+        Raises:
+            KeyboardInterrupt: it was asked to end.
+        """
+        try:
+            yield
+        except Exception as error:
+            if self.asked:
+                raise KeyboardInterrupt from error
+            raise
         if self.asked:
             raise KeyboardInterrupt
+
+    def _ask(self, number: int, frame: FrameType | None) -> None:
+        if self.asked:
+            self._before(number, frame)
         self.asked = True

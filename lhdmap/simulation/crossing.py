@@ -13,12 +13,15 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from lhdmap.errors import UsageError
 from lhdmap.messages import FloatArray
+from lhdmap.settings import figure
 from lhdmap.simulation.centre_line import Start, centre_line
 from lhdmap.simulation.drift import Drift, Mesh
 from lhdmap.simulation.raycast import Surface
 
 _REACH_M = 16.0  # the main drift this far from the opening takes part in the union
+_FLOOR_M = 4.0  # so far along the main drift its floor counts
 _SILL_M = 0.15  # the side drift's floor lies above the main one's, so that the machine's way stays as it was
 
 
@@ -128,12 +131,19 @@ def joined(a: Mesh, b: Mesh) -> Mesh:
 def side_drift(
     main: Drift, opening: tuple[float, float, float], rng: np.random.Generator, *, planar: bool = False
 ) -> Side:
-    """Return the level, straight drift of an `opening`: (arc length on the main drift m, angle deg, length m)."""
+    """Return the level, straight drift of an `opening`: (arc length on the main drift m, angle deg, length m).
+
+    Raises:
+        UsageError: the main drift is not that long.
+    """
     at_m, angle_deg, length_m = opening
     line = main.line
     x, y, z, heading = line.at(np.array([at_m]))[0]
     if not planar:
-        z = float(line.z_m[np.abs(line.s_m - at_m) < 4.0].max()) + _SILL_M
+        floor_m = line.z_m[np.abs(line.s_m - at_m) < _FLOOR_M]
+    if not len(floor_m):
+        raise UsageError(f"cross drift at {figure(at_m)} m: the drift is only {figure(float(line.s_m[-1]))} m long")
+    z = float(floor_m.max()) + _SILL_M
     start = Start(float(x), float(y), float(z), float(heading) + math.radians(angle_deg))
     pieces = ((length_m + 1.0, 0.0, 0.0),)
     settings = replace(main.settings, pieces=pieces, cross_drifts=(), widenings=())

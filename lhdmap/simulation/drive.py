@@ -14,6 +14,7 @@ import numpy.typing as npt
 from lhdmap.errors import UsageError
 from lhdmap.geometry import se3
 from lhdmap.messages import Float32Array, FloatArray, GroundTruth, LaserScan, Mount, Record
+from lhdmap.outputs import OutputFiles
 from lhdmap.simulation import sensors
 from lhdmap.simulation.pile_facts import PileTruth
 from lhdmap.simulation.pile_files import write_pile_truth
@@ -57,43 +58,39 @@ class ScannerStream(NamedTuple):
 
 
 def simulate_drift(
-    scenario: DriftScenario, path: Path, *, mesh_path: Path | None = None, progress: Progress | None = None
+    scenario: DriftScenario,
+    path: Path,
+    *,
+    mesh_path: Path | None = None,
+    progress: Progress | None = None,
+    force: bool = False,
 ) -> SimulatedDrive:
     """Simulate the drive of `scenario` into the log `path`, with `.truth.tum` and `.scenario.toml` beside it.
 
     A drive to a pile has `.pile.json` as well: the truth about it.
 
     `mesh_path` takes the drift's mesh (PLY, in `map`). `progress(records, duration_s)` wraps the records on their
-    way into the log.
+    way into the log. The files get their names together, when all are complete; with `force` over those of an earlier run.
 
     Raises:
-        UsageError: a file to be written exists already, or the log's name does not end in .mcap.
+        UsageError: a file to be written exists already (without `force`), or the log's name does not end in .mcap.
         InputError: the scenario's machine file cannot be read.
     """
-    from lhdmap.logs.writer import LogWriter
-
     if path.suffix != ".mcap":
         raise UsageError(f"{path}: logs are written as MCAP, so a name that ends in .mcap was wanted")
     truth_file, scenario_file = path.with_suffix(".truth.tum"), path.with_suffix(".scenario.toml")
     pile_file = path.with_suffix(".pile.json") if scenario.pile is not None else None
-    for file in (path, truth_file, scenario_file, mesh_path, pile_file):
-        if file is not None and file.exists():
-            raise UsageError(f"{file} exists already and is never overwritten: give another name with -o")
-    world = DriftWorld(scenario)
-    path.parent.mkdir(parents=True, exist_ok=True)
-    scenario_file.write_text(scenario_toml(scenario), encoding="utf-8")
-    truth = truth_at(world, front_stamps(world))
-    write_tum(truth_file, truth)
-    if mesh_path is not None:
-        world.write_mesh(mesh_path)
-    pile = pile_truth(world) if world.pile is not None else None
-    if pile is not None and pile_file is not None:
-        write_pile_truth(pile_file, pile, truth)
-    stream, messages = records(world), 0
-    with LogWriter(path) as writer:
-        for record in progress(stream, world.motion.duration_s) if progress else stream:
-            writer.write(record.topic, record.message, record.log_time_ns)
-            messages += 1
+    with OutputFiles(truth_file, scenario_file, mesh_path, pile_file, path, force=force) as files:
+        world = DriftWorld(scenario)
+        files.at(scenario_file).write_text(scenario_toml(scenario), encoding="utf-8")
+        truth = truth_at(world, front_stamps(world))
+        write_tum(files.at(truth_file), truth)
+        if mesh_path is not None:
+            world.write_mesh(files.at(mesh_path))
+        pile = pile_truth(world) if world.pile is not None else None
+        if pile is not None and pile_file is not None:
+            write_pile_truth(files.at(pile_file), pile, truth)
+        messages = _write_log(world, files.at(path), progress)
     scans = len(truth.stamps_ns)
     return SimulatedDrive(
         path,
@@ -108,6 +105,18 @@ def simulate_drift(
         pile_file,
         pile,
     )
+
+
+def _write_log(world: DriftWorld, path: Path, progress: Progress | None) -> int:
+    """Write the log of a drive; return how many messages are in it."""
+    from lhdmap.logs.writer import LogWriter
+
+    stream, messages = records(world), 0
+    with LogWriter(path) as writer:
+        for record in progress(stream, world.motion.duration_s) if progress else stream:
+            writer.write(record.topic, record.message, record.log_time_ns)
+            messages += 1
+    return messages
 
 
 def records(world: DriftWorld) -> Iterator[Record]:

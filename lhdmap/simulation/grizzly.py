@@ -16,6 +16,7 @@ import numpy as np
 from lhdmap.integration.cloud import Cloud
 from lhdmap.integration.cloud_io import write_cloud
 from lhdmap.messages import FloatArray
+from lhdmap.outputs import OutputFiles
 from lhdmap.rockbreaker.machine import Rockbreaker
 from lhdmap.simulation.drift import Mesh
 from lhdmap.simulation.pile_rocks import box, rock
@@ -127,13 +128,23 @@ def _seen(meshes: list[Mesh], rng: np.random.Generator) -> FloatArray:
     return np.concatenate(points)
 
 
-def write_scene(path: Path, machine: Rockbreaker, scene: GrizzlyScene) -> Path:
-    """Write the cloud in the frame that the machine says it stands in, and the truth as JSON, whose path is returned."""
-    T_cloud_base = machine.T_cloud_base
+def truth_path(path: Path) -> Path:
+    """Return where the truth of the cloud `path` goes."""
+    return path.with_name(path.stem + ".grizzly.json")
+
+
+def write_scene(path: Path, machine: Rockbreaker, scene: GrizzlyScene, *, force: bool = False) -> Path:
+    """Write the cloud in the frame that the machine says it stands in, and the truth as JSON, whose path is returned.
+
+    Raises:
+        UsageError: one of the files is there already, without `force`.
+    """
+    T_cloud_base, truth = machine.T_cloud_base, truth_path(path)
     points_m = scene.points_m @ T_cloud_base[:3, :3].T + T_cloud_base[:3, 3]
-    write_cloud(path, Cloud(points_m.astype(np.float32)))
-    truth = path.with_name(path.stem + ".grizzly.json")
-    truth.write_text(json.dumps(scene_json(machine, scene), indent=1) + "\n", encoding="utf-8")
+    with OutputFiles(truth, path, force=force) as files:
+        write_cloud(files.at(path), Cloud(points_m.astype(np.float32)))
+        text = json.dumps(scene_json(machine, scene), indent=1)
+        files.at(truth).write_text(text + "\n", encoding="utf-8")
     return truth
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import signal
 from collections.abc import Callable, Iterator
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
@@ -9,6 +10,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from lhdmap.errors import ConfigError
+from lhdmap.outputs import OutputFolder
 from lhdmap.settings import load_section, nearest, read_toml, setting
 from lhdmap.simulation.pile_files import row_of, write_table
 from lhdmap.simulation.pile_scenes import scene
@@ -72,25 +74,32 @@ def load_suite(path: Path) -> list[SuiteScene]:
     return found
 
 
-def write_suite(scenes: list[SuiteScene], folder: Path, *, jobs: int = 1, told: Told | None = None) -> Path:
+def write_suite(
+    scenes: list[SuiteScene], folder: Path, *, jobs: int = 1, told: Told | None = None, force: bool = False
+) -> Path:
     """Write the logs of all scenes into `folder`, with their truth and the table `truth.csv`; return the table.
 
-    What is there already (from a run that was interrupted) stays. `told(name, done, of)` hears of each finished scene.
+    What is in the partial folder already (from a run that was interrupted) stays. `told(name, done, of)` hears of each
+    finished scene.
 
     Raises:
+        UsageError: the folder is there already, without `force`.
         OSError: a file cannot be written.
     """
-    folder.mkdir(parents=True, exist_ok=True)
-    wanted = [one for one in scenes if not _finished(one, folder)]
-    for done, name in enumerate(_written(wanted, folder, jobs), start=1):
-        if told is not None:
-            told(name, done, len(wanted))
-    write_table(folder / TABLE, (row_of(folder / f"{one.name}.pile.json", folder) for one in scenes))
-    return folder / TABLE
+    with OutputFolder(folder, force=force, resumed=True) as growing:
+        wanted = [one for one in scenes if not _finished(one, growing.path)]
+        for done, name in enumerate(_written(wanted, growing.path, jobs), start=1):
+            growing.finished.append(name)
+            if told is not None:
+                told(name, done, len(wanted))
+        rows = (row_of(growing.path / f"{one.name}.pile.json", growing.path) for one in scenes)
+        write_table(growing.path / TABLE, rows)
+        growing.describe("suite", {"scenes": [one.name for one in scenes]})
+        return growing.complete() / TABLE
 
 
 def _finished(one: SuiteScene, folder: Path) -> bool:
-    return (folder / f"{one.name}.mcap").exists() and (folder / f"{one.name}.pile.json").exists()
+    return (folder / f"{one.name}.mcap").exists()  # it gets its name last
 
 
 def _written(scenes: list[SuiteScene], folder: Path, jobs: int) -> Iterator[str]:
@@ -98,19 +107,16 @@ def _written(scenes: list[SuiteScene], folder: Path, jobs: int) -> Iterator[str]
         for one in scenes:
             yield _write(one, folder)
         return
-    with ProcessPoolExecutor(jobs) as pool:
-        yield from pool.map(_write, scenes, [folder] * len(scenes))
+    with ProcessPoolExecutor(jobs, initializer=signal.signal, initargs=(signal.SIGINT, signal.SIG_IGN)) as pool:
+        try:
+            yield from pool.map(_write, scenes, [folder] * len(scenes))
+        finally:
+            pool.shutdown(wait=False, cancel_futures=True)
 
 
 def _write(one: SuiteScene, folder: Path) -> str:
-    """Write one scene under a partial name, and rename it when complete."""
+    """Write one scene; what a run that was interrupted has left of it is replaced."""
     from lhdmap.simulation.drive import simulate_drift
 
-    partial = folder / f"partial.{one.name}.mcap"
-    suffixes = (".truth.tum", ".scenario.toml", ".pile.json", ".mcap")
-    for suffix in suffixes:
-        partial.with_suffix(suffix).unlink(missing_ok=True)
-    simulate_drift(one.scenario(), partial)
-    for suffix in suffixes:
-        partial.with_suffix(suffix).replace(folder / f"{one.name}{suffix}")
+    simulate_drift(one.scenario(), folder / f"{one.name}.mcap", force=True)
     return one.name

@@ -1,15 +1,16 @@
-"""`lhdmap demo`: everything in one go, at a new place each time."""
+"""`lhdmap demo`: everything in one go, over nothing that is there unless that is asked for."""
 
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import pytest
 from lhdmap.cli.main import main
 from lhdmap.mapfolder import MapFolder
-from lhdmap.pipeline.demo import new_folder
+from lhdmap.simulation.scenario import DriftScenario, load_scenario
 from lhdmap.trajectory import read_tum
 
 
@@ -47,9 +48,48 @@ def test_a_pose_for_every_front_scan(demo: tuple[Path, Any]) -> None:
     assert len(read_tum(folder / "drive_map" / "trajectory.tum").stamps_ns) == told["map"]["scans"]
 
 
-def test_a_taken_name_is_left_alone(tmp_path: Path) -> None:
+@pytest.fixture
+def short_drive(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The demo with a drive of 3 m."""
+
+    def load(path: Path) -> DriftScenario:
+        whole = load_scenario(path)
+        drift, drive = replace(whole.drift, cross_drifts=()), replace(whole.drive, distance_m=3.0)
+        return replace(whole, drift=drift, drive=replace(drive, stops=(), reversals=()))
+
+    monkeypatch.setattr("lhdmap.pipeline.demo.load_scenario", load)
+
+
+def test_a_taken_name_is_refused_before_the_work(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (tmp_path / "demo").mkdir()
     (tmp_path / "demo" / "mine.txt").write_text("kept", encoding="utf-8")
-    assert new_folder(tmp_path / "demo") == tmp_path / "demo-2"
-    assert new_folder(tmp_path / "demo") == tmp_path / "demo-3"
-    assert (tmp_path / "demo" / "mine.txt").read_text(encoding="utf-8") == "kept"
+    for words in ([], ["--force"]):
+        assert main(["demo", "-o", str(tmp_path / "demo"), *words]) == 2
+        told = capsys.readouterr().err
+        assert str(tmp_path / "demo") in told
+        assert "-o OTHER" in told
+        assert "simulate" not in told
+    assert [path.name for path in tmp_path.rglob("*")] == ["demo", "mine.txt"]
+
+
+def test_a_second_demo_replaces_the_first_with_force(
+    short_drive: None, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    target = tmp_path / "demo"
+    for _ in range(2):
+        assert main(["demo", "-o", str(target), "--force", "--json", "--quiet"]) == 0
+        (target / "stale.txt").touch()
+    told = json.loads(capsys.readouterr().out.splitlines()[-1])
+    (target / "stale.txt").unlink()
+    assert [path.name for path in tmp_path.iterdir()] == ["demo"]
+    for name in ("log", "truth", "report", "recording"):
+        assert Path(told[name]).is_relative_to(target)
+        assert Path(told[name]).is_file()
+    source = json.loads((target / "drive_map" / "map.json").read_text(encoding="utf-8"))["sources"][0]
+    assert source["path"] == str(target / "drive.mcap")
+    assert main(["demo", "-o", str(target)]) == 2
+
+
+def test_make_demo_works_twice() -> None:
+    lines = (Path(__file__).parents[2] / "Makefile").read_text(encoding="utf-8").splitlines()
+    assert any("lhdmap demo" in line and "--force" in line for line in lines)

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 from typing import NamedTuple
 
 import pytest
 from lhdmap.cli.main import COMMANDS, main
+from lhdmap.mapfolder import MapFolderWriter, MapInfo
 
 from tests.cli.logs import write_room_log
 
@@ -35,15 +37,51 @@ REFUSALS = [
     Refusal("build-map {log} --config {missing}", 2, ("missing.mcap",)),
     Refusal("build-map {log} --config {text}", 2, ("notes.txt", "TOML")),
     Refusal("build-map {log} --machine {missing}", 3, ("missing.mcap",)),
-    Refusal("build-map {log} --speed 3", 2, ("--speed",)),
+    Refusal("build-map {log} --speed 3", 2, ("--speed", "usage: lhdmap build-map")),
+    Refusal("build-map {log} --outptu x", 2, ("--outptu", "did you mean '--output'", "usage: lhdmap build-map")),
+    Refusal("build-map --conifg x", 2, ("--conifg", "did you mean '--config'")),
+    Refusal("build-map {log} --set odometry.step=1", 2, ("one of step_m, step_s, step_deg?",)),
+    Refusal("build-map {log} --set step_m=1", 2, ("odometry.step_m=1",)),
+    Refusal("build-map {log} --set odometry.voxel_size_m=1", 2, ("integration.voxel_size_m",)),
+    Refusal("build-map {log} --set odometry.step_m=-1", 2, ("odometry.step_m = -1", "0 m or more")),
+    Refusal("build-map {log} --config {settings}", 2, ("mine.toml", "odometry.metod", "did you mean 'method'")),
+    Refusal("build-map {log} --topic frnt=/scan", 2, ("frnt", "did you mean 'front'")),
+    Refusal("build-map {map}", 3, ("map", "is a map folder of lhdmap", "lhdmap info", "drive.mcap")),
+    Refusal("build-map {log} -o {map}", 2, ("map", "is there already", "-o OTHER", "--force")),
+    Refusal("build-map {log} -o {foreign} --force", 2, ("foreign", "not made by lhdmap", "-o OTHER")),
+    Refusal("build-map {log} -o {log} --force", 2, ("room.mcap", "is a file")),
+    Refusal("build-map {log} -o {log}/map", 3, ("room.mcap", "cannot be made")),
+    Refusal("build-map {map}/inner.mcap -o {map} --force", 2, ("inner.mcap is in it",)),
+    Refusal("pile {map}", 3, ("is a map folder of lhdmap", "lhdmap info")),
+    Refusal("pile {log} -o {map}", 2, ("is there already", "--force")),
+    Refusal("pile {log} -o {log}/pile", 3, ("room.mcap", "cannot be made")),
+    Refusal("info {log}", 3, ("room.mcap", "is a log", "lhdmap doctor", "lhdmap build-map")),
+    Refusal("info {folder}", 3, ("folder", "map.json")),
+    Refusal("info {missing}", 3, ("missing.mcap", "no such file")),
+    Refusal("eval trajectory {log} --truth {tum}", 3, ("room.mcap", "is a log", "lhdmap build-map")),
+    Refusal("eval trajectory {tum} --truht {tum}", 2, ("--truht", "did you mean '--truth'", "usage: lhdmap eval traj")),
+    Refusal("eval trajectroy {tum}", 2, ("trajectroy", "did you mean 'trajectory'", "usage: lhdmap eval")),
+    Refusal("eval trajectory {tum} --truth {tum} --plot {text}", 2, ("notes.txt", "exists already", "--force")),
+    Refusal("rockbreaker paln", 2, ("paln", "did you mean 'plan'", "usage: lhdmap rockbreaker")),
+    Refusal("rockbreaker plan --to 6,0,-1 -o {map}", 2, ("is there already", "--force")),
+    Refusal("rockbreaker plan --to 6,0,-1 -o {log}/plan", 3, ("room.mcap", "cannot be made")),
+    Refusal("rockbreaker workspace -o {foreign} --force", 2, ("not made by lhdmap",)),
+    Refusal("config pil", 2, ("pil", "did you mean 'pile'")),
+    Refusal("completion tcsh", 2, ("tcsh", "bash, zsh, fish", "usage: lhdmap completion")),
+    Refusal("simulate grizly", 2, ("grizly", "did you mean 'grizzly'")),
+    Refusal("simulate drift --length 2 -o {log}/a.mcap", 3, ("room.mcap", "cannot be made")),
+    Refusal("view {log} --screenshot {text}", 2, ("notes.txt", "exists already", "--force")),
+    Refusal("view {log} --web -o {text}", 2, ("notes.txt", "exists already", "--force")),
+    Refusal("view {log} --web -o {log} --force", 2, ("room.mcap", "input itself")),
+    Refusal("view {log} --web -o /dev/full --force", 2, ("/dev/full", "no ordinary file")),
     Refusal("build-map", 2, ("LOG",)),
-    Refusal("doctor {log} --topic front", 2, ("ROLE=TOPIC",)),
+    Refusal("doctor {log} --topic front", 2, ("role=/topic",)),
     Refusal("doctor", 2, ("LOG",)),
     Refusal("config --set integration.voxel=1", 2, ("integration.voxel",)),
     Refusal("config --config {missing}", 2, ("missing.mcap",)),
     Refusal("simulate moon", 2, ("moon", "drift")),
     Refusal("simulate {text}", 3, ("notes.txt",)),
-    Refusal("simulate drift -o {log}", 2, ("room.mcap", "exists")),
+    Refusal("simulate drift -o {log}", 2, ("room.mcap", "exists", "--force")),
     Refusal("simulate drift -o {folder}/a.bag", 2, (".mcap",)),
     Refusal("simulate drift --roughness very -o {folder}/a.mcap", 2, ("--roughness",)),
     Refusal("eval trajectory {missing} --truth {log}", 3, ("missing.mcap",)),
@@ -85,6 +123,16 @@ def files(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     found["folder"].mkdir()
     found["log"] = write_room_log(root / "room.mcap", 5)
     found["two"] = write_room_log(root / "two.mcap", 5, ("/scan_a", "/scan_b"))
+    found["settings"] = root / "mine.toml"
+    found["settings"].write_text("[odometry]\nmetod = 'anchored'\n", encoding="utf-8")
+    found["foreign"] = root / "foreign"
+    found["foreign"].mkdir()
+    (found["foreign"] / "map.json").write_text('{"software": {"name": "another"}}', encoding="utf-8")
+    found["map"] = root / "map"
+    with MapFolderWriter(found["map"]) as folder:
+        (folder.path / "inner.mcap").write_bytes(found["log"].read_bytes())
+        (folder.path / "trajectory.tum").touch()
+        folder.complete(MapInfo([Path("drive.mcap")]), {Path("drive.mcap"): {"path": "drive.mcap"}})
     found["tum"] = root / "path.tum"
     found["tum"].write_text("".join(f"{i}.0 {i}.0 0 0 0 0 0 1\n" for i in range(9)), encoding="utf-8")
     return found
@@ -97,11 +145,17 @@ def test_is_refused_in_words(
     monkeypatch.chdir(files["folder"])
     before = sorted(path.name for path in files["folder"].parent.iterdir())
     assert main(case.words.format(**files).split()) == case.exit_code
-    told = capsys.readouterr().err
-    assert "Traceback" not in told
-    assert "fault in lhdmap" not in told
+    text = capsys.readouterr().err
+    assert "Traceback" not in text
+    assert "fault in lhdmap" not in text
     for word in case.told:
-        assert word in told
+        assert word in text
+    assert main([*case.words.format(**files).split(), "--json"]) == case.exit_code
+    told = capsys.readouterr()
+    error = json.loads(told.out)["error"]
+    assert error["exit_code"] == case.exit_code
+    assert error["message"].splitlines()[0] in told.err or case.words.startswith("doctor")
+    assert error["kind"] in ("usage", "settings", "input", "system", "shortfall")
     assert sorted(path.name for path in files["folder"].parent.iterdir()) == before, "a refused command left files"
 
 

@@ -13,7 +13,6 @@ from typing import Any
 
 import pytest
 from lhdmap.cli.main import main
-from lhdmap.mapfolder import MapFolder
 
 from tests.cli.logs import write_room_log
 
@@ -45,12 +44,6 @@ def test_build_map_gives_the_contracts_object(log: Path, tmp_path: Path, capsys:
 @pytest.mark.parametrize("words", [["doctor", "{log}"], ["config"], ["doctor", "{log}", "{log}"]])
 def test_one_json_object(words: list[str], log: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert isinstance(_json([word.format(log=log) for word in words], capsys), dict)
-
-
-def test_a_map_is_never_overwritten(log: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    folders = [_json(["build-map", str(log), "-o", str(tmp_path / "map")], capsys)["map"] for _ in range(2)]
-    assert folders == [str(tmp_path / "map"), str(tmp_path / "map-2")]
-    assert MapFolder.open(Path(folders[0])).changed_files() == []
 
 
 def test_without_an_output_the_map_lies_beside_its_log(log: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -100,3 +93,5 @@ def test_interrupted_keeps_what_is_there(interrupted: tuple[int, str, Path]) -> 
     assert "interrupted" in errors
     assert not (folder / "map").exists(), "an interrupted map does not look like a complete one"
     assert (folder / "map.partial").is_dir()
+    assert f"what was finished is kept in {folder / 'map.partial'}" in errors
+    assert {"odometry.tum", "trajectory.tum", "cloud.ply"} <= {path.name for path in (folder / "map.partial").iterdir()}

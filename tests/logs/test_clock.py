@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import sqlite3
+from contextlib import closing
 from pathlib import Path
 
 import numpy as np
@@ -11,6 +13,7 @@ from lhdmap.logs.blocks import Block, Loaded
 from lhdmap.logs.formats import open_log
 from lhdmap.logs.health import examine
 from lhdmap.logs.order import clock_was_set_back
+from lhdmap.logs.ros_messages import serialized
 from lhdmap.logs.source import LogSource
 from lhdmap.logs.stamp_clocks import ONE_CLOCK, Sample, find_clocks
 from lhdmap.logs.writer import LogWriter
@@ -174,3 +177,40 @@ def test_blocks_are_read_ahead_only_where_they_run_back() -> None:
     assert not set_back(listed, load)
     with pytest.raises(LhdmapError):
         set_back(listed[::-1], load)
+
+
+def _database(path: Path, times_ns: list[int]) -> Path:
+    """Write a ROS 2 bag in SQLite by hand: tachometer messages in the order given."""
+    data = [serialized(Tachometer(ns, 1.0 + k))[1] for k, ns in enumerate(times_ns)]
+    with closing(sqlite3.connect(path)) as base, base:
+        base.execute("CREATE TABLE topics (id INTEGER PRIMARY KEY, name TEXT, type TEXT, serialization_format TEXT)")
+        base.execute("CREATE TABLE messages (id INTEGER PRIMARY KEY, topic_id INTEGER, timestamp INTEGER, data BLOB)")
+        base.execute("INSERT INTO topics VALUES (1, '/machine/tachometer', 'geometry_msgs/msg/TwistStamped', 'cdr')")
+        rows = [(1, ns, message) for ns, message in zip(times_ns, data, strict=True)]
+        base.executemany("INSERT INTO messages (topic_id, timestamp, data) VALUES (?, ?, ?)", rows)
+    return path
+
+
+def test_a_database_with_a_clock_set_back_is_read_as_written(tmp_path: Path) -> None:
+    times = [(10 + k) * SECOND for k in range(40)] + [(30 + k) * SECOND for k in range(40)]
+    with open_log(_database(tmp_path / "log.db3", times)) as reader:
+        assert [record.log_time_ns for record in reader.records()] == times
+        assert [step.by_ns for step in reader.clock_steps] == [-20 * SECOND]
+    with open_log(_database(tmp_path / "other.db3", times[40:] + times[:20])) as reader:
+        assert [record.log_time_ns for record in reader.records()] == sorted(times[40:] + times[:20])
+
+
+@pytest.mark.parametrize(
+    ("starts_s", "wanted"),
+    [((0, 60, 120), "012"), ((120, 0, 60), "120"), ((0, 40, 100), "012"), ((7200, 60, 120), "012")],
+)
+def test_files_of_a_bag_follow_each_other(tmp_path: Path, starts_s: tuple[int, ...], wanted: str) -> None:
+    """By time where only their names are out of order, as listed where the clock was set back between them."""
+    for part, start_s in enumerate(starts_s):
+        with LogWriter(tmp_path / f"drive_{part}.mcap") as writer:
+            for k in range(60):
+                stamp = (start_s + k + 1) * SECOND
+                writer.write("/machine/tachometer", Tachometer(stamp, float(part)), stamp)
+    with open_log(tmp_path) as reader:
+        speeds = [record.message.speed_mps for record in reader.records() if isinstance(record.message, Tachometer)]
+    assert "".join(str(int(speed)) for speed in speeds[::60]) == wanted

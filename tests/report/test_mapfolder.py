@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from lhdmap import __version__
-from lhdmap.errors import InputError
+from lhdmap.errors import InputError, LhdmapWarning
 from lhdmap.mapfolder import MapFolder, MapFolderWriter, MapInfo
 from lhdmap.provenance import source_entry
 
@@ -59,11 +59,6 @@ def test_map_json_says_where_the_map_came_from(tmp_path: Path, log: Path) -> Non
     assert {"map", "base_link"} <= info["frames"].keys()
 
 
-def test_a_folder_is_never_overwritten(tmp_path: Path, log: Path) -> None:
-    names = [write(tmp_path / "map", log).name for _ in range(3)]
-    assert names == ["map", "map-2", "map-3"]
-
-
 def test_an_interrupted_run_keeps_what_it_had_under_a_partial_name(tmp_path: Path, log: Path) -> None:
     def interrupted() -> None:
         with MapFolderWriter(tmp_path / "map") as folder:
@@ -76,22 +71,9 @@ def test_an_interrupted_run_keeps_what_it_had_under_a_partial_name(tmp_path: Pat
     assert (tmp_path / "map.partial" / "trajectory.tum").exists()
     with pytest.raises(InputError, match="interrupted before it was complete"):
         MapFolder.open(tmp_path / "map.partial")
-    assert write(tmp_path / "map", log).name == "map"
-
-
-def test_a_name_taken_meanwhile_is_left_alone(tmp_path: Path, log: Path) -> None:
-    with MapFolderWriter(tmp_path / "map") as slow:
-        slow.write_trajectory(drive(5))
-        (tmp_path / "map").mkdir()
-        (tmp_path / "map" / "mine.txt").write_text("mine")
-        assert slow.complete(MapInfo([log])).name == "map-2"
-    assert (tmp_path / "map" / "mine.txt").read_text() == "mine"
-
-
-def test_two_runs_at_once_get_two_folders(tmp_path: Path, log: Path) -> None:
-    with MapFolderWriter(tmp_path / "map") as one, MapFolderWriter(tmp_path / "map") as other:
-        assert one.path != other.path
-        assert {one.complete(MapInfo([log])).name, other.complete(MapInfo([log])).name} == {"map", "map-2"}
+    with pytest.warns(LhdmapWarning, match="left over from an interrupted run, is replaced"):
+        assert write(tmp_path / "map", log).name == "map"
+    assert not (tmp_path / "map.partial").exists()
 
 
 def test_changed_and_missing_files_are_found(tmp_path: Path, log: Path) -> None:

@@ -77,7 +77,7 @@ def test_a_recording_is_not_overwritten(tmp_path: Path, log: Path, capsys: pytes
     before = (tmp_path / "old.rrd").read_bytes()
     assert main(["view", str(log), "--screenshot", str(tmp_path / "s.png"), "-o", str(tmp_path / "old.rrd")]) == 2
     assert (tmp_path / "old.rrd").read_bytes() == before
-    assert "is there already" in capsys.readouterr().err
+    assert "exists already" in capsys.readouterr().err
 
 
 def test_web_serves_this_machine_only_until_interrupted(tmp_path: Path) -> None:

@@ -158,7 +158,7 @@ def test_truth_changes_nothing_else_in_the_log(scenario: DriftScenario, tmp_path
 
 
 def test_nothing_is_overwritten(drive: SimulatedDrive, scenario: DriftScenario, tmp_path: Path) -> None:
-    with pytest.raises(UsageError, match="never overwritten"):
+    with pytest.raises(UsageError, match="exists already"):
         simulate_drift(scenario, drive.log)
     (tmp_path / "x.truth.tum").write_text("mine", encoding="utf-8")
     with pytest.raises(UsageError, match=r"x\.truth\.tum"):

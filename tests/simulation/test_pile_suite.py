@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import json
+import shutil
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +16,7 @@ from lhdmap.logs.formats import open_log
 from lhdmap.messages import LaserScan
 from lhdmap.resources import resource
 from lhdmap.simulation.pile_sections import VARIANTS
-from lhdmap.simulation.pile_suite import load_suite
+from lhdmap.simulation.pile_suite import SuiteScene, load_suite
 from lhdmap.trajectory import read_tum
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -66,12 +67,35 @@ def test_the_log_shows_the_wall_at_its_distance(folder: Path) -> None:
     assert middle + 0.8 == pytest.approx(truth_of(folder, "wall_4")["distance_to_toe_m"][-1], abs=0.6)
 
 
-def test_a_suite_goes_on_where_it_was_interrupted(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    before = {file.name: file.stat().st_mtime_ns for file in folder.glob("*.mcap")}
-    words = ["simulate", "pile", "--suite", str(folder.parent / "two.toml"), "-o", str(folder), "--json"]
+@pytest.mark.filterwarnings("default::lhdmap.errors.LhdmapWarning")
+def test_a_suite_goes_on_where_it_was_interrupted(
+    folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    words = ["simulate", "pile", "--suite", str(folder.parent / "two.toml"), "-o", str(tmp_path / "out"), "--json"]
+
+    def interrupted(one: SuiteScene, to: Path) -> str:
+        if one.variant == "post":
+            raise KeyboardInterrupt
+        for file in folder.glob(f"{one.name}.*"):
+            shutil.copy(file, to)
+        return one.name
+
+    with monkeypatch.context() as patch:
+        patch.setattr("lhdmap.simulation.pile_suite._write", interrupted)
+        assert main(words) == 4
+    assert f"kept in {tmp_path / 'out.partial'}" in json.loads(capsys.readouterr().out)["error"]["message"]
+    before = (tmp_path / "out.partial" / "wall_4.mcap").stat().st_ino
     assert main(words) == 0
-    assert json.loads(capsys.readouterr().out)["scenes"] == 2
-    assert {file.name: file.stat().st_mtime_ns for file in folder.glob("*.mcap")} == before
+    told = capsys.readouterr()
+    assert json.loads(told.out)["scenes"] == 2
+    assert "is gone on with" in told.err
+    assert (tmp_path / "out" / "wall_4.mcap").stat().st_ino == before
+    assert (tmp_path / "out" / "truth.csv").read_bytes() == (folder / "truth.csv").read_bytes()
+
+
+def test_a_suite_that_is_there_is_refused(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["simulate", "pile", "--suite", str(folder.parent / "two.toml"), "-o", str(folder)]) == 2
+    assert "--force" in capsys.readouterr().err
 
 
 def test_the_same_words_write_the_same_bytes(folder: Path, tmp_path: Path) -> None:

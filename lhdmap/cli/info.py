@@ -1,0 +1,156 @@
+"""`lhdmap info PATH`: what is in a map or run folder, in ten lines."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from lhdmap.cli.console import Console
+from lhdmap.errors import InputError
+
+_SETTINGS_SHOWN = 4
+_WHAT = {"map": "map", "pile": "ore pile", "plan": "rockbreaker's plan", "workspace": "rockbreaker's workspace"}
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the options of `lhdmap info`."""
+    parser.add_argument("path", type=Path, metavar="PATH", help="map folder, or that of another run of lhdmap")
+
+
+def run(arguments: argparse.Namespace, console: Console) -> int:
+    """Read the folder's description and print it."""
+    values = folder_values(arguments.path)
+    console.result(values, "\n".join(folder_lines(values)))
+    return 0
+
+
+def folder_values(path: Path) -> dict[str, Any]:
+    """Return what `--json` prints of a folder.
+
+    Raises:
+        InputError: it is none of lhdmap, or not complete.
+    """
+    from lhdmap.outputs import described, kind_of
+
+    info = described(path) if path.is_dir() else None
+    if info is None:
+        raise InputError(f"{path}: {_instead(path)}")
+    sizes = {one.name: one.stat().st_size for one in sorted(path.iterdir()) if one.is_file()}
+    listed = {name: int(entry["bytes"]) for name, entry in info.get("files", {}).items()}
+    return {
+        "path": str(path),
+        "kind": kind_of(path),
+        "software": info.get("software"),
+        "format_version": info.get("format_version"),
+        "sources": [source | {"there": Path(source["path"]).exists()} for source in info.get("sources", [])],
+        "counts": info.get("counts", {}),
+        "frames": info.get("frames", {}),
+        "settings": _changed_settings(info.get("options", {})),
+        "files": sizes,
+        "changed": [name for name, size in listed.items() if sizes.get(name) != size],
+        "warnings": info.get("warnings", []),
+        **({"map": folder_values(path / info["map"])} if "map" in info else {}),
+    }
+
+
+def _instead(path: Path) -> str:
+    """Return what is at a path that is no folder of lhdmap, and what to do with it."""
+    from lhdmap.mapfolder import looks_like_log
+    from lhdmap.outputs import PARTIAL_SUFFIX
+
+    if not path.exists():
+        return "no such file or folder; a map or run folder was wanted"
+    if path.is_dir() and path.name.endswith(PARTIAL_SUFFIX):
+        names = ", ".join(sorted(one.name for one in path.iterdir() if not one.name.startswith("."))) or "nothing"
+        return f"the run was interrupted before it was complete; run it again (in the folder: {names})"
+    if looks_like_log(path):
+        return "is a log; lhdmap doctor tells what is in it, lhdmap build-map makes a map of it"
+    if path.suffix == ".rrd":
+        return "is a Rerun recording; lhdmap view opens it"
+    return "a map or run folder of lhdmap was wanted, it has no map.json or run.json of one"
+
+
+def _changed_settings(options: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the settings that are not the defaults of this version, by `section.key`."""
+    from lhdmap.config import Settings, settings_table
+
+    defaults = settings_table(Settings())
+    found = {}
+    for section, values in options.items():
+        for key, value in values.items() if section in defaults and isinstance(values, dict) else ():
+            default = defaults[section].get(key)
+            if value != (list(default) if isinstance(default, tuple) else default):
+                found[f"{section}.{key}"] = value
+    return found
+
+
+def folder_lines(values: Mapping[str, Any]) -> list[str]:
+    """Return the folder in ten lines at most; of a run with a map in it, what is in the map."""
+    inner = values.get("map")
+    if inner:
+        return [f"{values['kind']:<12} {values['path']}", *folder_lines(inner)]
+    software = values["software"]
+    lines = [f"{_WHAT.get(values['kind'], values['kind']):<12} {values['path']}, made by lhdmap {software['version']}"]
+    for source in values["sources"][:1]:
+        more = f" and {len(values['sources']) - 1} more" if len(values["sources"]) > 1 else ""
+        lines.append(f"made from    {source['path']}{'' if source['there'] else ' (not found from here)'}{more}")
+    lines += _drive_lines(values["counts"])
+    lines += _result_lines(Path(values["path"]))
+    settings = [f"{name} = {value}" for name, value in values["settings"].items()]
+    more = " …" if len(settings) > _SETTINGS_SHOWN else ""
+    lines.append(f"settings     {', '.join(settings[:_SETTINGS_SHOWN]) or 'the defaults'}{more}")
+    lines.append(f"files        {', '.join(f'{name} {_size(size)}' for name, size in values['files'].items())}")
+    if values["changed"]:
+        lines.append(f"changed      {', '.join(values['changed'])}: not as they were written")
+    if values["warnings"]:
+        lines.append(f"warnings     {len(values['warnings'])}, the first: {values['warnings'][0]}")
+    return lines
+
+
+def _drive_lines(counts: Mapping[str, Any]) -> list[str]:
+    if "distance_m" not in counts:
+        return []
+    drive = f"drive        {counts['distance_m']:.0f} m in {counts['duration_s']:.0f} s"
+    if counts.get("poses"):
+        return [drive, f"scans        {counts['scans']}, poses given: {counts['poses']}"]
+    weak = 100.0 * (counts.get("degenerate_share") or 0.0)
+    scans = (
+        f"scans        {counts['scans']} ({counts['scans_processed']} processed), weak {weak:.0f} %, "
+        f"lost stretches {counts.get('lost_stretches', 0)}, closed loops {counts.get('closures', 0)}"
+    )
+    return [drive, scans]
+
+
+def _result_lines(folder: Path) -> list[str]:
+    """Return what the run found, of its own JSON files."""
+    import json
+
+    lines = []
+    for name in ("pile.json", "plan.json"):
+        if not (folder / name).is_file():
+            continue
+        try:
+            found = json.loads((folder / name).read_text(encoding="utf-8"))
+        except (OSError, ValueError):
+            lines.append(f"{name:<12} not readable")
+            continue
+        lines.append(_pile_line(found) if name == "pile.json" else _plan_line(found))
+    return lines
+
+
+def _pile_line(found: Mapping[str, Any]) -> str:
+    width = "" if found.get("width_m") is None else f", {found['width_m']:.2f} m wide"
+    slope = "" if found.get("inclination_deg") is None else f", inclination {found['inclination_deg']:.1f}°"
+    return f"pile         {found.get('status') or 'none looked for'}{width}{slope}"
+
+
+def _plan_line(found: Mapping[str, Any]) -> str:
+    if not found.get("feasible"):
+        return f"plan         not feasible: {(found.get('reason') or {}).get('text', 'no reason given')}"
+    return f"plan         {str(found['path']).upper()}, {found['timing']}: {found['duration_s']:.2f} s"
+
+
+def _size(size: int) -> str:
+    return f"{size / 1e6:.1f} MB" if size >= 1e5 else f"{size / 1e3:.0f} kB"

@@ -1,0 +1,53 @@
+"""What must be done before Ctrl-C ends the program at once.
+
+Raised wherever Python happens to be, KeyboardInterrupt is swallowed by libraries, turned into another error, or leaves their
+locks held. The program `lhdmap` therefore ends inside the handler of the signal (`lhdmap.cli.interrupt`), without unwinding:
+who has something to put in order says so here. In a program of somebody else nothing of this happens.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import signal
+import threading
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+Action = Callable[[], Path | None]
+_actions: list[Action] = []
+GIVE_WAY: list[Any] = [signal.default_int_handler]
+"""Handlers of Ctrl-C that may be replaced for a while: Python's own, and that of the program."""
+
+
+@contextlib.contextmanager
+def before_interrupt(action: Action) -> Iterator[None]:
+    """While entered, have `action` called before Ctrl-C ends the program; it returns where something is kept, or None."""
+    _actions.append(action)
+    try:
+        yield
+    finally:
+        _actions.remove(action)
+
+
+def put_in_order() -> list[Path]:
+    """Call all actions, the latest first; return what is kept."""
+    kept = []
+    while _actions:
+        with contextlib.suppress(Exception):  # nothing may keep the program from ending
+            path = _actions.pop()()
+            kept += [] if path is None else [path]
+    return kept
+
+
+@contextlib.contextmanager
+def undisturbed() -> Iterator[None]:
+    """Hold Ctrl-C back for a moment: for steps that belong together, and for processes that are to start deaf to it."""
+    if threading.current_thread() is not threading.main_thread() or not hasattr(signal, "pthread_sigmask"):
+        yield
+        return
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
