@@ -141,9 +141,10 @@ def _result_lines(folder: Path) -> list[str]:
 
 
 def _pile_line(found: Mapping[str, Any]) -> str:
+    status = found.get("status") or f"unknown: {found.get('reason')}"
     width = "" if found.get("width_m") is None else f", {found['width_m']:.2f} m wide"
     slope = "" if found.get("inclination_deg") is None else f", inclination {found['inclination_deg']:.1f}°"
-    return f"pile         {found.get('status') or 'none looked for'}{width}{slope}"
+    return f"pile         {status}{width}{slope}"
 
 
 def _plan_line(found: Mapping[str, Any]) -> str:

@@ -84,6 +84,8 @@ def test_without_an_inclinometer_it_says_that_none_was_looked_for(
     assert "unknown: no pile was looked for" in text
     assert "100 %" not in text
     assert "none" not in text
+    assert main(["info", str(tmp_path / "again")]) == 0
+    assert "pile         unknown: no pile was looked for" in capsys.readouterr().out
 
 
 def test_a_pile_that_is_not_to_be_looked_for(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
