@@ -102,6 +102,8 @@ def _collect(
         rows.append(row)
         if row.problem:
             console.warn(f"attempt {row.attempt.name}: {row.problem}")
+        elif row.reason:
+            console.warn(f"attempt {row.attempt.name}: {row.attempt.log}: no status: {row.reason}")
         elif runner is not None and truth.is_run(row.attempt):
             console.note(
                 f"{len(rows)} of {len(truth.attempts)}: {row.attempt.log}: {row.found.status or 'not identified'}"
@@ -145,8 +147,8 @@ def _line(row: PileRow) -> str:
 
 
 def _status(row: PileRow) -> str:
-    if row.problem:
-        return "could not be run"
+    if row.problem or row.reason:
+        return "could not be run" if row.problem else "no status"
     true, found = row.attempt.truth.status, row.found.status or ("not identified" if row.judged else "-")
     return found if true is None or true == found else f"{found} (true: {true})"
 

@@ -87,9 +87,9 @@ def _text(values: dict[str, Any], folder: Path) -> str:
     lines = [f"folder       {folder}", *_measures(values)]
     distance_m = values["distance_at_decision_m"]
     if distance_m is not None:
-        lines.append(f"decided      {distance_m:.1f} m before the toe")
-    elif not values["identified"]:
-        lines.append("decided      no: not identified")
+        lines.append(f"decided      {distance_m:.1f} m before the toe (the foot of the pile)")
+    elif values["status"] not in (None, "none"):
+        lines.append(f"decided      no: it was never sure enough that it is {values['status']}")
     if len(values["piles"]) > 1:
         statuses = ", ".join(one["status"] for one in values["piles"])
         lines.append(f"on the drive {statuses}: in pile.json, piles")

@@ -90,6 +90,7 @@ class Approach(NamedTuple):
 class PileReport:
     """Outcome of a drive: the decision (None: not identified), the last estimate, and how it came about.
 
+    `reason`: why no pile was looked for (empty: it was); status and probabilities are then null.
     `around_m` (N, 3): hits around the pile in the map, thinned, for pictures; `warnings`: what is to be said of the log.
     `piles`: all that was decided on the drive, this one too, in the order of time: the decision and the last estimate of each.
     """
@@ -101,18 +102,32 @@ class PileReport:
     around_m: FloatArray = field(default_factory=lambda: np.zeros((0, 3)))
     warnings: tuple[str, ...] = ()
     piles: tuple[Approach, ...] = ()
+    reason: str = ""
+
+    @property
+    def estimate(self) -> PileEstimate:
+        """What is said of the pile: the last estimate, without measures where it is none; unknown where none was looked for."""
+        if self.last is not None:
+            return _of_a_pile(self.last.estimate)
+        return PileEstimate.unknown(self.reason) if self.reason else PileEstimate()
 
     def to_json(self) -> dict[str, Any]:
-        """Return the content of `pile.json`: the last estimate, and when and how far away it was decided."""
-        best = self.last.estimate if self.last is not None else PileEstimate()
-        table = estimate_json(_of_a_pile(best))
-        table["warnings"] = [*self.warnings, *best.warnings]
+        """Return the content of `pile.json`: the last estimate, and when and how far away it was decided.
+
+        A warning is said once, at the top.
+        """
+        best = self.estimate
+        table = estimate_json(best)
+        table["warnings"] = list(dict.fromkeys([*self.warnings, *best.warnings]))
         table["method"] = self.method
         table["identified"] = self.decision is not None
         table["decided_at_ns"] = self.decision.stamp_ns if self.decision else None
         table["distance_at_decision_m"] = _number(self.decision.distance_m) if self.decision else None
         table["decision"] = estimate_json(self.decision.estimate) if self.decision else None
         table["piles"] = [_approach_json(one) for one in self.piles]
+        for part in (table["decision"], *table["piles"]):
+            if part is not None:
+                part["warnings"] = [text for text in part["warnings"] if text not in table["warnings"]]
         return table
 
 

@@ -21,14 +21,16 @@ from lhdmap.mapfolder import FRAMES, Diagnostics, MapFolderWriter, MapInfo
 from lhdmap.messages import Message
 from lhdmap.outputs import free_folder
 from lhdmap.pipeline.beside import Beside, HelperDied, Here
+from lhdmap.pipeline.cost import CompileClock, Spent, cost, peak_memory_mib
 from lhdmap.pipeline.given import GROUND_TRUTH, given_rows
 from lhdmap.pipeline.inspection import Inspection, Inspector, PileBeside
 from lhdmap.pipeline.interruption import Interruption
 from lhdmap.pipeline.mapping import MappingPipeline
 from lhdmap.pipeline.mounts import machine_of
-from lhdmap.pipeline.outcome import ROLES_READ, Inputs, Outcome, cost, odometry_of, ways_of
+from lhdmap.pipeline.outcome import ROLES_READ, Inputs, Outcome, odometry_of, ways_of
 from lhdmap.pipeline.refusal import require_a_map
 from lhdmap.provenance import file_entry, source_entry
+from lhdmap.report.page import fill_in_cost
 from lhdmap.report.recording import Thinning
 from lhdmap.trajectory import Trajectory
 
@@ -62,7 +64,7 @@ class BuildRequest:
     @property
     def inputs(self) -> Inputs:
         """What the map is made of."""
-        return Inputs(self.logs, self.settings, self.topics, self.target.name, bool(self.poses), self.force)
+        return Inputs(self.logs, self.settings, self.topics, self.target.name, self.poses, self.force)
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,10 +85,11 @@ def build_map(request: BuildRequest) -> BuildResult:
         InputError: a log cannot be used, or holds no scan.
         KeyboardInterrupt: Ctrl-C was pressed; what was finished is kept in the partial folder.
     """
-    started = time.monotonic()
+    started, compiling = time.monotonic(), CompileClock()
     free_folder(request.target, force=request.force, inputs=request.logs)
     given = given_rows(request.poses, request.logs, request.topics) if request.poses else None
     with (
+        compiling,
         LogSource(list(request.logs), request.topics, force=request.force) as source,
         MapFolderWriter(request.target, force=request.force, inputs=request.logs) as folder,
     ):
@@ -111,10 +114,12 @@ def build_map(request: BuildRequest) -> BuildResult:
                 require_a_map(source.paths[0], pipeline.records, ways.rows)
             final = _stamped(ways.final, as_recorded)
             folder.write_trajectory(final)
-            outcome = Outcome(request.inputs, source, pipeline, ways, started)
-            beside_mib = _write(folder, request, source, outcome, inspector)
+            outcome = Outcome(request.inputs, source, pipeline, ways)
+            beside = _write(folder, request, source, outcome, inspector)
         known = {path: _entry(request, path, future) for path, future in hashes.items()}
-        figures = outcome.summary | cost(started, outcome.duration_s, beside_mib)  # the same in map.json and on screen
+        own = Spent(peak_memory_mib(), compiling.seconds)
+        figures = outcome.summary | cost(started, outcome.duration_s, own, beside)  # one for page, map.json and screen
+        fill_in_cost(folder.path / "report.html", figures)
         info = MapInfo(request.logs, _options(request), figures, outcome.warnings, _frames(request))
         path = folder.complete(info, known)
     return BuildResult(path, figures | {"map": str(path)}, outcome.warnings, final)
@@ -147,8 +152,8 @@ def _run(pipeline: MappingPipeline, source: LogSource, progress: Progress | None
 
 def _write(
     folder: MapFolderWriter, request: BuildRequest, source: LogSource, outcome: Outcome, inspector: Inspector
-) -> float:
-    """Write the rest of the map but `map.json`; return the memory that a process beside this one took, MiB."""
+) -> Spent:
+    """Write the rest of the map but `map.json`; return what a process beside this one needed."""
     shown = outcome.report(), outcome.pipeline.machine or Machine(bodies={})
     inspector.tell(Inspection.write, *shown)
     write_cloud(folder.path / "cloud.ply", outcome.cloud)
@@ -156,13 +161,13 @@ def _write(
     if outcome.pile is not None:
         folder.write_json("pile.json", outcome.pile.to_json())
     try:
-        peak_mib = inspector.ask(Inspection.peak_memory_mib)
+        spent = inspector.ask(Inspection.spent)
     except HelperDied as error:
         outcome.warnings.append(f"{error}; the recording has no scans in it")
         with _inspection(Here, request, source, folder.path) as here:
             here.ask(Inspection.write, *shown)
-        return 0.0
-    return peak_mib if isinstance(inspector, Beside) else 0.0
+        return Spent()
+    return spent if isinstance(inspector, Beside) else Spent()
 
 
 def _inspector(request: BuildRequest, source: LogSource, folder: Path) -> Inspector:

@@ -7,7 +7,7 @@ integrated once a later pose is known, so that its motion is interpolated and no
 from __future__ import annotations
 
 import math
-from collections import deque
+from collections import Counter, deque
 from functools import partial
 from typing import Literal
 
@@ -94,6 +94,7 @@ class MappingPipeline:
         self._cloud = cloud
         self.rear = RearScans(self.mounts, self.wheels, machine or _DEFAULT_MACHINE)
         self.has_inclinometer = False
+        self.wheel_sources: Counter[str] = Counter()  # scans that wheels told the motion of, by sensor
         self._newest_ns = self._time_ns = self._before_ns = -(2**62)
         self._clock_ns = -(2**62)
         self._scan_ns = (self._clock_ns, self._clock_ns)  # of the newest scan: its stamp, and that made rising
@@ -281,6 +282,7 @@ class MappingPipeline:
         motion = self.wheels.motion_between(self._time_ns, time_ns) if self._time_ns > 0 else None
         prior = None
         if motion is not None:
+            self.wheel_sources[motion.source] += 1
             x, y, turn = (float(value) for value in motion.delta)
             prior = CloudPrior(se3.from_rpy(0.0, 0.0, turn, (x, y, 0.0)), motion.covariance)
         T_level_base = se3.from_rpy(*self._attitude_at(time_ns), 0.0) if self.has_inclinometer else None
@@ -320,6 +322,7 @@ class MappingPipeline:
         motion = self.wheels.motion_between(before_ns, time_ns) if before_ns > 0 else None
         if motion is None:
             return None
+        self.wheel_sources[motion.source] += 1
         forward_sigma, turn_sigma = math.sqrt(motion.covariance[0, 0]), math.sqrt(motion.covariance[2, 2])
         turn = None if motion.source == "tachometer" else float(motion.delta[2])
         half = 0.5 * float(motion.delta[2])  # the way's direction is the heading's in the middle of the step

@@ -25,14 +25,29 @@ def section(title: str, body: str) -> str:
     return f"<section>\n<h2>{title}</h2>\n{body}</section>\n" if body else ""
 
 
-def cards(figures: Iterable[tuple[str, str, str]]) -> str:
-    """Return cards of name, value and meaning."""
-    inner = "".join(
+def cards(figures: Iterable[tuple[str, str, str]], more: str = "") -> str:
+    """Return cards of name, value and meaning; `more` is markup after the last one."""
+    return f"<div class=cards>\n{card_list(figures)}{more}</div>\n"
+
+
+def card_list(figures: Iterable[tuple[str, str, str]]) -> str:
+    """Return the cards of name, value and meaning without a frame around them."""
+    return "".join(
         f"<div class=card><b>{html.escape(value)}</b><span>{html.escape(name)}</span>"
         f"<p>{html.escape(meaning)}</p></div>\n"
         for name, value, meaning in figures
     )
-    return f"<div class=cards>\n{inner}</div>\n"
+
+
+def terms(words: Iterable[tuple[str, str]]) -> str:
+    """Return words and what they mean, folded away."""
+    rows = "".join(f"<dt>{html.escape(word)}</dt><dd>{html.escape(meaning)}</dd>\n" for word, meaning in words)
+    return f"<details><summary>What the words mean</summary><dl>\n{rows}</dl></details>\n" if rows else ""
+
+
+def paragraph(words: str) -> str:
+    """Return a paragraph of text."""
+    return f"<p>{html.escape(words)}</p>\n"
 
 
 def listed(items: Iterable[str], kind: str) -> str:

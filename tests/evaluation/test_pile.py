@@ -290,3 +290,15 @@ def test_figures_agree_with_plain_arithmetic(values: list[tuple[float, float, fl
         assert summary.p90 is not None
         assert summary.max is not None
         assert summary.median <= summary.p90 <= summary.max
+
+
+def test_a_pile_that_was_not_looked_for_is_null_and_counts_for_nothing(truth_file: Callable[..., Path]) -> None:
+    path = truth_file("1,a,3.0,-50.0,loadable", "2,b,,,none", header=HEADER + ",gt_status")
+    reports = {"a": _report(3.0, -50.0), "b": PileReport(None, None, reason="no pile was looked for: no inclinometer")}
+    rows = evaluate_pile(read_pile_truth(path), lambda log: reports[log.name])
+    found = PileEvaluation(tuple(rows), was_run=True).to_json()
+    assert [row["pred_status"] for row in found["rows"]] == ["loadable", None]
+    assert "inclinometer" in found["rows"][1]["reason"]
+    assert found["rows"][1]["problem"] is None
+    assert found["status_n"] == 1
+    assert found["status_accuracy"] == 1.0

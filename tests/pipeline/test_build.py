@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import html
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
+from lhdmap.config import Settings
 from lhdmap.errors import InputError
 from lhdmap.evaluation.trajectory import evaluate_trajectory
 from lhdmap.integration.cloud_io import read_cloud
@@ -166,3 +169,26 @@ def test_a_pause_in_the_log_is_told(untold: Path, tmp_path: Path) -> None:
                 writer.write(source.roles[role], [message] if isinstance(message, Mount) else message)
     found = build_map(BuildRequest([tmp_path / "pause.mcap"], tmp_path / "map"))
     assert any("no scan for 61 s" in text for text in found.warnings)
+
+
+@pytest.mark.parametrize("why", ["inclinometer", "off"])
+def test_a_pile_that_was_not_looked_for_is_null_with_the_reason(untold: Path, tmp_path: Path, why: str) -> None:
+    log, settings = untold, Settings()
+    if why == "off":
+        settings = replace(settings, pile=replace(settings.pile, method="off"))
+    else:
+        log = rewritten(untold, tmp_path / "scans.mcap", "as it is")
+    found = build_map(BuildRequest([log], tmp_path / "map", settings))
+    assert found.summary["pile"] is None
+    assert why in found.summary["pile_reason"]
+    assert not (found.folder / "pile.json").exists()
+    page = (found.folder / "report.html").read_text(encoding="utf-8")
+    assert "<p>No pile was looked for: " in page
+    assert "probability" not in page
+
+
+def test_no_warning_is_said_twice(built: BuildResult) -> None:
+    assert len(set(built.warnings)) == len(built.warnings)
+    page = (built.folder / "report.html").read_text(encoding="utf-8")
+    for text in built.warnings:
+        assert page.count(html.escape(text)) == 1
