@@ -22,6 +22,14 @@ from lhdmap.logs.topics import SCAN, is_ground_truth, missing_scanner, roles_and
 from lhdmap.logs.value_health import ValueWatch
 from lhdmap.messages import LaserScan, Message, Record
 
+# Words of readers' remarks on what was guessed or left out.
+_GUESSED = (
+    "times of its points",
+    "field of view is a guess",
+    "not used; it is read as",
+    "not named in metadata.yaml",
+    "another clock",
+)
 _KEY_SCAN_STEP_M, _KEY_SCAN_PERIOD_S = 0.5, 0.3
 # Wraps the records while they are read, for a progress display: reader and records in, records out.
 Progress = Callable[[LogReader, Iterator[Record]], Iterator[Record]]
@@ -91,7 +99,7 @@ def _examined(reader: LogReader, overrides: Mapping[str, str], progress: Progres
     findings += _mounts(survey, roles, watches)
     findings += _key_scans(roles, watches)
     findings += _clocks(reader)
-    findings += [Finding(Severity.NOTE, "", line) for line in reader.remarks if not _told_elsewhere(line)]
+    findings += [_of_remark(line) for line in reader.remarks if not _told_elsewhere(line)]
     used = {role: topic for role, topic in roles.items() if role not in survey.left_out}
     return Examination(reader.path, _verdict(findings), findings, take_inventory(reader, used))
 
@@ -127,6 +135,11 @@ def _clocks(reader: LogReader) -> list[Finding]:
     start_ns = min((seen.first_ns for seen in reader.stamps.values() if seen.count), default=0)
     advice = "the order of the file is kept, and time runs on as if the clock had not been set"
     return [Finding(Severity.REMARK, "", step.text(start_ns), advice) for step in reader.clock_steps]
+
+
+def _of_remark(line: str) -> Finding:
+    """Return a reader's remark as a finding; how a format is read is a note, what was guessed or left out is more."""
+    return Finding(Severity.REMARK if any(word in line for word in _GUESSED) else Severity.NOTE, "", line)
 
 
 def _told_elsewhere(remark: str) -> bool:
