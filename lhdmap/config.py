@@ -13,6 +13,7 @@ from lhdmap.errors import ConfigError
 from lhdmap.integration.integrator import IntegrationSettings
 from lhdmap.odometry.cloud_settings import CloudOdometrySettings
 from lhdmap.odometry.settings import AnchorSettings, OdometrySettings, RangeFlowSettings, SearchSettings
+from lhdmap.odometry.trust_settings import TrustSettings
 from lhdmap.pile.figure9_settings import Figure9Constants, RepairedConstants
 from lhdmap.pile.settings import PileSettings
 from lhdmap.proprioception.attitude import AttitudeSettings
@@ -37,6 +38,7 @@ class Settings:
     anchor: AnchorSettings = field(default_factory=AnchorSettings)
     search: SearchSettings = field(default_factory=SearchSettings)
     range_flow: RangeFlowSettings = field(default_factory=RangeFlowSettings)
+    trust: TrustSettings = field(default_factory=TrustSettings)
     cloud_odometry: CloudOdometrySettings = field(default_factory=CloudOdometrySettings)
     attitude: AttitudeSettings = field(default_factory=AttitudeSettings)
     wheels: WheelSettings = field(default_factory=WheelSettings)

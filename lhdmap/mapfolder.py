@@ -46,7 +46,8 @@ class Diagnostics(NamedTuple):
     `residual` (the matcher's, m), `inliers` (share or count, as the matcher gives it), `information_along`,
     `information_across` (1/m^2) and `information_heading` (1/rad^2) in the machine's frame, `degenerate` (an axis was
     not observed), `substitute` (what was used instead: `wheels`, `motion`, or empty), `slip` (speed of the wheels over
-    that of the machine minus one, NaN where not known).
+    that of the machine minus one, NaN where not known). `std_along`, `std_across` (m), `std_heading` (rad): standard deviations
+    of what the step from the processed scan before adds to the error of the path; None in maps that do not tell it.
     """
 
     stamp_ns: npt.NDArray[np.int64]
@@ -58,6 +59,9 @@ class Diagnostics(NamedTuple):
     degenerate: npt.NDArray[np.bool_]
     substitute: Sequence[str]
     slip: FloatArray
+    std_along: FloatArray | None = None
+    std_across: FloatArray | None = None
+    std_heading: FloatArray | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -111,7 +115,8 @@ class MapFolderWriter:
         import pyarrow as pa
         import pyarrow.parquet as pq
 
-        columns = diagnostics._asdict() | {"substitute": pa.array(list(diagnostics.substitute), pa.string())}
+        columns = {name: values for name, values in diagnostics._asdict().items() if values is not None}
+        columns["substitute"] = pa.array(list(diagnostics.substitute), pa.string())
         path = self.path / "diagnostics.parquet"
         with path.open("wb") as file:
             pq.write_table(pa.table(columns), file, compression="zstd")
@@ -206,8 +211,9 @@ class MapFolder:
         path = self.file("diagnostics.parquet")
         try:
             with path.open("rb") as file:
-                table = pq.read_table(file, columns=list(Diagnostics._fields))
-            columns = {name: table.column(name).to_numpy() for name in Diagnostics._fields}
+                table = pq.read_table(file)
+            optional = set(Diagnostics._field_defaults) - set(table.column_names)
+            columns = {name: table.column(name).to_numpy() for name in Diagnostics._fields if name not in optional}
         except (pa.ArrowException, OSError, KeyError) as error:
             raise InputError(f"{path}: not readable as diagnostics ({error})") from error
         return Diagnostics(**columns | {"substitute": [str(text) for text in columns["substitute"]]})

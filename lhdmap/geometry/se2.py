@@ -51,3 +51,17 @@ def transform(T_a_b: FloatArray, points_b: FloatArray) -> FloatArray:
         out[i, 0] = T_a_b[0] + c * points_b[i, 0] - s * points_b[i, 1]
         out[i, 1] = T_a_b[1] + s * points_b[i, 0] + c * points_b[i, 1]
     return out
+
+
+@nb.njit(cache=True)
+def adjoint(T_a_b: FloatArray) -> FloatArray:
+    """Return the matrix (3, 3) that carries a small motion from the axes of b to those of a: T exp(e) = exp(adjoint e) T."""
+    c, s = math.cos(T_a_b[2]), math.sin(T_a_b[2])
+    return np.array([[c, -s, T_a_b[1]], [s, c, -T_a_b[0]], [0.0, 0.0, 1.0]])
+
+
+@nb.njit(cache=True)
+def composed_covariance(covariance_a_b: FloatArray, T_b_c: FloatArray, covariance_b_c: FloatArray) -> FloatArray:
+    """Return the covariance (3, 3) of T_a_c from those of T_a_b and T_b_c, independent, each in the axes of its end."""
+    carried = adjoint(inverse(T_b_c))
+    return carried @ covariance_a_b @ carried.T + covariance_b_c

@@ -15,6 +15,7 @@ from lhdmap.odometry.motion import Motion
 from lhdmap.odometry.rear_view import NO_POINTS, NOTHING_BEHIND, Behind, JointOffset
 from lhdmap.odometry.settings import AnchorSettings, OdometrySettings, RangeFlowSettings, SearchSettings
 from lhdmap.odometry.slant import NO_RISE, slants
+from lhdmap.odometry.step_covariance import noise_share
 from lhdmap.odometry.steps import BY_DEFINITION, Matched, marginal_information
 from lhdmap.odometry.surface_map import empty_map, insert_all
 
@@ -100,7 +101,7 @@ class AnchoredMatcher:
         result = self._match(hits, heading)
         if result.support < self._anchor.min_support and not self._at_the_edge(result, hits):
             return self._lose(points, T_base_scanner, result.support)
-        self._lost_in_a_row = 0
+        self._lost_in_a_row, model = 0, self._model
         self._learn_noise(result.residual_sigmas)
         if len(hits.points) > hits.front:
             self._joint.update(result, hits, self._model, self._anchor.cell_m, seen.joint_x_m)
@@ -116,8 +117,9 @@ class AnchoredMatcher:
         self._doubt = max(self._doubt - 1, 0)
         self._owed = _OWED_KEPT * self._owed if self._doubt else NOTHING_OWED
         residual_m = result.residual_sigmas * self._noise_m
+        noise = noise_share(result, hits, self._map.fine.cell_m, model)
         return Matched(
-            result.information, residual_m, result.support, lost=False, doubtful=doubtful, jumped=self._jumped
+            result.information, residual_m, result.support, False, doubtful, self._jumped, noise, self._layered
         )
 
     def _hits(self, points: FloatArray, seen: Behind, rise: FloatArray) -> Hits:

@@ -17,7 +17,10 @@ from lhdmap.odometry.rear_view import NO_POINTS, NOTHING_BEHIND, Behind, RearVie
 from lhdmap.odometry.scan_points import NO_BOXES, half_sweep_ns, planar_points
 from lhdmap.odometry.settings import AnchorSettings, OdometrySettings, RangeFlowSettings, SearchSettings
 from lhdmap.odometry.slant import NO_RISE
+from lhdmap.odometry.step_covariance import StepErrors
+from lhdmap.odometry.step_error import NO_ERROR
 from lhdmap.odometry.steps import Matched, OdometryStep, WheelStep, body_information, inflated, marginal_information
+from lhdmap.odometry.trust_settings import TrustSettings
 from lhdmap.odometry.wheel_fusion import WheelFusion
 
 _FIRST_SCANS = 10
@@ -56,6 +59,7 @@ class PlanarOdometry:
         wide: SearchSettings | None = None,
         range_flow: RangeFlowSettings | None = None,
         velocity: FloatArray | None = None,
+        trust: TrustSettings | None = None,
     ) -> None:
         self._settings = settings or OdometrySettings()
         self._motion = Motion(self._settings, velocity)
@@ -75,6 +79,7 @@ class PlanarOdometry:
         self._rate = AdaptiveRate(self._settings)
         self._wheels_used = False
         self.wheels = WheelFusion(self._settings, self._motion)
+        self._errors, self._error = StepErrors(trust or TrustSettings()), NO_ERROR
         self.points = np.zeros((0, 3))  # hits of the last processed scan, level base frame, heights in odom
 
     def update(
@@ -99,6 +104,8 @@ class PlanarOdometry:
             matched = self._matcher.step(points, mount, self._behind(view, floor_m), view.rise)
         held = matched.support > _WALLS_ALONE and not self._weak(self._information(matched))
         self.wheels.learn(self._motion.pose, matched, held=held and not matched.lost)
+        pose, seen = self._motion.pose, body_information(matched.information, self._motion.state[2])
+        self._error = self._errors.of(pose, matched, body_information(self._motion.P[:3, :3], pose[2]), seen)
         return self._step(scan, matched)
 
     def _information(self, matched: Matched) -> FloatArray:
@@ -155,6 +162,7 @@ class PlanarOdometry:
             substitute,
             True,
             matched.lost,
+            self._error,
         )
 
     def _weak(self, information: FloatArray) -> bool:

@@ -9,6 +9,7 @@ import numba as nb
 import numpy as np
 
 from lhdmap.messages import FloatArray
+from lhdmap.odometry.step_error import NO_ERROR, StepError
 
 BY_DEFINITION = 1e8 * np.eye(3)  # information of the pose that defines a frame
 
@@ -30,7 +31,7 @@ class Matched(NamedTuple):
 
     `information` (3, 3) of the scan alone in `odom` axes, residual, share of hits that agree, whether the scan could not be
     placed (the pose is then the prediction), whether it was placed where the motion did not foretell it, now or a moment ago, and
-    whether just now.
+    whether just now. `noise_share` of the information comes from noise (of a pair of scans, most); `layered`: the scanner tilts.
     """
 
     information: FloatArray
@@ -39,16 +40,19 @@ class Matched(NamedTuple):
     lost: bool
     doubtful: bool = False
     jumped: bool = False
+    noise_share: float = 0.7
+    layered: bool = False
 
 
 class OdometryStep(NamedTuple):
     """Outcome of one scan.
 
     `T_odom_base`: planar pose (3,) at `time_ns`, the middle of the sweep: there an error of the speed that undid the sweep does
-    not move the scan as a whole; `covariance`: (3, 3) of the step from the scan before, in body axes (m, rad);
-    `information`: (3,) along, across (1/m²) and heading (1/rad²) of this scan against the map, the others given;
+    not move the scan as a whole; `covariance`: (3, 3) of that pose against the local map, in body axes (m, rad), a weak
+    direction as wide as it is; `information`: (3,) along, across (1/m²) and heading (1/rad²) of this scan against the map, the others given;
     `degenerate`: a direction was not observed; `substitute`: what stood in for it (`wheels`, `motion` or empty);
-    `processed`: False where the adaptive rate only predicted; `lost`: the scan did not fit the map.
+    `processed`: False where the adaptive rate only predicted; `lost`: the scan did not fit the map; `error`: what the step
+    from the processed scan before adds to the error of the way, none where the scan was not processed.
     """
 
     stamp_ns: int
@@ -63,6 +67,7 @@ class OdometryStep(NamedTuple):
     substitute: str
     processed: bool
     lost: bool
+    error: StepError = NO_ERROR
 
 
 @nb.njit(cache=True)

@@ -221,7 +221,7 @@ class MappingPipeline:
 
     def _odometry(self, velocity: FloatArray | None) -> PlanarOdometry:
         s = self.settings
-        return PlanarOdometry(s.odometry, s.anchor, s.search, s.range_flow, velocity)
+        return PlanarOdometry(s.odometry, s.anchor, s.search, s.range_flow, velocity, s.trust)
 
     def _rising(self, stamp_ns: int) -> int:
         """Return a stamp that never runs backwards once stamps of scans did: the order of the log then tells more."""
@@ -260,7 +260,8 @@ class MappingPipeline:
         if step.processed:
             self.track.append(time_ns, step.T_odom_base, *self._attitude_at(time_ns))
             front, rear = self.odometry.points, self.odometry.points_behind
-            self.smoother.keys.update(time_ns, step.T_odom_base, front, weak=step.degenerate)
+            unseen = step.lost or step.substitute == "motion"
+            self.smoother.keys.update(time_ns, step.T_odom_base, front, step.error, unseen=unseen)
             self.path.update(AlignedScan(time_ns, step.T_odom_base, front, rear, weak=step.lost))
             self._record(scan.stamp_ns, time_ns, step)
             self._look_for_pile(scan, time_ns, step)
@@ -336,8 +337,9 @@ class MappingPipeline:
         if wheel_mps is not None:
             slip = self.slip.update(time_ns, wheel_mps, speed_mps)
         match_ = (step.residual_m, step.support)
+        std = np.sqrt(np.diag(step.error.covariance)) if isinstance(step, OdometryStep) else np.full(3, math.nan)
         self.records.add_processed(
-            stamp_ns, match_, step.information, step.substitute, (step.degenerate, step.lost), slip
+            stamp_ns, match_, step.information, step.substitute, (step.degenerate, step.lost), slip, std
         )
         self.records.add_motion(time_ns, speed_mps, wheel_mps, self.wheels.articulation_at(time_ns))
 

@@ -37,10 +37,14 @@ class ScanRecords:
         substitute: str,
         flags: tuple[bool, bool],
         slip: float,
+        std: FloatArray,
     ) -> None:
-        """Add a processed scan: match as (residual m, support), information (3,), flags as (degenerate, lost), slip."""
+        """Add a processed scan: match as (residual m, support), information (3,), flags as (degenerate, lost), slip.
+
+        `std` (3,): standard deviations of what the step adds to the error of the path, NaN where they are not known.
+        """
         self._processed_ns.append(stamp_ns)
-        self._rows.append((*match, *(float(v) for v in information), float(flags[0]), slip))
+        self._rows.append((*match, *(float(v) for v in information), float(flags[0]), slip, *std.tolist()))
         self._substitutes.append(substitute)
         self._lost.append(flags[1])
 
@@ -81,7 +85,7 @@ class ScanRecords:
 
     def diagnostics(self) -> Diagnostics:
         """Return the table of the map folder."""
-        table = np.array(self._rows, dtype=float).reshape(-1, 7)
+        table = np.array(self._rows, dtype=float).reshape(-1, 10)
         stamps = np.array(self._processed_ns, dtype=np.int64)
         return Diagnostics(
             stamps,
@@ -92,7 +96,7 @@ class ScanRecords:
             table[:, 4],
             table[:, 5] > 0.5,
             self._substitutes,
-            table[:, 6],
+            *table[:, 6:].T,
         )
 
     def speed(self) -> SpeedSeries | None:

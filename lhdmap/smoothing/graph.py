@@ -2,21 +2,30 @@
 
 from __future__ import annotations
 
-import math
+from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 
 from lhdmap.geometry import se2
 from lhdmap.messages import FloatArray
+from lhdmap.odometry.step_error import NO_ERROR, StepError
 from lhdmap.smoothing.closures import Closure
 from lhdmap.smoothing.keys import KeyScan
-from lhdmap.smoothing.settings import SmoothingSettings
 
 _CAUCHY = 1.0
+_LEAST = np.diag([1e-8, 1e-8, 1e-12])  # of a step that was hardly one: the graph must stay solvable
 
 
-def smoothed(keys: list[KeyScan], closures: list[Closure], settings: SmoothingSettings) -> FloatArray:
-    """Return the poses of the keys, shape (N, 3), in the frame of the first: maximum a posteriori.
+class Smoothed(NamedTuple):
+    """Poses of the keys, shape (N, 3), in the frame of the first, and the covariance (3, 3) of the last in its own axes."""
+
+    poses: FloatArray
+    end_covariance: FloatArray
+
+
+def smoothed(keys: list[KeyScan], closures: list[Closure]) -> Smoothed:
+    """Return the poses that are the likeliest: steps weigh as they were measured.
 
     Without closures these are the odometry's own.
     """
@@ -24,7 +33,7 @@ def smoothed(keys: list[KeyScan], closures: list[Closure], settings: SmoothingSe
 
     poses = np.array([key.pose for key in keys])
     if not closures:
-        return poses
+        return Smoothed(poses, chained(keys).covariance)
     graph, values = gtsam.NonlinearFactorGraph(), gtsam.Values()
     fixed = gtsam.noiseModel.Diagonal.Sigmas(np.full(3, 1e-6))
     graph.add(gtsam.PriorFactorPose2(0, gtsam.Pose2(*poses[0]), fixed))
@@ -32,7 +41,7 @@ def smoothed(keys: list[KeyScan], closures: list[Closure], settings: SmoothingSe
         values.insert(index, gtsam.Pose2(*pose))
     for index in range(len(keys) - 1):
         step = se2.between(poses[index], poses[index + 1])
-        noise = gtsam.noiseModel.Diagonal.Sigmas(_step_sigmas(keys[index], keys[index + 1], settings))
+        noise = gtsam.noiseModel.Gaussian.Covariance(keys[index + 1].error.covariance + _LEAST)
         graph.add(gtsam.BetweenFactorPose2(index, index + 1, gtsam.Pose2(*step), noise))
     for closure in closures:
         gaussian = gtsam.noiseModel.Gaussian.Covariance(closure.covariance)
@@ -41,13 +50,13 @@ def smoothed(keys: list[KeyScan], closures: list[Closure], settings: SmoothingSe
         graph.add(gtsam.BetweenFactorPose2(closure.earlier, closure.current, pose, robust))
     solved = gtsam.LevenbergMarquardtOptimizer(graph, values).optimize()
     found = [solved.atPose2(index) for index in range(len(keys))]
-    return np.array([[pose.x(), pose.y(), pose.theta()] for pose in found])
+    end = gtsam.Marginals(graph, solved).marginalCovariance(len(keys) - 1)
+    return Smoothed(np.array([[pose.x(), pose.y(), pose.theta()] for pose in found]), end)
 
 
-def _step_sigmas(before: KeyScan, after: KeyScan, settings: SmoothingSettings) -> FloatArray:
-    """Return the standard deviations (3,) of a step between keys: a random walk with the travel, wider where weak."""
-    travel_m = max(after.travelled_m - before.travelled_m, 0.1)
-    position = (settings.weak_sigma if after.weak else settings.along_sigma) * math.sqrt(travel_m)
-    turn = abs(float(se2.wrap(after.pose[2] - before.pose[2])))
-    heading = math.radians(settings.heading_sigma_deg) * math.sqrt(travel_m) + 0.002 * turn
-    return np.array([position, position, heading])
+def chained(keys: list[KeyScan]) -> StepError:
+    """Return the error of the way from the first key to the last, in the last one's axes, by the odometry alone."""
+    total = NO_ERROR
+    for before, key in pairwise(keys):
+        total = total.then(se2.between(before.pose, key.pose), key.error)
+    return total

@@ -9,20 +9,27 @@ import numpy as np
 
 from lhdmap.geometry import se2
 from lhdmap.messages import Float32Array, FloatArray
+from lhdmap.odometry.step_error import NO_ERROR, StepError, measured_covariance
 from lhdmap.smoothing.settings import SmoothingSettings
 
 
 class KeyScan(NamedTuple):
-    """A scan kept: time, pose (3,) by odometry, distance travelled, hits (N, 3), and whether the odometry was weak before it.
+    """A scan kept: time, pose (3,) by odometry, distance travelled, hits (N, 3), and how good the way since the key before is.
 
-    The hits are in the level base frame; `weak` tells of the way since the key before.
+    The hits are in the level base frame. `error`: what the step from the key before adds to the error of the way; `unseen_m`: the
+    longest stretch without a break up to this key on which neither walls nor wheels told the motion in all directions.
     """
 
     time_ns: int
     pose: FloatArray
     travelled_m: float
     points: Float32Array
-    weak: bool
+    error: StepError = NO_ERROR
+    unseen_m: float = 0.0
+
+    def covariance(self, before: KeyScan) -> FloatArray:
+        """Return the covariance (3, 3) of the step from the key `before`, in this key's axes (m, rad)."""
+        return measured_covariance(before.error.jitter, se2.between(before.pose, self.pose), self.error)
 
 
 class KeyScans:
@@ -33,17 +40,28 @@ class KeyScans:
         self.keys: list[KeyScan] = []
         self._travelled_m = 0.0
         self._last: FloatArray | None = None
-        self._weak = False
+        self._error = NO_ERROR  # since the last key
+        self._unseen_m = self._longest_m = 0.0
 
-    def update(self, time_ns: int, pose: FloatArray, points: FloatArray, *, weak: bool) -> None:
-        """Take a processed scan: pose (3,) in `odom`, hits (N, 3) in the level base frame."""
+    def update(
+        self, time_ns: int, pose: FloatArray, points: FloatArray, error: StepError = NO_ERROR, *, unseen: bool = False
+    ) -> None:
+        """Take a processed scan: pose (3,) in `odom`, hits (N, 3) in the level base frame, what its step may be off.
+
+        `unseen`: neither walls nor wheels told this step in all directions.
+        """
         if self._last is not None:
-            self._travelled_m += math.hypot(pose[0] - self._last[0], pose[1] - self._last[1])
+            step = se2.between(self._last, pose)
+            length_m = math.hypot(step[0], step[1])
+            self._travelled_m += length_m
+            self._unseen_m = self._unseen_m + length_m if unseen else 0.0
+            self._longest_m = max(self._longest_m, self._unseen_m)
+            self._error = self._error.then(step, error)
         self._last = pose.copy()
-        self._weak |= weak
         if self._due(pose) and len(points) > 0:
-            self.keys.append(KeyScan(time_ns, pose.copy(), self._travelled_m, points.astype(np.float32), self._weak))
-            self._weak = False
+            hits = points.astype(np.float32)
+            self.keys.append(KeyScan(time_ns, pose.copy(), self._travelled_m, hits, self._error, self._longest_m))
+            self._error = NO_ERROR
 
     def _due(self, pose: FloatArray) -> bool:
         if not self.keys:

@@ -49,20 +49,3 @@ class SmoothingSettings:
     )
     agree_m: float = setting(0.3, unit="m", doc="Closures in a row must agree to this.", minimum=0.01)
     agree_deg: float = setting(3.0, unit="deg", doc="... and to this.", minimum=0.1)
-    along_sigma: float = setting(
-        0.002,
-        unit="m/sqrt(m)",
-        doc="Random walk of the odometry's position.",
-        minimum=1e-5,
-        source="0.02 % over 10 m, with room",
-    )
-    heading_sigma_deg: float = setting(
-        0.01,
-        unit="deg/sqrt(m)",
-        doc="Random walk of the odometry's heading.",
-        minimum=1e-5,
-        source="measured, with room",
-    )
-    weak_sigma: float = setting(
-        0.02, unit="m/sqrt(m)", doc="Random walk where a direction was weakly observed or a scan lost.", minimum=1e-5
-    )

@@ -16,11 +16,15 @@ from lhdmap.smoothing.settings import SmoothingSettings
 
 
 class Correction(NamedTuple):
-    """Planar corrections of the odometry: `T_map_odom` (N, 3) at `times_ns` (N,), and the number of closures behind them."""
+    """Planar corrections of the odometry: `T_map_odom` (N, 3) at `times_ns` (N,), and the number of closures behind them.
+
+    `end_covariance` (3, 3): of the last key, in its axes, where closures were used.
+    """
 
     times_ns: npt.NDArray[np.int64]
     T_map_odom: FloatArray
     closures: int
+    end_covariance: FloatArray | None = None
 
 
 class Smoother:
@@ -39,10 +43,10 @@ class Smoother:
         closures = find_closures(keys, self._settings) if self._settings.closures else []
         if not closures:
             return None
-        poses = smoothed(keys, closures, self._settings)
+        poses, end = smoothed(keys, closures)
         moved = np.array([se2.compose(pose, se2.inverse(key.pose)) for pose, key in zip(poses, keys, strict=True)])
         moved[:, 2] = np.unwrap(moved[:, 2])
-        return Correction(np.array([key.time_ns for key in keys], dtype=np.int64), moved, len(closures))
+        return Correction(np.array([key.time_ns for key in keys], dtype=np.int64), moved, len(closures), end)
 
 
 def corrected(poses: FloatArray, times_ns: npt.NDArray[np.int64], correction: Correction) -> FloatArray:

@@ -1,0 +1,45 @@
+"""How far a step of the planar odometry may be off, in parts that add up in different ways.
+
+Three parts, each in the body's axes (m, m, rad):
+
+- **walk**: the map is renewed at poses that are a little off, so what a scan is off by stays for good, in part. It adds up like a
+  random walk, the faster the more of what the scan tells is noise of the walls' directions, and the shorter its lever is.
+- **pull**: such noise also pulls all scans the same way. It adds up with the way itself.
+- **jitter**: what a scan is off the local map. It does not add up: it counts at both ends of a step, however long that is.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from lhdmap.geometry import se2
+from lhdmap.messages import FloatArray
+
+
+class StepError(NamedTuple):
+    """Error of a step in the axes of its end: `walk` (3, 3), `pull` (3,) and, of its end alone, `jitter` (3, 3)."""
+
+    walk: FloatArray
+    pull: FloatArray
+    jitter: FloatArray
+
+    @property
+    def covariance(self) -> FloatArray:
+        """What the step adds to the error of the way, shape (3, 3): without jitter."""
+        return self.walk + np.outer(self.pull, self.pull)
+
+    def then(self, step: FloatArray, after: StepError) -> StepError:
+        """Return the error of this step and the next one, `step` (3,), together."""
+        carried = se2.adjoint(se2.inverse(step))
+        walk = carried @ self.walk @ carried.T + after.walk
+        return StepError(walk, carried @ self.pull + after.pull, after.jitter)
+
+
+NO_ERROR = StepError(np.zeros((3, 3)), np.zeros(3), np.zeros((3, 3)))
+
+
+def measured_covariance(before: FloatArray, way: FloatArray, error: StepError) -> FloatArray:
+    """Return the covariance (3, 3) of a measured `way` (3,), in the axes of its end: the jitter `before` it (3, 3) counts too."""
+    return se2.composed_covariance(before, way, error.covariance + error.jitter)

@@ -1,0 +1,45 @@
+"""Settings of what the planar odometry says of its own error."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from lhdmap.settings import setting
+
+_SOURCE = "measured: simulated drives of all wall classes (docs/odometry.md)"
+
+
+@dataclass(frozen=True, slots=True)
+class TrustSettings:
+    """How the error of the planar odometry grows: random walk, pull, and what does not add up."""
+
+    walk_per_m: float = setting(
+        1.4,
+        unit="1/m",
+        doc="Share of a scan's covariance against the local map that each metre makes lasting, where all that a scan tells of a "
+        "direction is noise of the walls' directions, half of it; less noise, less.",
+        minimum=0.0,
+        source=_SOURCE,
+    )
+    pull: float = setting(
+        0.002,
+        unit="m/m",
+        doc="How much too long or short the way is read where all that a scan tells is noise, standard deviation.",
+        minimum=0.0,
+        source=_SOURCE,
+    )
+    jitter: float = setting(
+        0.65,
+        doc="Variance of a scan's error against the local map, as a share of what the motion filter believes.",
+        minimum=0.0,
+        source=_SOURCE,
+    )
+    noisy_jitter: float = setting(
+        0.6, doc="... and what is added to that share where all that a scan tells is noise.", minimum=0.0, source=_SOURCE
+    )
+    tilted: float = setting(
+        5.0,
+        doc="Times that variances are larger of a tilted scanner, which sees other rock in each scan.",
+        minimum=1.0,
+        source=_SOURCE,
+    )
