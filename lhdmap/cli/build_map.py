@@ -74,12 +74,14 @@ def progress_of(console: Console) -> Any:
 
 def summary_text(summary: dict[str, Any]) -> str:
     """Return the result in words."""
-    from lhdmap.report.text import cost_line, duration
+    from lhdmap.report.text import cost_line, duration, trust_line
 
     reason = str(summary["pile_reason"]).replace("no pile was looked for", "not looked for")
     pile = summary["pile"].replace("_", " ") if summary["pile"] else reason
+    trust = trust_line(summary)
     return "\n".join(
         [
+            *([] if trust is None else [f"may be off   {trust}"]),
             f"map          {summary['map']}",
             f"report       {Path(summary['map']) / 'report.html'}",
             f"drive        {summary['distance_m']:.1f} m in {duration(summary['duration_s'])}",

@@ -115,12 +115,15 @@ def _drive_lines(counts: Mapping[str, Any]) -> list[str]:
     drive = f"drive        {counts['distance_m']:.0f} m in {counts['duration_s']:.0f} s"
     if counts.get("poses"):
         return [drive, f"scans        {counts['scans']}, poses given: {counts['poses']}"]
+    from lhdmap.report.text import trust_line
+
     weak = 100.0 * (counts.get("degenerate_share") or 0.0)
     scans = (
         f"scans        {counts['scans']} ({counts['scans_processed']} processed), weak {weak:.0f} %, "
         f"lost stretches {counts.get('lost_stretches', 0)}, closed loops {counts.get('closures', 0)}"
     )
-    return [drive, scans]
+    trust = trust_line(counts)
+    return [*([] if trust is None else [f"may be off   {trust}"]), drive, scans]
 
 
 def _result_lines(folder: Path) -> list[str]:

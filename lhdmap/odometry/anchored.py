@@ -15,7 +15,7 @@ from lhdmap.odometry.motion import Motion
 from lhdmap.odometry.rear_view import NO_POINTS, NOTHING_BEHIND, Behind, JointOffset
 from lhdmap.odometry.settings import AnchorSettings, OdometrySettings, RangeFlowSettings, SearchSettings
 from lhdmap.odometry.slant import NO_RISE, slants
-from lhdmap.odometry.step_covariance import noise_share
+from lhdmap.odometry.step_covariance import direction_noise
 from lhdmap.odometry.steps import BY_DEFINITION, Matched, marginal_information
 from lhdmap.odometry.surface_map import empty_map, insert_all
 
@@ -117,10 +117,9 @@ class AnchoredMatcher:
         self._doubt = max(self._doubt - 1, 0)
         self._owed = _OWED_KEPT * self._owed if self._doubt else NOTHING_OWED
         residual_m = result.residual_sigmas * self._noise_m
-        noise = noise_share(result, hits, self._map.fine.cell_m, model)
-        return Matched(
-            result.information, residual_m, result.support, False, doubtful, self._jumped, noise, self._layered
-        )
+        noise = direction_noise(result.pose, hits, result.lines, self._map.fine.cell_m, model)
+        seen = (self._layered, len(hits.points) == hits.front)
+        return Matched(result.information, residual_m, result.support, False, doubtful, self._jumped, noise, *seen)
 
     def _hits(self, points: FloatArray, seen: Behind, rise: FloatArray) -> Hits:
         """Return what is matched: a level scanner sees the same curve of the walls again by itself."""

@@ -104,8 +104,8 @@ class PlanarOdometry:
             matched = self._matcher.step(points, mount, self._behind(view, floor_m), view.rise)
         held = matched.support > _WALLS_ALONE and not self._weak(self._information(matched))
         self.wheels.learn(self._motion.pose, matched, held=held and not matched.lost)
-        pose, seen = self._motion.pose, body_information(matched.information, self._motion.state[2])
-        self._error = self._errors.of(pose, matched, body_information(self._motion.P[:3, :3], pose[2]), seen)
+        pose = self._motion.pose
+        self._error = self._errors.of(pose, matched, body_information(self._motion.P[:3, :3], pose[2]))
         return self._step(scan, matched)
 
     def _information(self, matched: Matched) -> FloatArray:

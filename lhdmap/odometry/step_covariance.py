@@ -3,21 +3,26 @@
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numba as nb
 import numpy as np
 
+from lhdmap.geometry import se2
 from lhdmap.messages import FloatArray
-from lhdmap.odometry.matching import Hits, Match, MatchModel, line_weight, slanted
+from lhdmap.odometry.matching import line_weight, slanted
 from lhdmap.odometry.step_error import StepError
-from lhdmap.odometry.steps import Matched
+from lhdmap.odometry.steps import Matched, body_information
 from lhdmap.odometry.trust_settings import TrustSettings
 
 # Variance of the cells along a line, in squares of a cell: a Gaussian of two cells' deviation, cut off at three.
 _SPREAD_CELLS2 = 2.2
 _MOST_NOISE = 2.0  # share of noise: lines of few cells make it larger than all that the scan tells
-_USUAL_LEVER_M, _LEAST_LEVER_M, _LONGEST_LEVER_M = 5.0, 4.0, 50.0
+_USUAL_LEVER_M, _LEAST_LEVER_M, _LONGEST_LEVER_M = 5.0, 3.0, 50.0
 _LEVER_POWER = 1.5
+_OF_PAIRS = 0.5  # share of noise where scans are compared in pairs: each link of the chain adds its error
+_LITTLE = np.diag([1e-3, 1e-3, 1e-3])  # information of no scan
+_SWAY = np.diag([0.0, 0.0035**2, 0.0])  # of a tilted scanner: noise of the roll shifts what it sees of the walls sideways
 
 
 class StepErrors:
@@ -28,32 +33,53 @@ class StepErrors:
         self._pose: FloatArray | None = None
         self._variance = np.zeros(3)  # of the pose against the map
 
-    def of(self, pose: FloatArray, matched: Matched, covariance: FloatArray, information: FloatArray) -> StepError:
-        """Take a scan's pose (3,), covariance (3, 3) against the map and own information (3, 3), both in the body's axes."""
+    def of(self, pose: FloatArray, matched: Matched, covariance: FloatArray) -> StepError:
+        """Take a scan's pose (3,) with its covariance (3, 3) against the map, in the body's axes."""
         s, before = self._settings, self._pose if self._pose is not None else pose
-        way_m = float(np.hypot(*(pose[:2] - before[:2])))
+        forward_m, aside_m, _ = se2.between(before, pose).tolist()
+        way_m = math.hypot(forward_m, aside_m)
         grown = np.maximum(np.diag(covariance) - self._variance, 0.0)
         self._pose, self._variance = pose, np.diag(covariance).copy()
         if matched.lost:  # nothing holds the pose: what the motion is off stays
             return StepError(np.diag(grown), np.zeros(3), covariance)
-        noise, tilt = min(matched.noise_share, _MOST_NOISE), s.tilted if matched.layered else 1.0
-        alone = np.linalg.inv(information + np.diag([1e-3, 1e-3, 1e-3]))
-        lever_m = math.sqrt(float(alone[1, 1] / alone[2, 2]))
-        short = _USUAL_LEVER_M / min(max(lever_m, _LEAST_LEVER_M), _LONGEST_LEVER_M)
-        walk = tilt * s.walk_per_m * noise * (1.0 + noise) * short**_LEVER_POWER * way_m * covariance
-        followed = min(float(covariance[0, 0] / alone[0, 0]), 1.0)  # by the motion, not by wheels or inertia
-        pull = s.pull * min(noise, 1.0) * short * followed * way_m
-        return StepError(walk, np.array([pull, 0.0, 0.0]), tilt * (s.jitter + s.noisy_jitter * min(noise, 1.0)) * covariance)
+        seen = _seen(matched, float(pose[2]))
+        short = _USUAL_LEVER_M / min(max(seen.lever_m, _LEAST_LEVER_M), _LONGEST_LEVER_M)
+        noisy = min(seen.noise, 1.0)
+        lasting = s.walk_per_m * (seen.noise_along + seen.noise**2) * short**_LEVER_POWER * way_m
+        followed = min(float(covariance[0, 0]) / seen.variance_along, 1.0)  # the scan, not wheels or inertia
+        lasting += max(1.0 - 2.0 * followed, 0.0) * way_m
+        pull = s.pull * noisy * short * math.sqrt(followed)
+        jitter = (s.jitter + s.noisy_jitter * noisy) * covariance
+        if matched.layered:
+            lasting *= s.tilted_alone_walk if matched.alone else s.tilted_walk
+            pull += s.tilted_alone_pull if matched.alone else 0.0
+            jitter = s.tilted_jitter * jitter + _SWAY
+        return StepError(lasting * covariance, np.array([pull * forward_m, 0.0, 0.0]), jitter)
 
 
-def noise_share(result: Match, hits: Hits, fine_m: float, model: MatchModel) -> float:
-    """Return which share of a match's information comes from noise of its lines' directions: small in rough walls, 1 in smooth."""
-    noise = _direction_noise(result.pose, hits, result.lines, fine_m, model)
-    return float(np.trace(np.linalg.solve(result.information + 1e-3 * np.eye(3), noise)))
+class _Seen(NamedTuple):
+    """What a scan alone tells: share of noise in all of it and along, lever of its hits (m), variance along (m²)."""
+
+    noise: float
+    noise_along: float
+    lever_m: float
+    variance_along: float
+
+
+def _seen(matched: Matched, heading_rad: float) -> _Seen:
+    information = body_information(matched.information, heading_rad)
+    noise = _OF_PAIRS * information if matched.noise is None else body_information(matched.noise, heading_rad)
+    alone = np.linalg.inv(information + _LITTLE)
+    return _Seen(
+        min(float(np.trace(alone @ noise)), _MOST_NOISE),
+        min(float(noise[0, 0] / (information[0, 0] + _LITTLE[0, 0])), _MOST_NOISE),
+        math.sqrt(float(alone[1, 1] / alone[2, 2])),
+        float(alone[0, 0]),
+    )
 
 
 @nb.njit(cache=True, nogil=True)
-def _direction_noise(pose, hits, lines, fine_m, model):  # type: ignore[no-untyped-def]
+def direction_noise(pose, hits, lines, fine_m, model):  # type: ignore[no-untyped-def]
     """Return what noise of the lines' directions adds to the information (3, 3) on average: it turns normals along the walls."""
     c, s = math.cos(pose[2]), math.sin(pose[2])
     points, total, row = hits.points, np.zeros((3, 3)), np.zeros(3)

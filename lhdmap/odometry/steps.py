@@ -31,7 +31,8 @@ class Matched(NamedTuple):
 
     `information` (3, 3) of the scan alone in `odom` axes, residual, share of hits that agree, whether the scan could not be
     placed (the pose is then the prediction), whether it was placed where the motion did not foretell it, now or a moment ago, and
-    whether just now. `noise_share` of the information comes from noise (of a pair of scans, most); `layered`: the scanner tilts.
+    whether just now. `noise` (3, 3): what of the information comes from noise of the walls' directions; `layered`: the scanner
+    tilts; `alone`: no other scanner sees its walls again.
     """
 
     information: FloatArray
@@ -40,8 +41,9 @@ class Matched(NamedTuple):
     lost: bool
     doubtful: bool = False
     jumped: bool = False
-    noise_share: float = 0.7
+    noise: FloatArray | None = None
     layered: bool = False
+    alone: bool = True
 
 
 class OdometryStep(NamedTuple):

@@ -14,7 +14,7 @@ class TrustSettings:
     """How the error of the planar odometry grows: random walk, pull, and what does not add up."""
 
     walk_per_m: float = setting(
-        1.4,
+        1.8,
         unit="1/m",
         doc="Share of a scan's covariance against the local map that each metre makes lasting, where all that a scan tells of a "
         "direction is noise of the walls' directions, half of it; less noise, less.",
@@ -22,7 +22,7 @@ class TrustSettings:
         source=_SOURCE,
     )
     pull: float = setting(
-        0.002,
+        0.0016,
         unit="m/m",
         doc="How much too long or short the way is read where all that a scan tells is noise, standard deviation.",
         minimum=0.0,
@@ -37,9 +37,22 @@ class TrustSettings:
     noisy_jitter: float = setting(
         0.6, doc="... and what is added to that share where all that a scan tells is noise.", minimum=0.0, source=_SOURCE
     )
-    tilted: float = setting(
-        5.0,
-        doc="Times that variances are larger of a tilted scanner, which sees other rock in each scan.",
+    tilted_walk: float = setting(
+        8.0,
+        doc="Times that the walk's variance is larger of a tilted scanner that sees other rock in each scan, with a rear scanner.",
         minimum=1.0,
         source=_SOURCE,
+    )
+    tilted_alone_walk: float = setting(
+        20.0, doc="... and without one: no scanner sees the same rock again.", minimum=1.0, source=_SOURCE
+    )
+    tilted_alone_pull: float = setting(
+        0.0014,
+        unit="m/m",
+        doc="How much too short a tilted front scanner alone reads the way, standard deviation.",
+        minimum=0.0,
+        source="measured: 0.1 to 0.4 % (docs/odometry.md)",
+    )
+    tilted_jitter: float = setting(
+        5.0, doc="Times that the jitter's variance is larger of a tilted scanner.", minimum=1.0, source=_SOURCE
     )

@@ -16,7 +16,7 @@ from lhdmap.errors import InputError
 from lhdmap.integration.cloud import Cloud
 from lhdmap.logs.source import LogSource
 from lhdmap.machine import Machine
-from lhdmap.messages import Joints, LaserScan, PointCloud
+from lhdmap.messages import FloatArray, Joints, LaserScan, PointCloud
 from lhdmap.names import name_of
 from lhdmap.pile.result import PileReport
 from lhdmap.pipeline.beside import HelperDied
@@ -32,6 +32,7 @@ from lhdmap.pipeline.track import FinalTrack, Rows, resample, trajectory_of
 from lhdmap.proprioception.wheels import WheelOdometry
 from lhdmap.report.data import ReportData, Summary, TopicRow
 from lhdmap.smoothing.smoother import corrected
+from lhdmap.smoothing.trust import expected_error
 from lhdmap.trajectory import Trajectory
 
 ROLES_READ = ("front", "rear", "points", "inclinometer", "joints", "tachometer", "wheel_odometry", "tf_static")
@@ -55,13 +56,17 @@ class Inputs(NamedTuple):
 
 
 class Ways(NamedTuple):
-    """The way by odometry alone and the final one, at the scans; the final `rows`, whether they `moved`, closed loops."""
+    """The way by odometry alone and the final one, at the scans; the final `rows`, whether they `moved`, closed loops.
+
+    `end_covariance` (3, 3): of the last key scan once loops were closed.
+    """
 
     odometry: Trajectory
     final: Trajectory
     rows: Rows
     moved: bool
     closures: int
+    end_covariance: FloatArray | None = None
 
 
 def odometry_of(pipeline: MappingPipeline) -> Trajectory:
@@ -88,7 +93,8 @@ def ways_of(pipeline: MappingPipeline, given: Rows | None) -> Ways:
         rows = Rows(rows.times_ns, corrected(rows.poses, rows.times_ns, correction))
     final = trajectory_of(resample(rows, times), stamps)
     moved = given is not None or correction is not None
-    return Ways(odometry_of(pipeline), final, rows, moved, 0 if correction is None else correction.closures)
+    closed = (0, None) if correction is None else (correction.closures, correction.end_covariance)
+    return Ways(odometry_of(pipeline), final, rows, moved, *closed)
 
 
 class Outcome:
@@ -115,6 +121,7 @@ class Outcome:
         stamps, records = ways.odometry.stamps_ns, pipeline.records
         self.duration_s = source.duration_s or float(stamps[-1] - stamps[0]) * 1e-9
         self.summary: dict[str, Any] = {
+            "expected_error": None if inputs.poses else self._expected_error(distance_m),
             "scans": len(stamps),
             "scans_processed": records.processed,
             "duration_s": self.duration_s,
@@ -126,6 +133,13 @@ class Outcome:
             "pile": None if self.pile is None else self.pile.estimate.status,
             "pile_reason": self.pile_reason or (None if self.pile is None else self.pile.estimate.reason or None),
         }
+
+    def _expected_error(self, distance_m: float) -> dict[str, Any] | None:
+        """Return how far the map may be off at its end; None of clouds of a 3D scanner, whose drift nobody measures."""
+        pipeline = self.pipeline
+        height_std_m = pipeline.attitude.height_std_m(distance_m) if pipeline.has_inclinometer else None
+        found = expected_error(pipeline.smoother.keys, height_std_m, self.ways.end_covariance)
+        return None if found is None else found._asdict()
 
     def _no_pile(self) -> str:
         """Return why no pile is looked for; empty where one is."""

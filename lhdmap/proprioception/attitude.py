@@ -27,6 +27,8 @@ LARGEST_TILT_RAD = math.radians(60.0)
 JUMP_RUN = 10  # so many samples in a row at a new level are no outliers but the level
 THIRD_DIFFERENCE = math.sqrt(20.0)  # its standard deviation for white noise of one
 NOISE_EVERY = 50
+_ALIKE_M = 0.1  # way over which the noise of samples adds to the height as one error: a fit's window at 12 km/h, less its averaging
+_AT_BENDS_M = 0.03  # where the grade changes the body pitches about another point; measured on simulated drives
 
 
 @dataclass(frozen=True, slots=True)
@@ -144,6 +146,11 @@ class AttitudeFilter:
         elif self._held_ns is not None:
             self._silent_s = max(self._silent_s, (stamp_ns - self._held_ns) * 1e-9)
         return self._held
+
+    def height_std_m(self, way_m: float) -> float:
+        """Return the standard deviation (m) of a height that was integrated along the slope of a way."""
+        constant_m = math.radians(self.settings.std_floor_deg) * way_m
+        return math.hypot(constant_m, self._noise_rad * math.sqrt(_ALIKE_M * way_m), _AT_BENDS_M)
 
     def texts(self) -> list[str]:
         """Return what was odd, in words."""

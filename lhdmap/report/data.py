@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -66,6 +66,7 @@ class Summary:
     lost_stretches: int = 0
     closures: int = 0
     compile_s: float | None = None
+    expected_error: Mapping[str, Any] | None = None
 
 
 @dataclass(frozen=True, slots=True)

@@ -33,6 +33,7 @@ def headline(data: ReportData) -> list[Figure]:
             Figure("given", "poses", f"path and map are made from {data.poses}; no pose was estimated"),
         ]
     return [
+        *_trust(s),
         driven,
         Figure(scans, "scans", _processed(s)),
         *_degeneracy(s, data.witness),
@@ -40,6 +41,49 @@ def headline(data: ReportData) -> list[Figure]:
         Figure(str(s.closures), "loop closures", _closures(s)),
         *_truth(data.evaluation),
     ]
+
+
+def _trust(s: Summary) -> list[Figure]:
+    if s.expected_error is None:
+        return []
+    error = s.expected_error
+    least = "at least " if error["lower_bound"] else ""
+    meaning = (
+        f"how far the end of the path may be off against its start, in 95 of 100 drives: {error['end_pct']:.2g} % of the way; "
+        f"heading {_degrees(error['heading_deg'])}, height {_height(error['height_m'])}{_unseen(error)}"
+    )
+    return [Figure(f"{least}{length(error['end_m'])}", "expected error", meaning)]
+
+
+def trust_line(figures: Mapping[str, Any]) -> str | None:
+    """Return in one line how far the map may be off; None where nobody knows. `figures` are those of `build-map --json`."""
+    error = figures.get("expected_error")
+    if error is None:
+        return None
+    least = "at least " if error["lower_bound"] else ""
+    return (
+        f"{least}{length(error['end_m'])} at its end ({error['end_pct']:.2g} %), heading {_degrees(error['heading_deg'])}, "
+        f"height {_height(error['height_m'])} (95 %){_unseen(error)}"
+    )
+
+
+def _unseen(error: Mapping[str, Any]) -> str:
+    if not error["lower_bound"]:
+        return ""
+    return f"; on up to {error['unseen_m']:.0f} m neither walls nor wheels told the motion in all directions: it may be more"
+
+
+def _height(height_m: float | None) -> str:
+    return "not observed" if height_m is None else length(height_m)
+
+
+def _degrees(angle_deg: float) -> str:
+    return f"{angle_deg:.2g}°" if angle_deg < 10.0 else f"{angle_deg:.0f}°"
+
+
+def length(metres: float) -> str:
+    """Return a length as people read it: `4.2 cm`, `1.35 m`."""
+    return f"{100 * metres:.1f} cm" if metres < 1.0 else f"{metres:.2f} m"
 
 
 def cost_figures(s: Summary) -> list[Figure]:

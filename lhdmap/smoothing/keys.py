@@ -14,10 +14,9 @@ from lhdmap.smoothing.settings import SmoothingSettings
 
 
 class KeyScan(NamedTuple):
-    """A scan kept: time, pose (3,) by odometry, distance travelled, hits (N, 3), and how good the way since the key before is.
+    """A scan kept: time, pose (3,) by odometry, distance travelled, hits (N, 3), and how far the way since the key before may be off.
 
-    The hits are in the level base frame. `error`: what the step from the key before adds to the error of the way; `unseen_m`: the
-    longest stretch without a break up to this key on which neither walls nor wheels told the motion in all directions.
+    The hits are in the level base frame. `error`: what the step from the key before adds to the error of the way.
     """
 
     time_ns: int
@@ -25,7 +24,6 @@ class KeyScan(NamedTuple):
     travelled_m: float
     points: Float32Array
     error: StepError = NO_ERROR
-    unseen_m: float = 0.0
 
     def covariance(self, before: KeyScan) -> FloatArray:
         """Return the covariance (3, 3) of the step from the key `before`, in this key's axes (m, rad)."""
@@ -33,15 +31,18 @@ class KeyScan(NamedTuple):
 
 
 class KeyScans:
-    """Collects key scans while the odometry runs."""
+    """Collects key scans while the odometry runs.
+
+    `travelled_m`: so far; `rest`: error of the way from the last key to the last scan, whose pose (3,) is `last`; `unseen_m`: longest
+    stretch on which neither walls nor wheels told the motion in all directions.
+    """
 
     def __init__(self, settings: SmoothingSettings) -> None:
         self._settings = settings
         self.keys: list[KeyScan] = []
-        self._travelled_m = 0.0
-        self._last: FloatArray | None = None
-        self._error = NO_ERROR  # since the last key
-        self._unseen_m = self._longest_m = 0.0
+        self.travelled_m = self.unseen_m = self._unseen_m = 0.0
+        self.last: FloatArray | None = None
+        self.rest = NO_ERROR
 
     def update(
         self, time_ns: int, pose: FloatArray, points: FloatArray, error: StepError = NO_ERROR, *, unseen: bool = False
@@ -50,18 +51,18 @@ class KeyScans:
 
         `unseen`: neither walls nor wheels told this step in all directions.
         """
-        if self._last is not None:
-            step = se2.between(self._last, pose)
+        if self.last is not None:
+            step = se2.between(self.last, pose)
             length_m = math.hypot(step[0], step[1])
-            self._travelled_m += length_m
+            self.travelled_m += length_m
             self._unseen_m = self._unseen_m + length_m if unseen else 0.0
-            self._longest_m = max(self._longest_m, self._unseen_m)
-            self._error = self._error.then(step, error)
-        self._last = pose.copy()
+            self.unseen_m = max(self.unseen_m, self._unseen_m)
+            self.rest = self.rest.then(step, error)
+        self.last = pose.copy()
         if self._due(pose) and len(points) > 0:
             hits = points.astype(np.float32)
-            self.keys.append(KeyScan(time_ns, pose.copy(), self._travelled_m, hits, self._error, self._longest_m))
-            self._error = NO_ERROR
+            self.keys.append(KeyScan(time_ns, pose.copy(), self.travelled_m, hits, self.rest))
+            self.rest = NO_ERROR._replace(jitter=error.jitter)
 
     def _due(self, pose: FloatArray) -> bool:
         if not self.keys:
