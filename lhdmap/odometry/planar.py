@@ -32,13 +32,15 @@ class View(NamedTuple):
     """What else is known of a scan's surroundings.
 
     `height_m` of `base_link` in `odom`; `boxes_m` (K, 6): own bodies; `rear`: tells what the rear scanner sees at the same
-    time, asked for the scans that are processed only; `rise` (2,): of the scanner's plane (`slant.rise_of`).
+    time, asked for the scans that are processed only; `rise` (2,): of the scanner's plane (`slant.rise_of`); `levelled`: an
+    inclinometer tells roll and pitch.
     """
 
     height_m: float = 0.0
     boxes_m: FloatArray = NO_BOXES
     rear: Callable[[], RearView | None] | None = None
     rise: FloatArray = NO_RISE
+    levelled: bool = True
 
 
 _PLAIN = View()
@@ -105,7 +107,8 @@ class PlanarOdometry:
         held = matched.support > _WALLS_ALONE and not self._weak(self._information(matched))
         self.wheels.learn(self._motion.pose, matched, held=held and not matched.lost)
         pose = self._motion.pose
-        self._error = self._errors.of(pose, matched, body_information(self._motion.P[:3, :3], pose[2]))
+        against_map = body_information(self._motion.P[:3, :3], pose[2])
+        self._error = self._errors.of(pose, matched, against_map, levelled=view.levelled)
         return self._step(scan, matched)
 
     def _information(self, matched: Matched) -> FloatArray:

@@ -21,6 +21,7 @@ _MOST_NOISE = 2.0  # share of noise: lines of few cells make it larger than all 
 _USUAL_LEVER_M, _LEAST_LEVER_M, _LONGEST_LEVER_M = 5.0, 3.0, 50.0
 _LEVER_POWER = 1.5
 _OF_PAIRS = 0.5  # share of noise where scans are compared in pairs: each link of the chain adds its error
+_SECOND = 2
 _LITTLE = np.diag([1e-3, 1e-3, 1e-3])  # information of no scan
 _SWAY = np.diag([0.0, 0.0035**2, 0.0])  # of a tilted scanner: noise of the roll shifts what it sees of the walls sideways
 
@@ -32,29 +33,46 @@ class StepErrors:
         self._settings = settings
         self._pose: FloatArray | None = None
         self._variance = np.zeros(3)  # of the pose against the map
+        self._scans = 0
 
-    def of(self, pose: FloatArray, matched: Matched, covariance: FloatArray) -> StepError:
-        """Take a scan's pose (3,) with its covariance (3, 3) against the map, in the body's axes."""
-        s, before = self._settings, self._pose if self._pose is not None else pose
+    def of(self, pose: FloatArray, matched: Matched, covariance: FloatArray, *, levelled: bool = True) -> StepError:
+        """Take a scan's pose (3,) with its covariance (3, 3) against the map, in the body's axes.
+
+        `levelled`: an inclinometer tells how the machine rolls and pitches.
+        """
+        s, before = self._settings, pose if self._pose is None else self._pose
+        self._scans += 1
+        start = np.zeros((3, 3))
+        if self._scans == _SECOND:  # placed against one scan: so is the heading of all that follows
+            start[2, 2] = math.radians(s.start_deg) ** 2
         forward_m, aside_m, _ = se2.between(before, pose).tolist()
         way_m = math.hypot(forward_m, aside_m)
         grown = np.maximum(np.diag(covariance) - self._variance, 0.0)
         self._pose, self._variance = pose, np.diag(covariance).copy()
         if matched.lost:  # nothing holds the pose: what the motion is off stays
-            return StepError(np.diag(grown), np.zeros(3), covariance)
+            return StepError(start + np.diag(grown), np.zeros(3), covariance)
         seen = _seen(matched, float(pose[2]))
         short = _USUAL_LEVER_M / min(max(seen.lever_m, _LEAST_LEVER_M), _LONGEST_LEVER_M)
         noisy = min(seen.noise, 1.0)
-        lasting = s.walk_per_m * (seen.noise_along + seen.noise**2) * short**_LEVER_POWER * way_m
+        lasting = s.walk_per_m * (seen.noise_along + seen.noise**2)
+        if matched.layered:
+            lasting += self._tilted_walk(matched, levelled=levelled)
+        lasting *= short**_LEVER_POWER * way_m
         followed = min(float(covariance[0, 0]) / seen.variance_along, 1.0)  # the scan, not wheels or inertia
         lasting += max(1.0 - 2.0 * followed, 0.0) * way_m
         pull = s.pull * noisy * short * math.sqrt(followed)
         jitter = (s.jitter + s.noisy_jitter * noisy) * covariance
         if matched.layered:
-            lasting *= s.tilted_alone_walk if matched.alone else s.tilted_walk
             pull += s.tilted_alone_pull if matched.alone else 0.0
             jitter = s.tilted_jitter * jitter + _SWAY
-        return StepError(lasting * covariance, np.array([pull * forward_m, 0.0, 0.0]), jitter)
+        return StepError(start + lasting * covariance, np.array([pull * forward_m, 0.0, 0.0]), jitter)
+
+
+    def _tilted_walk(self, matched: Matched, *, levelled: bool) -> float:
+        s = self._settings
+        if not levelled:
+            return s.tilted_unlevelled_walk
+        return s.tilted_alone_walk if matched.alone else s.tilted_walk
 
 
 class _Seen(NamedTuple):

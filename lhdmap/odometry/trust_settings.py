@@ -21,6 +21,13 @@ class TrustSettings:
         minimum=0.0,
         source=_SOURCE,
     )
+    start_deg: float = setting(
+        0.018,
+        unit="deg",
+        doc="Error of the heading that the first scan of a drive leaves, standard deviation: one scan is no map.",
+        minimum=0.0,
+        source=_SOURCE,
+    )
     pull: float = setting(
         0.0016,
         unit="m/m",
@@ -38,16 +45,20 @@ class TrustSettings:
         0.6, doc="... and what is added to that share where all that a scan tells is noise.", minimum=0.0, source=_SOURCE
     )
     tilted_walk: float = setting(
-        8.0,
-        doc="Times that the walk's variance is larger of a tilted scanner that sees other rock in each scan, with a rear scanner.",
-        minimum=1.0,
+        2.0,
+        unit="1/m",
+        doc="... and what is added to it of a tilted scanner, which sees other rock in each scan, with a rear scanner.",
+        minimum=0.0,
         source=_SOURCE,
     )
     tilted_alone_walk: float = setting(
-        20.0, doc="... and without one: no scanner sees the same rock again.", minimum=1.0, source=_SOURCE
+        10.0, unit="1/m", doc="... and without one: no scanner sees the same rock again.", minimum=0.0, source=_SOURCE
+    )
+    tilted_unlevelled_walk: float = setting(
+        100.0, unit="1/m", doc="... and without an inclinometer.", minimum=0.0, source=_SOURCE
     )
     tilted_alone_pull: float = setting(
-        0.0014,
+        0.002,
         unit="m/m",
         doc="How much too short a tilted front scanner alone reads the way, standard deviation.",
         minimum=0.0,

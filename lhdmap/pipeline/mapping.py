@@ -301,7 +301,7 @@ class MappingPipeline:
         """Return a scan with all that is known of the machine at `time_ns`, the middle of its sweep."""
         rear = partial(self._behind, time_ns) if self.has_inclinometer else None
         rise = rise_of(self.mounts.of(scan.frame_id, "front").T_parent_child)
-        view = View(self.track.height_m, self._boxes, rear, rise)
+        view = View(self.track.height_m, self._boxes, rear, rise, self.has_inclinometer)
         return ScanInput(scan, partial(self._placement, scan, time_ns), self._wheel_step(before_ns, time_ns), view)
 
     def _placement(self, scan: LaserScan, time_ns: int) -> FloatArray:

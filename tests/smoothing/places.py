@@ -9,10 +9,13 @@ import numpy as np
 from lhdmap.geometry import se2
 from lhdmap.messages import FloatArray
 from lhdmap.odometry.scan_points import planar_points
+from lhdmap.odometry.step_error import StepError
 from lhdmap.simulation.planar import PlanarScanner, PlanarWorld, drift_world, simulate_scans, world_from_polylines
 from lhdmap.smoothing.keys import KeyScan
 
 SIDE_M = 16.0
+SIGMA_M = 0.002
+WALK = StepError(np.diag([SIGMA_M**2, SIGMA_M**2, math.radians(0.01) ** 2]), np.zeros(3), np.zeros((3, 3)))  # of a metre
 
 
 @functools.lru_cache(maxsize=1)
@@ -63,7 +66,7 @@ def keys_of(world: PlanarWorld, true: FloatArray, odometry: FloatArray, reach_m:
     keys = []
     for scan, pose, way in zip(scans, odometry, travelled, strict=True):
         points = planar_points(scan, np.eye(4), np.zeros(3)).astype(np.float32)
-        keys.append(KeyScan(scan.stamp_ns, pose.copy(), float(way), points, False))
+        keys.append(KeyScan(scan.stamp_ns, pose.copy(), float(way), points, WALK))
     return keys
 
 

@@ -14,7 +14,7 @@ from lhdmap.smoothing.keys import KeyScan, KeyScans
 from lhdmap.smoothing.settings import SmoothingSettings
 from lhdmap.smoothing.smoother import Smoother
 
-from tests.smoothing.places import drifted, keys_of, lap, square, straight
+from tests.smoothing.places import SIGMA_M, WALK, drifted, keys_of, lap, square, straight
 
 SETTINGS = SmoothingSettings()
 NO_POINTS = np.zeros((1, 3), dtype=np.float32)
@@ -40,7 +40,7 @@ def test_a_second_lap_closes_the_loop(twice_round: tuple[FloatArray, list[KeySca
 def test_the_graph_shrinks_the_error(twice_round: tuple[FloatArray, list[KeyScan]]) -> None:
     true, keys = twice_round
     before = np.array([key.pose for key in keys])
-    after = smoothed(keys, find_closures(keys, SETTINGS), SETTINGS)
+    after = smoothed(keys, find_closures(keys, SETTINGS)).poses
     assert after[0] == pytest.approx(true[0], abs=1e-4)
     assert (
         np.hypot(*(after[64:, :2] - true[64:, :2]).T).mean()
@@ -75,7 +75,7 @@ def test_there_and_back_in_a_smooth_drift_fixes_nothing_along() -> None:
 
 
 def plain_keys(count: int) -> list[KeyScan]:
-    return [KeyScan(k, np.array([float(k), 0.0, 0.0]), float(k), NO_POINTS, False) for k in range(count)]
+    return [KeyScan(k, np.array([float(k), 0.0, 0.0]), float(k), NO_POINTS, WALK) for k in range(count)]
 
 
 def closure(earlier: int, current: int, shift_m: float = 0.0) -> Closure:
@@ -96,10 +96,10 @@ def test_a_lone_closure_is_dropped() -> None:
 
 def test_the_graph_of_a_tiny_loop_has_the_least_squares_solution() -> None:
     """Three steps of 1 m along a line and a closure that says 3.3: with equal weights the rest is shared out evenly."""
-    keys, sigma = plain_keys(4), SETTINGS.along_sigma
+    keys, sigma = plain_keys(4), SIGMA_M
     variance = 1e4 * np.diag([sigma**2, sigma**2, 1.0])  # so weak that the robust kernel stays quadratic
     shift = 0.001
-    found = smoothed(keys, [Closure(0, 3, np.array([3.0 + shift, 0.0, 0.0]), variance)], SETTINGS)
+    found = smoothed(keys, [Closure(0, 3, np.array([3.0 + shift, 0.0, 0.0]), variance)]).poses
     weight = (1 / (1e4 * sigma**2)) / (1 / (1e4 * sigma**2) + 1 / (3 * sigma**2))
     assert found[3, 0] - 3.0 == pytest.approx(shift * weight, rel=0.01)
     assert np.diff(found[:, 0]) == pytest.approx(np.full(3, 1.0 + shift * weight / 3), abs=1e-9)
@@ -107,22 +107,23 @@ def test_the_graph_of_a_tiny_loop_has_the_least_squares_solution() -> None:
 
 def test_one_gross_closure_does_not_bend_the_graph() -> None:
     right = [closure(k, k + 30) for k in range(20)]
-    found = smoothed(plain_keys(50), [*right, closure(10, 41, shift_m=15.0)], SETTINGS)
+    found = smoothed(plain_keys(50), [*right, closure(10, 41, shift_m=15.0)]).poses
     assert np.abs(found[:, 0] - np.arange(50.0)).max() < 0.1
 
 
 def test_without_closures_the_odometry_stands() -> None:
     smoother = Smoother(SETTINGS)
     for k in range(30):
-        smoother.keys.update(k, np.array([float(k), 0.0, 0.0]), np.ones((20, 3)), weak=False)
+        smoother.keys.update(k, np.array([float(k), 0.0, 0.0]), np.ones((20, 3)), WALK)
     assert smoother.correction() is None
 
 
-def test_keys_are_a_metre_apart_and_remember_weakness() -> None:
+def test_keys_are_a_metre_apart_and_add_up_what_their_steps_may_be_off() -> None:
     keys = KeyScans(SETTINGS)
     for k in range(101):
-        keys.update(k, np.array([0.1 * k, 0.0, 0.0]), np.ones((5, 3)), weak=k == 37)
+        keys.update(k, np.array([0.1 * k, 0.0, 0.0]), np.ones((5, 3)), WALK, unseen=30 <= k < 70)
     places = np.array([key.pose[0] for key in keys.keys])
     assert np.diff(places) == pytest.approx(1.0, abs=0.11)
-    assert [key.weak for key in keys.keys].count(True) == 1
+    assert keys.unseen_m == pytest.approx(4.0)
+    assert keys.keys[1].error.walk[0, 0] == pytest.approx(round(10 * places[1]) * WALK.walk[0, 0])
     assert keys.keys[-1].travelled_m == pytest.approx(places[-1])
