@@ -45,8 +45,9 @@ class Diagnostics(NamedTuple):
 
     `residual` (the matcher's, m), `inliers` (share or count, as the matcher gives it), `information_along`,
     `information_across` (1/m^2) and `information_heading` (1/rad^2) in the machine's frame, `degenerate` (an axis was
-    not observed), `substitute` (what was used instead: `wheels`, `motion`, or empty), `slip` (speed of the wheels over
-    that of the machine minus one, NaN where not known).
+    not observed), `substitute` (what was used instead: `wheels`, `motion`, or empty), `slip` (skid factor of
+    the wheels, Eq. (7) of the loading paper; NaN where not known), `wheels` (what became of the wheels' step before the scan,
+    and why: `lhdmap.odometry.wheel_model`).
     """
 
     stamp_ns: npt.NDArray[np.int64]
@@ -58,6 +59,10 @@ class Diagnostics(NamedTuple):
     degenerate: npt.NDArray[np.bool_]
     substitute: Sequence[str]
     slip: FloatArray
+    wheels: Sequence[str]
+
+
+_TEXTS = ("substitute", "wheels")
 
 
 @dataclass(frozen=True, slots=True)
@@ -111,7 +116,8 @@ class MapFolderWriter:
         import pyarrow as pa
         import pyarrow.parquet as pq
 
-        columns = diagnostics._asdict() | {"substitute": pa.array(list(diagnostics.substitute), pa.string())}
+        texts = {name: pa.array(list(getattr(diagnostics, name)), pa.string()) for name in _TEXTS}
+        columns = diagnostics._asdict() | texts
         path = self.path / "diagnostics.parquet"
         with path.open("wb") as file:
             pq.write_table(pa.table(columns), file, compression="zstd")
@@ -210,7 +216,7 @@ class MapFolder:
             columns = {name: table.column(name).to_numpy() for name in Diagnostics._fields}
         except (pa.ArrowException, OSError, KeyError) as error:
             raise InputError(f"{path}: not readable as diagnostics ({error})") from error
-        return Diagnostics(**columns | {"substitute": [str(text) for text in columns["substitute"]]})
+        return Diagnostics(**columns | {name: [str(text) for text in columns[name]] for name in _TEXTS})
 
     def file(self, name: str) -> Path:
         """Return the path of one file of the folder.

@@ -100,7 +100,7 @@ def build_map(request: BuildRequest) -> BuildResult:
             pipeline = MappingPipeline(
                 request.settings,
                 machine_of(source, request.machine),
-                _sweep_sink(inspector),
+                _sweep_sink(inspector, request.settings.recording.scan_interval_s),
                 primary,
                 pile=PileBeside(inspector),
             )
@@ -185,8 +185,8 @@ def _cores() -> int:
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
-def _sweep_sink(inspector: Inspector) -> Callable[[str, int, Any], None]:
-    thinning = Thinning()
+def _sweep_sink(inspector: Inspector, interval_s: float) -> Callable[[str, int, Any], None]:
+    thinning = Thinning(interval_s)
 
     def take(role: str, stamp_ns: int, points_map: Any) -> None:
         if thinning.take(stamp_ns, role):

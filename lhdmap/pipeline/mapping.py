@@ -44,7 +44,7 @@ from lhdmap.pipeline.sweep_times import SweepTimes
 from lhdmap.pipeline.sweeps import ScanSink, SweepIntegration
 from lhdmap.pipeline.track import Track
 from lhdmap.proprioception.attitude import AttitudeFilter
-from lhdmap.proprioception.slip import SlipEstimator
+from lhdmap.proprioception.slip import SkidFactor
 from lhdmap.proprioception.wheels import WheelOdometry
 from lhdmap.smoothing.realign import AlignedScan
 from lhdmap.smoothing.smoother import Smoother
@@ -80,7 +80,7 @@ class MappingPipeline:
         self.mounts = Mounts(machine)
         self.attitude = AttitudeFilter(settings.attitude)
         self.wheels = WheelOdometry(settings.wheels, machine or _DEFAULT_MACHINE)
-        self.slip = SlipEstimator(settings.slip, settings.wheels.scale_std)
+        self.slip = SkidFactor(settings.slip)
         self.odometry: PlanarOdometry | None = None  # begins once the first scans have told the speed
         self.sweeps = SweepIntegration(settings, machine, self.mounts, on_sweep)
         self.clouds = CloudOdometry(settings.cloud_odometry) if primary == "points" else None
@@ -332,14 +332,15 @@ class MappingPipeline:
     def _record(self, stamp_ns: int, time_ns: int, step: OdometryStep | CloudStep) -> None:
         wheel_mps = self.wheels.speed_at(time_ns)
         speed_mps = float(step.velocity[0])
-        slip = math.nan
-        if wheel_mps is not None:
-            slip = self.slip.update(time_ns, wheel_mps, speed_mps)
-        match_ = (step.residual_m, step.support)
-        self.records.add_processed(
-            stamp_ns, match_, step.information, step.substitute, (step.degenerate, step.lost), slip
-        )
+        match_, flags = (step.residual_m, step.support), (step.degenerate, step.lost)
+        wheels = step.wheels, self._slip(time_ns, wheel_mps, math.nan if step.degenerate else speed_mps)
+        self.records.add_processed(stamp_ns, match_, step.information, step.substitute, flags, wheels)
         self.records.add_motion(time_ns, speed_mps, wheel_mps, self.wheels.articulation_at(time_ns))
+
+    def _slip(self, time_ns: int, wheel_mps: float | None, seen_mps: float) -> float:
+        """Return the skid factor; `seen_mps` is NaN where the walls did not show the speed, which is then the wheels' own."""
+        scale = 1.0 if self.odometry is None else self.odometry.wheels.scale
+        return self.slip.update(time_ns, math.nan if wheel_mps is None else wheel_mps / scale, seen_mps)
 
 
 def _says_nothing(scan: LaserScan, after_ns: int) -> bool:
