@@ -41,7 +41,8 @@ def _leave(exit_code: int) -> None:
     except BrokenPipeError:
         pass
     except OSError as error:
-        os.write(2, f"lhdmap: standard output: {error.strerror}\n".encode())
-        exit_code = 3
+        if exit_code == 0:  # told already otherwise
+            os.write(2, f"lhdmap: standard output: {error.strerror}\n".encode())
+            exit_code = 3
     sys.stderr.flush()
     os._exit(exit_code)

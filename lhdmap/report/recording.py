@@ -17,11 +17,13 @@ from typing import Any, Self
 import numpy as np
 import numpy.typing as npt
 
+from lhdmap.errors import InputError
 from lhdmap.integration.cloud import Cloud
 from lhdmap.machine import Machine
 from lhdmap.mapfolder import Diagnostics
 from lhdmap.messages import Float32Array, FloatArray
 from lhdmap.report.data import ReportData
+from lhdmap.report.recording_end import load_quietly, write_out
 from lhdmap.report.recording_layout import RUN_CURVES, blueprint
 from lhdmap.settings import setting
 from lhdmap.trajectory import Trajectory
@@ -71,6 +73,7 @@ class RecordingWriter:
     def __init__(self, path: Path, title: str, start_ns: int, settings: RecordingSettings | None = None) -> None:
         """Open the file in the background; `start_ns` is the stamp that counts as time zero."""
         self._settings = settings or RecordingSettings()
+        self._path, self._failed = path, False
         self._start_ns = self._end_ns = start_ns
         self._thinning = Thinning(self._settings.scan_interval_s)
         self._floor: tuple[Stamps, FloatArray] | None = None
@@ -195,11 +198,21 @@ class RecordingWriter:
             self.add_curve("motion/slip", stamps, 100.0 * found.slip, 0xD55E00FF, "slip, %")
 
     def close(self) -> None:
-        """Add the layout of the viewer and close the file."""
+        """Add the layout of the viewer and close the file.
+
+        Raises:
+            InputError: it could not be written.
+        """
+        if self._failed:
+            return
         self._log_scans()
         used = tuple(view for view in self.curves if any(self._has(entity) for entity in view[1]))
         self._stream.send_blueprint(blueprint(self._bounds, self._end_ns - self._start_ns, used))
-        self._stream.disconnect()
+        try:
+            write_out(self._stream, self._path)
+        except InputError:
+            self._failed = True
+            raise
 
     def _has(self, pattern: str) -> bool:
         """Return whether a curve of this entity, or below it (`…/**`), was recorded."""
@@ -237,9 +250,8 @@ class RecordingWriter:
 
 
 def _open(path: Path, title: str, start_ns: int) -> tuple[Any, Any]:
-    """Return the module of Rerun, and a stream into the file."""
-    import rerun as rr
-
+    """Return the module of Rerun, and a stream into the file; what goes wrong is told by `close`, in our words."""
+    rr = load_quietly()
     stream = rr.RecordingStream(APPLICATION, recording_id=f"{title} {start_ns}")
     stream.save(path)
     stream.send_recording_name(title)
