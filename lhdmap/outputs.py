@@ -64,7 +64,9 @@ def free_folder(target: Path, *, force: bool = False, inputs: Sequence[Path] = (
     if not force:
         raise UsageError(f"{target}: is there already; -o OTHER makes another folder, --force replaces this one")
     if target.is_symlink() or not target.is_dir():
-        raise UsageError(f"{target}: is {_kind(target)}, --force replaces folders of lhdmap only; take another name, -o OTHER")
+        raise UsageError(
+            f"{target}: is {_kind(target)}, --force replaces folders of lhdmap only; take another name, -o OTHER"
+        )
     if described(target) is None and any(target.iterdir()):
         raise UsageError(
             f"{target}: was not made by lhdmap (no map.json or run.json of it), --force does not replace it; -o OTHER"

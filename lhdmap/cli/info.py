@@ -113,10 +113,11 @@ def _drive_lines(counts: Mapping[str, Any]) -> list[str]:
     if "distance_m" not in counts:
         return []
     weak = 100.0 * (counts.get("degenerate_share") or 0.0)
+    scans = f"{counts['scans']} ({counts['scans_processed']} processed), weak {weak:.0f} %"
+    lost, loops = counts.get("lost_stretches", 0), counts.get("closures", 0)
     return [
         f"drive        {counts['distance_m']:.0f} m in {counts['duration_s']:.0f} s",
-        f"scans        {counts['scans']} ({counts['scans_processed']} processed), weak {weak:.0f} %, "
-        f"lost stretches {counts.get('lost_stretches', 0)}, closed loops {counts.get('closures', 0)}",
+        f"scans        {scans}, lost stretches {lost}, closed loops {loops}",
     ]
 
 

@@ -40,7 +40,9 @@ INSTALL_HINT = "on Debian, open3d needs: apt-get install libegl1 libgl1 libx11-6
 FAULT_HINT = "please report it with the output of the same command and --debug"
 _HINTS = {
     **dict.fromkeys((errno.ENOSPC, errno.EDQUOT), "; make room, or name another place with -o"),
-    **dict.fromkeys((errno.EACCES, errno.EPERM, errno.EROFS), "; name another place with -o, or get the right to write"),
+    **dict.fromkeys(
+        (errno.EACCES, errno.EPERM, errno.EROFS), "; name another place with -o, or get the right to write"
+    ),
 }
 
 

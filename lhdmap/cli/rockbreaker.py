@@ -232,9 +232,7 @@ def _finite(value: float, option: str) -> float:
     return value
 
 
-def _write(
-    folder: MapFolderWriter, arguments: argparse.Namespace, settings: Any, outcome: Outcome
-) -> dict[str, Any]:
+def _write(folder: MapFolderWriter, arguments: argparse.Namespace, settings: Any, outcome: Outcome) -> dict[str, Any]:
     """Write the folder; return the values with the paths in it."""
     from lhdmap.config import settings_table
     from lhdmap.mapfolder import MapInfo

@@ -68,7 +68,9 @@ def open_log(path: Path | str) -> LogReader:
     if not path.exists():
         raise InputError(f"{path}: no such file or folder")
     if path.is_dir() and (kind := kind_of(path)) is not None:
-        raise InputError(f"{path}: is a {kind} folder of lhdmap and no log: lhdmap info tells what is in it{_its_log(path)}")
+        raise InputError(
+            f"{path}: is a {kind} folder of lhdmap and no log: lhdmap info tells what is in it{_its_log(path)}"
+        )
     if path.is_file() and not path.stat().st_size:
         raise InputError(f"{path}: the file is empty; {WANTED}")
     return _opener(path)(path)

@@ -110,9 +110,7 @@ def build_map(request: BuildRequest) -> BuildResult:
     return BuildResult(final, summary, outcome.warnings, ways.final)
 
 
-def _run(
-    pipeline: MappingPipeline, source: LogSource, progress: Progress | None, interruption: Interruption
-) -> None:
+def _run(pipeline: MappingPipeline, source: LogSource, progress: Progress | None, interruption: Interruption) -> None:
     """Send all messages through the stages, until Ctrl-C: the stages then finish with what they have."""
     messages: Iterable[tuple[str, Message]] = source.messages([role for role in ROLES_READ if role in source.roles])
     if progress is not None:

@@ -67,9 +67,7 @@ def _demo(folder: OutputFolder, settings: Settings, watcher: Watcher) -> Demo:
     folder.finished.append("drive.mcap")
     say("2/3 build-map: from the log alone, its ground truth is not read")
     known_as = {drive.log: folder.target / drive.log.name}
-    request = BuildRequest(
-        [drive.log], path / "drive_map", settings, progress=watcher.build, recorded_as=known_as
-    )
+    request = BuildRequest([drive.log], path / "drive_map", settings, progress=watcher.build, recorded_as=known_as)
     built = build_map(request)
     say("3/3 eval: the map's trajectory against the truth of the simulation")
     evaluation = evaluate_trajectory(built.trajectory, drive.truth)

@@ -15,8 +15,9 @@ from lhdmap.interrupts import GIVE_WAY
 class Interruption:
     """While entered, the first Ctrl-C only sets `asked`; a second one does at once what it would have done without this.
 
-    Raised wherever the program happens to be, KeyboardInterrupt would leave locks of the compiler held (llvmlite's), and the thread
-    that integrates would wait for them for ever. Outside of the main thread, or where the caller handles the signal, nothing changes.
+    Raised wherever the program happens to be, KeyboardInterrupt would leave locks of the compiler held (llvmlite's), and the
+    thread that integrates would wait for them for ever. Outside of the main thread, or where the caller handles the signal,
+    nothing changes.
     """
 
     def __init__(self) -> None:

@@ -43,7 +43,9 @@ def write_out(stream: Any, path: Path) -> None:
         if full or stalls >= _MOST_STALLS:
             _LEFT_OPEN.append(stream)
             reason = "the disk is full" if full else "is the disk full?"
-            raise InputError(f"{path}: the recording cannot be written, {reason}; make room, or name another place with -o")
+            raise InputError(
+                f"{path}: the recording cannot be written, {reason}; make room, or name another place with -o"
+            )
     stream.disconnect()
 
 

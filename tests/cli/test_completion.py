@@ -63,7 +63,7 @@ printf '%s\\n' "${COMPREPLY[@]}"
 """
 
 
-@pytest.mark.parametrize(("words", "wanted"), OFFERS, ids=lambda value: " ".join(value))
+@pytest.mark.parametrize(("words", "wanted"), OFFERS, ids=" ".join)
 def test_bash_offers(words: list[str], wanted: list[str], nodes: list[Node], folder: Path) -> None:
     assert sorted(offered("bash", bash(nodes), BASH, folder, words)) == sorted(wanted)
 
@@ -75,7 +75,7 @@ def test_bash_offers_behind_an_equals_sign(nodes: list[Node], folder: Path) -> N
 
 
 @pytest.mark.skipif(shutil.which("fish") is None, reason="fish is not installed")
-@pytest.mark.parametrize(("words", "wanted"), OFFERS, ids=lambda value: " ".join(value))
+@pytest.mark.parametrize(("words", "wanted"), OFFERS, ids=" ".join)
 def test_fish_offers(words: list[str], wanted: list[str], nodes: list[Node], folder: Path) -> None:
     line = " ".join(["lhdmap", *words])
     found = offered("fish", fish(nodes), f"source ./script; complete -C '{line}'", folder, [])
@@ -96,7 +96,7 @@ _lhdmap
 
 
 @pytest.mark.skipif(shutil.which("zsh") is None, reason="zsh is not installed")
-@pytest.mark.parametrize(("words", "wanted"), OFFERS, ids=lambda value: " ".join(value))
+@pytest.mark.parametrize(("words", "wanted"), OFFERS, ids=" ".join)
 def test_zsh_offers(words: list[str], wanted: list[str], nodes: list[Node], folder: Path) -> None:
     """With stand-ins for the functions of its completion system, which only run at a terminal."""
     assert sorted(offered("zsh", zsh(nodes), ZSH, folder, words)) == sorted(wanted)

@@ -9,7 +9,6 @@ from pathlib import Path
 
 import pytest
 from lhdmap.cli.main import main
-
 from tools.ctrl_c import problem
 
 from tests.cli.logs import write_room_log
@@ -52,7 +51,9 @@ entry_point()
     ("module", "name", "kept"),
     [("pipeline.build", "MappingPipeline", []), ("pipeline.build", "Outcome", ["odometry.tum", "trajectory.tum"])],
 )
-def test_what_is_kept_is_said_and_nothing_else(module: str, name: str, kept: list[str], log: Path, tmp_path: Path) -> None:
+def test_what_is_kept_is_said_and_nothing_else(
+    module: str, name: str, kept: list[str], log: Path, tmp_path: Path
+) -> None:
     """Inside a part of the run that takes long."""
     words = ["build-map", str(log), "-o", str(tmp_path / "map"), "--one-process", "--json", "--quiet"]
     code = SLOW.format(module=module, name=name, words=words)

@@ -18,7 +18,16 @@ def built(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The map of 80 scans over 79 x 4 cm, with one setting changed."""
     folder = tmp_path_factory.mktemp("info")
     log = write_room_log(folder / "room.mcap", 80)
-    words = ["build-map", str(log), "-o", str(folder / "map"), "--set", "odometry.step_m=0.2", "--one-process", "--quiet"]
+    words = [
+        "build-map",
+        str(log),
+        "-o",
+        str(folder / "map"),
+        "--set",
+        "odometry.step_m=0.2",
+        "--one-process",
+        "--quiet",
+    ]
     assert main(words) == 0
     return folder / "map"
 
@@ -35,7 +44,16 @@ def test_a_map_in_ten_lines(built: Path, capsys: pytest.CaptureFixture[str]) -> 
     lines = capsys.readouterr().out.splitlines()
     assert len(lines) <= 10
     text = "\n".join(lines)
-    for part in ("map ", str(built), "room.mcap", "3 m in 3 s", "80 (", "odometry.step_m = 0.2", "cloud.ply", "warnings"):
+    for part in (
+        "map ",
+        str(built),
+        "room.mcap",
+        "3 m in 3 s",
+        "80 (",
+        "odometry.step_m = 0.2",
+        "cloud.ply",
+        "warnings",
+    ):
         assert part in text
 
 

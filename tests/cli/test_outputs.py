@@ -86,7 +86,10 @@ def test_what_ctrl_c_finds_is_removed_or_named(tmp_path: Path) -> None:
         (lambda path: path.touch(), "is a file"),
         (lambda path: path.symlink_to(old_run(path.parent / "behind")), "is a link"),
         (lambda path: path.symlink_to(path.parent / "nowhere"), "is a link"),
-        (lambda path: path.with_name("run.partial").mkdir() or (path.parent / "run.partial" / "x").touch(), "in the way"),
+        (
+            lambda path: path.with_name("run.partial").mkdir() or (path.parent / "run.partial" / "x").touch(),
+            "in the way",
+        ),
     ],
 )
 def test_force_spares_what_is_no_run(tmp_path: Path, make: object, told: str) -> None:
@@ -121,8 +124,9 @@ def test_two_runs_at_once_do_not_meet(tmp_path: Path) -> None:
         with pytest.raises(UsageError, match="another run is writing it"):
             OutputFolder(tmp_path / "run")
         assert first.path.is_dir()
-    with pytest.warns(LhdmapWarning, match="left over"), OutputFolder(tmp_path / "run") as third:
-        (third.path / "c.txt").touch()
+    with pytest.warns(LhdmapWarning, match="left over"):
+        third = OutputFolder(tmp_path / "run")
+    with third:
         third.complete()
     assert names(tmp_path) == ["run"]
 
@@ -149,9 +153,14 @@ def test_files_get_their_names_together(tmp_path: Path) -> None:
     assert names(tmp_path / "new") == ["a.mcap", "a.txt"]
     with pytest.raises(UsageError, match="--force"):
         OutputFiles(*paths)
-    with pytest.raises(ZeroDivisionError), OutputFiles(*paths, force=True) as files:
-        files.at(paths[0]).write_text("newer", encoding="utf-8")
-        raise ZeroDivisionError
+
+    def failed() -> None:
+        with OutputFiles(*paths, force=True) as files:
+            files.at(paths[0]).write_text("newer", encoding="utf-8")
+            raise ZeroDivisionError
+
+    with pytest.raises(ZeroDivisionError):
+        failed()
     assert [path.read_text(encoding="utf-8") for path in paths] == ["new", "new"]
     assert names(tmp_path / "new") == ["a.mcap", "a.txt"]
 
@@ -160,7 +169,11 @@ def test_folders_are_known_by_their_description(tmp_path: Path) -> None:
     with MapFolderWriter(tmp_path / "pile") as folder:
         folder.write_json("pile.json", {})
         folder.complete(MapInfo([]))
-    assert (kind_of(tmp_path / "pile"), kind_of(old_run(tmp_path / "demo")), kind_of(tmp_path)) == ("pile", "demo", None)
+    assert (kind_of(tmp_path / "pile"), kind_of(old_run(tmp_path / "demo")), kind_of(tmp_path)) == (
+        "pile",
+        "demo",
+        None,
+    )
     assert described(tmp_path) is None
 
 
@@ -216,7 +229,8 @@ def limited(words: list[str], limit_bytes: int) -> subprocess.CompletedProcess[s
 def test_a_disk_that_is_full_is_told_in_one_line(limit_bytes: int, tmp_path: Path) -> None:
     target = tmp_path / "a.mcap"
     done = limited(
-        ["simulate", "drift", "--length", "2", "--mesh-size", "0.3", "-o", str(target), "--quiet", "--json"], limit_bytes
+        ["simulate", "drift", "--length", "2", "--mesh-size", "0.3", "-o", str(target), "--quiet", "--json"],
+        limit_bytes,
     )
     assert done.returncode == 3
     assert len(done.stderr.strip().splitlines()) == 1
@@ -247,7 +261,11 @@ def test_no_right_to_write_is_told(
         raise OSError(number, os.strerror(number), str(path))
 
     monkeypatch.setattr(Path, "mkdir", refused)
-    for words in (["build-map", str(log), "-o"], ["pile", str(log), "-o"], ["rockbreaker", "plan", "--to", "6,0,-1", "-o"]):
+    for words in (
+        ["build-map", str(log), "-o"],
+        ["pile", str(log), "-o"],
+        ["rockbreaker", "plan", "--to", "6,0,-1", "-o"],
+    ):
         assert main([*words, str(tmp_path / "out")]) == 3
         told = capsys.readouterr().err.strip().splitlines()
         assert [line for line in told if not line.startswith("warning")] == [
@@ -268,7 +286,9 @@ def test_the_lock_goes_with_its_process(tmp_path: Path) -> None:
         fcntl.flock(mark, fcntl.LOCK_EX)
         with pytest.raises(UsageError, match="another run"):
             OutputFolder(tmp_path / "run")
-    with pytest.warns(LhdmapWarning, match="replaced"), OutputFolder(tmp_path / "run") as folder:
+    with pytest.warns(LhdmapWarning, match="replaced"):
+        folder = OutputFolder(tmp_path / "run")
+    with folder:
         folder.complete()
 
 

@@ -73,7 +73,11 @@ def test_what_cannot_be_planned_says_why_and_ends_with_1(tmp_path: Path, capsys:
     assert values["reason"]["sigma"] == 1.0
     assert values["csv"] is None
     assert values["duration_s"] is None
-    assert values["error"] == {"kind": "shortfall", "message": f"not feasible: {values['reason']['text']}", "exit_code": 1}
+    assert values["error"] == {
+        "kind": "shortfall",
+        "message": f"not feasible: {values['reason']['text']}",
+        "exit_code": 1,
+    }
     assert main(words) == 2
     assert "--force" in capsys.readouterr().err
     assert main([*words, "--force"]) == 1
@@ -98,7 +102,10 @@ def test_from_a_cloud_to_the_rock_in_it(tmp_path: Path, capsys: pytest.CaptureFi
     assert len(values["steps"]) == 2
     assert values["duration_s"] == pytest.approx(sum(step["duration_s"] for step in values["steps"]))
     assert values["clearance_m"] > 0.0
-    assert told([*words, "--path", "cslm", "--timing", "limit", "--no-pictures", "--force"], capsys)["limit_reached_at_s"] > 0.0
+    assert (
+        told([*words, "--path", "cslm", "--timing", "limit", "--no-pictures", "--force"], capsys)["limit_reached_at_s"]
+        > 0.0
+    )
     assert main(["rockbreaker", "plan", "--cloud", str(cloud), "--no-pictures", "-o", str(tmp_path / "other")]) == 0
     assert "oversize" in capsys.readouterr().out
 
@@ -112,7 +119,16 @@ def test_a_machine_that_stands_elsewhere_in_the_cloud_finds_the_same_rock(
     for number, words in enumerate(([], ["--machine", str(machine)])):
         cloud = tmp_path / f"grizzly{number}.ply"
         told(["simulate", "grizzly", "--seed", "2", *words, "-o", str(cloud)], capsys)
-        asked = ["rockbreaker", "plan", "--cloud", str(cloud), *words, "--no-pictures", "-o", str(tmp_path / f"{number}")]
+        asked = [
+            "rockbreaker",
+            "plan",
+            "--cloud",
+            str(cloud),
+            *words,
+            "--no-pictures",
+            "-o",
+            str(tmp_path / f"{number}"),
+        ]
         plans.append(told(asked, capsys))
     assert plans[1]["rock"]["top_m"] == pytest.approx(plans[0]["rock"]["top_m"], abs=0.05)
     assert plans[1]["duration_s"] == pytest.approx(plans[0]["duration_s"], rel=0.02)

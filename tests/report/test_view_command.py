@@ -104,7 +104,7 @@ def broken(path: Path, how: str) -> Path:
         case "magic":
             data = data[:4]
         case "inside":  # not only what is drawn, but where its parts begin
-            data[64 : middle] = bytes(middle - 64)
+            data[64:middle] = bytes(middle - 64)
         case "start":
             data[:4] = b"PK12"
         case share:
