@@ -7,6 +7,7 @@ was there stays whole.
 from __future__ import annotations
 
 import contextlib
+import errno
 import json
 import os
 import shutil
@@ -24,6 +25,7 @@ PARTIAL_SUFFIX = ".partial"
 SOFTWARE = {"name": "lhdmap", "version": __version__}
 DESCRIPTIONS = ("map.json", "run.json")
 _KINDS = {"map": "trajectory.tum", "pile": "pile.json", "plan": "plan.json", "workspace": "workspace.json"}
+_FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 _MARK = ".lhdmap"  # in a folder that grows: whose it is; locked as long as its run goes on
 
 
@@ -140,6 +142,7 @@ class OutputFolder:
         kept = self._leave()
         if kept is not None and error is not None:
             mark_kept(error, kept)
+        _name_place(error, self.path)
 
     def describe(self, kind: str, values: Mapping[str, Any] | None = None) -> None:
         """Write `run.json`: what kind of run this is, for folders that are no map."""
@@ -217,6 +220,12 @@ class OutputFolder:
         return None
 
 
+def _name_place(error: BaseException | None, path: Path) -> None:
+    """Say on an error that the disk is full which one: the operating system names no file where writing to an open one fails."""
+    if isinstance(error, OSError) and error.filename is None and error.errno in _FULL:
+        error.filename = str(path)
+
+
 def _locked(descriptor: int) -> bool:
     """Return whether the lock was free, or there is no such thing here; it is given back with the file, by a crash too."""
     try:
@@ -267,6 +276,7 @@ class OutputFiles:
         self._end.close()
         if kind is not None:
             self._drop()
+            _name_place(error, self._paths[-1])
             return
         with undisturbed():
             for path in self._paths:

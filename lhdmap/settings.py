@@ -85,6 +85,8 @@ def nearest(key: str, known: typing.Iterable[str]) -> str:
 
 def figure(value: float) -> str:
     """Return a figure for a person: `39` for 39.0785, `12.5`, `0.35`."""
+    if abs(value) >= 1e5 and math.isfinite(value):
+        return f"{value:,.0f}"
     if not math.isfinite(value) or f"{value:g}" == f"{value:.3g}":
         return f"{value:g}"
     return f"{value:.0f}" if abs(value) >= 10.0 else f"{value:.2g}"

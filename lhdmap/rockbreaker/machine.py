@@ -253,7 +253,7 @@ def _check_joint(name: str, joint: Joint) -> None:
     if not nearest_m <= joint.shortest_m < joint.longest_m <= farthest_m + 1e-9:
         raise ConfigError(
             f"{name}: the cylinder's range {joint.shortest_m:g} to {joint.longest_m:g} m must lie between "
-            f"{nearest_m:g} and {farthest_m:g} m, what its pins allow"
+            f"{nearest_m:.3f} and {farthest_m:.3f} m, what its pins allow"
         )
 
 

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import multiprocessing
 import signal
+import threading
 from collections.abc import Callable, Iterator
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
@@ -107,11 +109,24 @@ def _written(scenes: list[SuiteScene], folder: Path, jobs: int) -> Iterator[str]
         for one in scenes:
             yield _write(one, folder)
         return
-    with ProcessPoolExecutor(jobs, initializer=signal.signal, initargs=(signal.SIGINT, signal.SIG_IGN)) as pool:
+    with ProcessPoolExecutor(jobs, initializer=_obey) as pool:
         try:
             yield from pool.map(_write, scenes, [folder] * len(scenes))
         finally:
             pool.shutdown(wait=False, cancel_futures=True)
+
+
+def _obey() -> None:
+    """Leave Ctrl-C to the process that gives the orders, and end with it: nothing else would tell this one that it is gone."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    threading.Thread(target=_end_with_parent, name="parent", daemon=True).start()
+
+
+def _end_with_parent() -> None:
+    parent = multiprocessing.parent_process()
+    if parent is not None:
+        parent.join()
+        signal.raise_signal(signal.SIGKILL)
 
 
 def _write(one: SuiteScene, folder: Path) -> str:

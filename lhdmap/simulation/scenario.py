@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from lhdmap.errors import ConfigError
-from lhdmap.settings import load_section, nearest, read_toml, section_toml
+from lhdmap.settings import figure, load_section, nearest, read_toml, section_toml
 from lhdmap.simulation.pile_sections import MountingSettings, PileSettings
 from lhdmap.simulation.sections import (
     DriftSettings,
@@ -59,8 +59,8 @@ class DriftScenario:
             raise ConfigError("planar = true: a pile needs a world with heights")
         if self.drive.distance_m > self.pile.toe_m - NEAREST_M:
             raise ConfigError(
-                f"drive.distance_m = {self.drive.distance_m:g}: the pile begins at {self.pile.toe_m:g} m, and the machine "
-                f"must stop {NEAREST_M:g} m before it"
+                f"drive.distance_m = {figure(self.drive.distance_m)}: the pile begins at {figure(self.pile.toe_m)} m, and the "
+                f"machine must stop {NEAREST_M:g} m before it"
             )
 
 
