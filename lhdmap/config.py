@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import tomllib
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -93,6 +93,24 @@ def settings_toml(settings: Settings | None = None, sections: Iterable[str] = ()
     named = list(sections)
     texts = [section_toml(name, getattr(chosen, name)) for name in named or SECTIONS]
     return "\n".join(texts if named else [_HEADER, *texts])
+
+
+def settings_from(values: Mapping[str, Any]) -> Settings:
+    """Return the defaults with these over them: `{"odometry.method": "range_flow"}` or `{"odometry": {"method": …}}`.
+
+    Raises:
+        ConfigError: a section, key or value is wrong.
+    """
+    table: dict[str, dict[str, Any]] = {}
+    for name, value in values.items():
+        section, dot, key = str(name).partition(".")
+        if not (dot or isinstance(value, Mapping)):
+            near = [one for one in setting_names() if one.endswith(f".{name}")]
+            raise ConfigError(f"settings: '{name}' is in no section{nearest(section, near or SECTIONS)}")
+        part = {key: value} if dot else dict(value)
+        _check(section, part, "settings: ")
+        table.setdefault(section, {}).update(part)
+    return Settings(**{name: load_section(SECTIONS[name], name, part) for name, part in table.items()})
 
 
 def settings_table(settings: Settings) -> dict[str, dict[str, Any]]:

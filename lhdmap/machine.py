@@ -66,7 +66,7 @@ class BodyBox:
     """A box around a part of the machine, axis-aligned in the frame of the body that it belongs to."""
 
     frame: str = setting(
-        "base_link", source="contract", choices=("base_link", "rear_link"), doc="Body that carries the part."
+        "base_link", source="frames of the log", choices=("base_link", "rear_link"), doc="Body that carries the part."
     )
     min_m: tuple[float, float, float] = setting(
         (0.0, 0.0, 0.0), unit="m", source=ASSUMED, doc="Lower corner (x, y, z) in that frame."
@@ -81,7 +81,7 @@ class SensorMount:
     """Pose of a sensor frame on the front or the rear body; angles in REP 103 order, Rz(yaw) Ry(pitch) Rx(roll)."""
 
     parent: str = setting(
-        "base_link", source="contract", choices=("base_link", "rear_link"), doc="Body that carries the sensor."
+        "base_link", source="frames of the log", choices=("base_link", "rear_link"), doc="Body that carries the sensor."
     )
     position_m: tuple[float, float, float] = setting(
         (0.0, 0.0, 0.0), unit="m", source=ASSUMED, doc="Position (x, y, z) in the parent."

@@ -20,6 +20,7 @@ import numpy.typing as npt
 
 from lhdmap.errors import InputError
 from lhdmap.messages import FloatArray
+from lhdmap.names import shown
 from lhdmap.outputs import PARTIAL_SUFFIX, SOFTWARE, OutputFolder
 from lhdmap.provenance import file_entry, sha256_of, source_entry
 from lhdmap.trajectory import Trajectory, read_tum, write_tum
@@ -44,8 +45,9 @@ class Diagnostics(NamedTuple):
 
     `residual` (the matcher's, m), `inliers` (share or count, as the matcher gives it), `information_along`,
     `information_across` (1/m^2) and `information_heading` (1/rad^2) in the machine's frame, `degenerate` (an axis was
-    not observed), `substitute` (what was used instead: `wheels`, `motion`, or empty), `slip` (speed of the wheels over
-    that of the machine minus one, NaN where not known).
+    not observed), `substitute` (what was used instead: `wheels`, `motion`, or empty), `slip` (skid factor of
+    the wheels, Eq. (7) of the loading paper; NaN where not known), `wheels` (what became of the wheels' step before the scan,
+    and why: `lhdmap.odometry.wheel_model`).
     """
 
     stamp_ns: npt.NDArray[np.int64]
@@ -57,6 +59,10 @@ class Diagnostics(NamedTuple):
     degenerate: npt.NDArray[np.bool_]
     substitute: Sequence[str]
     slip: FloatArray
+    wheels: Sequence[str]
+
+
+_TEXTS = ("substitute", "wheels")
 
 
 @dataclass(frozen=True, slots=True)
@@ -110,9 +116,11 @@ class MapFolderWriter:
         import pyarrow as pa
         import pyarrow.parquet as pq
 
-        columns = diagnostics._asdict() | {"substitute": pa.array(list(diagnostics.substitute), pa.string())}
+        texts = {name: pa.array(list(getattr(diagnostics, name)), pa.string()) for name in _TEXTS}
+        columns = diagnostics._asdict() | texts
         path = self.path / "diagnostics.parquet"
-        pq.write_table(pa.table(columns), path, compression="zstd")
+        with path.open("wb") as file:
+            pq.write_table(pa.table(columns), file, compression="zstd")
         return self.finished(path)
 
     def write_json(self, name: str, values: Mapping[str, Any]) -> Path:
@@ -203,11 +211,12 @@ class MapFolder:
 
         path = self.file("diagnostics.parquet")
         try:
-            table = pq.read_table(path, columns=list(Diagnostics._fields))
+            with path.open("rb") as file:
+                table = pq.read_table(file, columns=list(Diagnostics._fields))
             columns = {name: table.column(name).to_numpy() for name in Diagnostics._fields}
         except (pa.ArrowException, OSError, KeyError) as error:
             raise InputError(f"{path}: not readable as diagnostics ({error})") from error
-        return Diagnostics(**columns | {"substitute": [str(text) for text in columns["substitute"]]})
+        return Diagnostics(**columns | {name: [str(text) for text in columns[name]] for name in _TEXTS})
 
     def file(self, name: str) -> Path:
         """Return the path of one file of the folder.
@@ -239,11 +248,11 @@ def _write_json(path: Path, values: Mapping[str, Any]) -> Path:
 def _plain(value: Any) -> Any:
     """Return numpy values, paths and tuples as what JSON knows; what is not finite as null."""
     if isinstance(value, Mapping):
-        return {str(key): _plain(item) for key, item in value.items()}
+        return {shown(key): _plain(item) for key, item in value.items()}
     if isinstance(value, (list, tuple)):
         return [_plain(item) for item in value]
     if isinstance(value, (np.generic, np.ndarray)):
         return _plain(value.tolist())
     if isinstance(value, float) and not math.isfinite(value):
         return None
-    return value if value is None or isinstance(value, (bool, int, float, str)) else str(value)
+    return value if value is None or isinstance(value, (bool, int, float)) else shown(value)

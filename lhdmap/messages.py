@@ -14,6 +14,9 @@ import numpy.typing as npt
 FloatArray = npt.NDArray[np.float64]
 Float32Array = npt.NDArray[np.float32]
 
+BODY_FRAMES = ("base_link", "rear_link")
+"""The bodies that sensors are mounted on."""
+
 
 class LaserScan(NamedTuple):
     """One sweep of a 2D scanner (`sensor_msgs/LaserScan`).

@@ -4,7 +4,7 @@ A stage declares its section next to its code::
 
     @dataclass(frozen=True, slots=True)
     class AttitudeSettings:
-        lag_s: float = setting(0.1, unit="s", source="findings, section 1", doc="Lag of the inclinometer that is undone.")
+        lag_s: float = setting(0.1, unit="s", source="measured: prototypes", doc="Lag of the inclinometer that is undone.")
 
 `lhdmap.config` lists the sections, `load_section` fills one from a mapping, `section_toml` prints it.
 """

@@ -27,8 +27,9 @@ PACKAGE = ROOT / "lhdmap"
 
 FLOORS = [
     {"errors"},
-    {"messages", "settings", "resources", "interrupts"},
-    {"geometry", "trajectory", "provenance", "outputs"},
+    {"messages", "settings", "resources", "names", "interrupts"},
+    {"geometry", "tables", "provenance", "outputs"},
+    {"trajectory"},
     {"machine", "mapfolder"},
     {"kinematics"},
     {"logs", "proprioception", "odometry", "integration"},
@@ -37,6 +38,7 @@ FLOORS = [
     {"report"},
     {"config"},
     {"pipeline"},
+    {"front"},
     {"cli"},
     {"__main__"},
 ]

@@ -21,6 +21,7 @@ from pathlib import Path
 from types import FrameType
 
 import numpy as np
+import zstandard
 from lhdmap.errors import InputError
 from lhdmap.logs import open_log
 from lhdmap.logs.health import examine
@@ -72,13 +73,23 @@ def _slow(i: int, stamp: int) -> tuple[str, Message]:
         ("/operation/mode", Text(stamp, f"autonomous {i}")),
         ("/odom", WheelPose(stamp, 0.1 * i, 0.0, 0.01)),
         ("/ground_truth/odometry", GroundTruth(stamp, np.array([0.1 * i, 0, 0]), np.array([0, 0, 0, 1.0]))),
-        ("/lidar/points", PointCloud(stamp, "top", np.full((20, 3), i, np.float32), np.empty(0, np.float32))),
+        (
+            "/lidar/points",
+            PointCloud(stamp, "top", np.full((20, 3), i, np.float32), np.linspace(0.0, 0.1, 20, dtype=np.float32)),
+        ),
     ]
     return topics[i % len(topics)]
 
 
-def write_mcap(path: Path, count: int, compression: CompressionType, *, chunked: bool = True) -> Path:
-    """Write a small MCAP log; returns its path."""
+def write_mcap(
+    path: Path,
+    count: int,
+    compression: CompressionType,
+    *,
+    chunked: bool = True,
+    packed: Callable[[bytes], bytes] = bytes,
+) -> Path:
+    """Write a small MCAP log, each message `packed`; returns its path."""
     channels: dict[str, int] = {}
     with path.open("wb") as file:
         writer = Writer(file, chunk_size=8192, compression=compression, use_chunking=chunked)
@@ -88,9 +99,17 @@ def write_mcap(path: Path, count: int, compression: CompressionType, *, chunked:
             if topic not in channels:
                 schema = writer.register_schema(kind, "ros2msg", definition(kind).encode())
                 channels[topic] = writer.register_channel(topic, "cdr", schema)
-            writer.add_message(channels[topic], log_ns, data, log_ns)
+            writer.add_message(channels[topic], log_ns, packed(data), log_ns)
         writer.finish()  # type: ignore[no-untyped-call]
     return path
+
+
+def compressed(path: Path) -> Path:
+    """Compress a log as a whole, in frames as large logs have; returns the path of what comes out."""
+    target, data = path.with_name(path.name + ".zst"), path.read_bytes()
+    frames = [zstandard.compress(data[start : start + 4096]) for start in range(0, len(data), 4096)]
+    target.write_bytes(b"".join(frames))
+    return target
 
 
 def write_bag(path: Path, count: int, compression: BagWriter.CompressionFormat | None) -> Path:
@@ -169,6 +188,10 @@ SEEDS: dict[str, Seed] = {
     "mcap-unchunked": lambda folder, count: write_mcap(
         folder / "flat.mcap", count, CompressionType.NONE, chunked=False
     ),
+    "mcap-messages": lambda folder, count: write_mcap(
+        folder / "packed.mcap", count, CompressionType.NONE, packed=zstandard.compress
+    ),
+    "mcap-file": lambda folder, count: compressed(write_mcap(folder / "file.mcap", count, CompressionType.NONE)),
     "bag-none": lambda folder, count: write_bag(folder / "none.bag", count, None),
     "bag-lz4": lambda folder, count: write_bag(folder / "lz4.bag", count, BagWriter.CompressionFormat.LZ4),
     "bag-bz2": lambda folder, count: write_bag(folder / "bz2.bag", count, BagWriter.CompressionFormat.BZ2),
@@ -244,7 +267,7 @@ def _fuzz(folder: Path, count: int, messages: int, seed: int) -> int:
 
 
 def _fuzz_one(path: Path, data: bytes, count: int, seed: int) -> tuple[int, int, float, int]:
-    target = path.with_name("mutated" + path.suffix)
+    target = path.with_name("mutated" + "".join(path.suffixes))
     delivered = refused = failed = 0
     slowest = 0.0
     for number in range(count):

@@ -8,7 +8,8 @@ from pathlib import Path
 from typing import Any
 
 from lhdmap.cli.console import Console
-from lhdmap.cli.options import add_output, add_poses, add_settings, add_topics, beside, topic_overrides
+from lhdmap.cli.options import add_output, add_poses, add_settings, add_topics, topic_overrides
+from lhdmap.names import beside
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -73,16 +74,27 @@ def progress_of(console: Console) -> Any:
 
 def summary_text(summary: dict[str, Any]) -> str:
     """Return the result in words."""
+    from lhdmap.report.text import cost_line, duration
+
+    reason = str(summary["pile_reason"]).replace("no pile was looked for", "not looked for")
+    pile = summary["pile"].replace("_", " ") if summary["pile"] else reason
     return "\n".join(
         [
             f"map          {summary['map']}",
             f"report       {Path(summary['map']) / 'report.html'}",
-            f"scans        {summary['scans']} ({summary['scans_processed']} processed)",
-            f"drive        {summary['distance_m']:.1f} m in {summary['duration_s']:.1f} s",
-            f"weak scans   {100 * summary['degenerate_share']:.0f} %, lost stretches {summary['lost_stretches']}",
-            (
-                f"run          {summary['wall_s']:.1f} s = {summary['realtime_factor']:.1f} x real time, "
-                f"{summary['peak_memory_mib']:.0f} MiB"
-            ),
+            f"drive        {summary['distance_m']:.1f} m in {duration(summary['duration_s'])}",
+            *_ways(summary),
+            f"pile         {pile}",
+            f"run          {cost_line(summary)}",
         ]
     )
+
+
+def _ways(summary: dict[str, Any]) -> list[str]:
+    """Return how the path was found: from the scans, or given."""
+    if summary["poses"]:
+        return [f"scans        {summary['scans']}", f"poses        given: {summary['poses']}"]
+    return [
+        f"scans        {summary['scans']} ({summary['scans_processed']} processed)",
+        f"weak scans   {100 * summary['degenerate_share']:.0f} %, lost stretches {summary['lost_stretches']}",
+    ]

@@ -11,6 +11,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from typing import Any, TypeVar
 
 from lhdmap.errors import LhdmapError
+from lhdmap.names import shown
 
 T = TypeVar("T")
 STANDARD_OUTPUT = "standard output"
@@ -33,17 +34,17 @@ class Console:
     def note(self, text: str) -> None:
         """Print a line of information on standard error."""
         if not self.quiet:
-            print(text, file=sys.stderr)
+            print(shown(text), file=sys.stderr)
 
     def warn(self, text: str) -> None:
         """Print a warning once."""
         if text not in self._warned:
             self._warned.add(text)
-            print(f"warning: {text}", file=sys.stderr)
+            print(f"warning: {shown(text)}", file=sys.stderr)
 
     def usage(self, text: str) -> None:
         """Print how a command is called, before the error that says what is wrong with the call."""
-        print(text, file=sys.stderr)
+        print(shown(text), file=sys.stderr)
 
     def result(
         self, values: Mapping[str, Any], text: str, *, failure: LhdmapError | None = None, at_once: bool = False
@@ -56,7 +57,7 @@ class Console:
         if failure is not None:
             self._values |= failure_of(failure.kind, str(failure), failure.exit_code)
         if not self.json:
-            _out(text)
+            _out(shown(text))
         if at_once:
             self.close()
             sys.stdout.flush()
@@ -65,7 +66,7 @@ class Console:
         """Print an error; with `--json` the object has it, beside what was found before."""
         self._values |= failure_of(kind, text, exit_code)
         with contextlib.suppress(OSError):  # nobody listens any more: the exit code says it
-            print(f"lhdmap: {text}", file=sys.stderr)
+            print(f"lhdmap: {shown(text)}", file=sys.stderr)
             self.close()
 
     def close(self) -> None:
@@ -107,7 +108,7 @@ class _Meter:
     """A progress line that costs nothing between its updates."""
 
     def __init__(self, label: str, total: float, *, terminal: bool) -> None:
-        self._label, self._total, self._terminal = label, max(total, 1e-9), terminal
+        self._label, self._total, self._terminal = shown(label), max(total, 1e-9), terminal
         self._start = self._shown = time.monotonic()
         self._interval = 0.2 if terminal else 10.0
         self._calls = 0
@@ -140,9 +141,11 @@ class _Meter:
 def _plain(value: Any) -> Any:
     """Return the value with numpy scalars and arrays as plain ones and what is not finite as null."""
     if isinstance(value, Mapping):
-        return {str(key): _plain(item) for key, item in value.items()}
+        return {shown(key): _plain(item) for key, item in value.items()}
     if isinstance(value, (list, tuple)):
         return [_plain(item) for item in value]
+    if isinstance(value, str):
+        return shown(value)
     if hasattr(value, "tolist"):
         return _plain(value.tolist())
     if isinstance(value, float) and not math.isfinite(value):

@@ -73,7 +73,7 @@ def demo_text(demo: Demo, wall_s: float) -> str:
             f"drive       {demo.drive.distance_m:.0f} m, {demo.drive.scans} front scans, {demo.drive.log}",
             f"map         {built.summary['scans_processed']} scans processed, cloud and trajectory, {built.folder}",
             f"error       end point {end} of the distance{segments}",
-            f"time        {wall_s:.0f} s, of which build-map {built.summary['wall_s']:.0f} s",
+            f"time        {wall_s:.0f} s, of which build-map {built.summary['wall_s']:.0f} s{_compiling(built.summary)}",
             "",
             f"report      open {built.folder / 'report.html'} in a browser",
             f"recording   {program} view {built.folder}",
@@ -81,6 +81,12 @@ def demo_text(demo: Demo, wall_s: float) -> str:
             f"your log    {program} doctor LOG, then {program} build-map LOG",
         ]
     )
+
+
+def _compiling(summary: dict[str, Any]) -> str:
+    """Return how much of build-map was compilation, where that is worth a word."""
+    seconds = float(summary["compile_s"])
+    return f" ({seconds:.0f} s of it compiling, once after installation)" if seconds >= 1.0 else ""
 
 
 def _simulation_progress(console: Console) -> Any:

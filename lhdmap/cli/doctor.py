@@ -16,6 +16,7 @@ from lhdmap.logs.finding import Finding, Severity
 from lhdmap.logs.health import Examination, Verdict, examine
 from lhdmap.logs.inventory import Inventory, TopicSummary
 from lhdmap.messages import Record
+from lhdmap.names import name_of
 
 _WIDTH = 118
 _ORDER = (Severity.FATAL, Severity.PROBLEM, Severity.REMARK, Severity.NOTE)
@@ -38,7 +39,7 @@ def run(arguments: argparse.Namespace, console: Console) -> int:
         def position(record: Record) -> float:
             return (record.log_time_ns - start_ns) / 1e9
 
-        return console.progress(records, total=reader.duration_s or 1.0, label=reader.path.name, position=position)
+        return console.progress(records, total=reader.duration_s or 1.0, label=name_of(reader.path), position=position)
 
     outcomes = [examine(path, overrides, progress) for path in arguments.logs]
     text = "\n\n".join("\n".join(_lines(outcome)) for outcome in outcomes)

@@ -28,8 +28,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         type=Path,
         required=True,
         metavar="T.csv",
-        help="attempt,log,gt_width_m,gt_inclination_deg and optionally gt_status, pred_width_m, pred_inclination_deg; logs "
-        "relative to the file are run unless predictions are given",
+        help="attempt,gt_width_m,gt_inclination_deg and log or pred_width_m,pred_inclination_deg, optionally gt_status; the log "
+        "(relative to the file) of a line without prediction is run",
     )
     add_settings(parser)
     suggest(
@@ -55,8 +55,8 @@ def run(arguments: argparse.Namespace, console: Console) -> int:
     from lhdmap.evaluation.pile_truth import read_pile_truth
 
     truth = read_pile_truth(arguments.truth)
-    runner = None if truth.has_predictions else _runner(arguments)
-    if truth.has_predictions and (arguments.config or arguments.set or arguments.poses or arguments.at != "end"):
+    runner = _runner(arguments) if truth.needs_run else None
+    if runner is None and (arguments.config or arguments.set or arguments.poses or arguments.at != "end"):
         raise UsageError(
             f"{arguments.truth} holds predictions, so no log is run: leave out --config, --set, --poses and --at, or its "
             "columns pred_…"
@@ -102,7 +102,9 @@ def _collect(
         rows.append(row)
         if row.problem:
             console.warn(f"attempt {row.attempt.name}: {row.problem}")
-        elif runner is not None:
+        elif row.reason:
+            console.warn(f"attempt {row.attempt.name}: {row.attempt.log}: no status: {row.reason}")
+        elif runner is not None and truth.is_run(row.attempt):
             console.note(
                 f"{len(rows)} of {len(truth.attempts)}: {row.attempt.log}: {row.found.status or 'not identified'}"
             )
@@ -145,8 +147,8 @@ def _line(row: PileRow) -> str:
 
 
 def _status(row: PileRow) -> str:
-    if row.problem:
-        return "could not be run"
+    if row.problem or row.reason:
+        return "could not be run" if row.problem else "no status"
     true, found = row.attempt.truth.status, row.found.status or ("not identified" if row.judged else "-")
     return found if true is None or true == found else f"{found} (true: {true})"
 

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import argparse
+import warnings
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from lhdmap.cli.console import Console
 from lhdmap.cli.options import add_force
-from lhdmap.errors import EvaluationShortfall, UsageError
+from lhdmap.errors import EvaluationShortfall, LhdmapWarning, UsageError
 from lhdmap.outputs import OutputFiles, free_files
 
 if TYPE_CHECKING:
@@ -75,11 +76,18 @@ def run(arguments: argparse.Namespace, console: Console) -> int:
     settings = _settings(arguments)
     if arguments.plot:
         free_files([arguments.plot], force=arguments.force, inputs=[arguments.estimate, arguments.truth])
-    estimate = load_estimate(arguments.estimate, odometry=arguments.odometry)
-    found = evaluate_trajectory(estimate, load_truth(arguments.truth), settings)
+    with warnings.catch_warnings(record=True) as told:
+        warnings.simplefilter("always", LhdmapWarning)
+        estimate = load_estimate(arguments.estimate, odometry=arguments.odometry)
+        truth = load_truth(arguments.truth)
+    read = [str(one.message) for one in told if issubclass(one.category, LhdmapWarning)]
+    for text in read:
+        console.warn(text)
+    found = evaluate_trajectory(estimate, truth, settings)
     for warning in found.warnings:
         console.note(f"note: {warning}")
-    console.result(found.to_json(), trajectory_table(found))
+    values = found.to_json()
+    console.result(values | {"warnings": [*read, *values["warnings"]]}, trajectory_table(found))
     if arguments.plot:
         from lhdmap.report.evaluation_plot import plot_evaluation
 

@@ -112,13 +112,15 @@ def folder_lines(values: Mapping[str, Any]) -> list[str]:
 def _drive_lines(counts: Mapping[str, Any]) -> list[str]:
     if "distance_m" not in counts:
         return []
+    drive = f"drive        {counts['distance_m']:.0f} m in {counts['duration_s']:.0f} s"
+    if counts.get("poses"):
+        return [drive, f"scans        {counts['scans']}, poses given: {counts['poses']}"]
     weak = 100.0 * (counts.get("degenerate_share") or 0.0)
-    scans = f"{counts['scans']} ({counts['scans_processed']} processed), weak {weak:.0f} %"
-    lost, loops = counts.get("lost_stretches", 0), counts.get("closures", 0)
-    return [
-        f"drive        {counts['distance_m']:.0f} m in {counts['duration_s']:.0f} s",
-        f"scans        {scans}, lost stretches {lost}, closed loops {loops}",
-    ]
+    scans = (
+        f"scans        {counts['scans']} ({counts['scans_processed']} processed), weak {weak:.0f} %, "
+        f"lost stretches {counts.get('lost_stretches', 0)}, closed loops {counts.get('closures', 0)}"
+    )
+    return [drive, scans]
 
 
 def _result_lines(folder: Path) -> list[str]:
@@ -139,9 +141,10 @@ def _result_lines(folder: Path) -> list[str]:
 
 
 def _pile_line(found: Mapping[str, Any]) -> str:
+    status = found.get("status") or f"unknown: {found.get('reason')}"
     width = "" if found.get("width_m") is None else f", {found['width_m']:.2f} m wide"
     slope = "" if found.get("inclination_deg") is None else f", inclination {found['inclination_deg']:.1f}°"
-    return f"pile         {found.get('status') or 'none looked for'}{width}{slope}"
+    return f"pile         {status}{width}{slope}"
 
 
 def _plan_line(found: Mapping[str, Any]) -> str:

@@ -91,13 +91,3 @@ def topic_overrides(words: Iterable[str]) -> dict[str, str]:
             raise UsageError(f"--topic {word}: role=/topic was wanted, e.g. --topic front=/scan")
         found[role] = topic
     return found
-
-
-def beside(path: Path, what: str) -> Path:
-    """Return the folder beside an input that results go to: `drive_map` for `drive.mcap`, also where the input is `.`."""
-    whole = Path.cwd() / path
-    whole = whole if whole.name not in ("", "..") and path.name else whole.resolve()
-    name = whole.name
-    while "." in name[1:]:
-        name = name[: name.rindex(".")]
-    return whole.parent / f"{name}_{what}"

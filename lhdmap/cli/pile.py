@@ -7,7 +7,8 @@ from pathlib import Path
 from typing import Any
 
 from lhdmap.cli.console import Console
-from lhdmap.cli.options import add_output, add_poses, add_settings, add_topics, beside, topic_overrides
+from lhdmap.cli.options import add_output, add_poses, add_settings, add_topics, topic_overrides
+from lhdmap.names import beside, name_of
 from lhdmap.outputs import free_folder
 
 CLOUD_SUFFIXES = (".ply", ".pcd", ".laz", ".las")
@@ -16,7 +17,7 @@ CLOUD_SUFFIXES = (".ply", ".pcd", ".laz", ".las")
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options of `lhdmap pile`."""
     parser.add_argument(
-        "input", type=Path, metavar="LOG|CLOUD", help="log or bag folder, or a cloud (.ply, .pcd, .laz)"
+        "input", type=Path, metavar="LOG|CLOUD", help="log or bag folder, or a cloud (.ply, .pcd, .las, .laz)"
     )
     add_output(parser, "folder to make (default: LOG_pile beside the log; of a cloud, none)")
     add_settings(parser)
@@ -47,8 +48,8 @@ def run(arguments: argparse.Namespace, console: Console) -> int:
         report = identify(arguments.input, settings, arguments.poses, machine, topics)
         values = report.to_json()
         folder.write_json("pile.json", values)
-        write_pile_report(report, folder.path / "report.html", f"Ore pile, {arguments.input.name}")
-        write_pile_recording(report, folder.path / "pile.rrd", arguments.input.name)
+        write_pile_report(report, folder.path / "report.html", f"Ore pile, {name_of(arguments.input)}")
+        write_pile_recording(report, folder.path / "pile.rrd", name_of(arguments.input))
         path = folder.complete(MapInfo([arguments.input], settings_table(settings), warnings=values["warnings"]))
     for text in values["warnings"]:
         console.warn(text)
@@ -69,6 +70,7 @@ def _run_cloud(arguments: argparse.Namespace, console: Console) -> int:
         free_folder(arguments.output, force=arguments.force, inputs=[arguments.input])
     estimate, more = run_cloud(arguments.input, arguments.up)
     values = estimate_json(estimate) | more
+    values["reason"] = values["reason"] or None
     if arguments.output is not None:
         with MapFolderWriter(arguments.output, force=arguments.force, inputs=[arguments.input]) as folder:
             folder.write_json("pile.json", values)
@@ -85,9 +87,9 @@ def _text(values: dict[str, Any], folder: Path) -> str:
     lines = [f"folder       {folder}", *_measures(values)]
     distance_m = values["distance_at_decision_m"]
     if distance_m is not None:
-        lines.append(f"decided      {distance_m:.1f} m before the toe")
-    elif not values["identified"]:
-        lines.append("decided      no: not identified")
+        lines.append(f"decided      {distance_m:.1f} m before the toe (the foot of the pile)")
+    elif values["status"] not in (None, "none"):
+        lines.append(f"decided      no: it was never sure enough that it is {values['status']}")
     if len(values["piles"]) > 1:
         statuses = ", ".join(one["status"] for one in values["piles"])
         lines.append(f"on the drive {statuses}: in pile.json, piles")
@@ -95,8 +97,7 @@ def _text(values: dict[str, Any], folder: Path) -> str:
 
 
 def _measures(values: dict[str, Any]) -> list[str]:
-    chance = values["probabilities"][values["status"]]
-    lines = [f"status       {values['status']} ({100 * chance:.0f} %)"]
+    lines = [f"status       {_status(values)}"]
     if values["width_m"] is not None:
         lines.append(f"width        {values['width_m']:.2f} m{_deviation(values['width_std_m'], 2)}")
     if values["inclination_deg"] is not None:
@@ -107,6 +108,17 @@ def _measures(values: dict[str, Any]) -> list[str]:
         lines.append(f"volume seen  {values['volume_m3']:.1f} m³{_deviation(values['volume_std_m3'], 1)}")
     lines.extend(f"boulder      {one['size_m']:.1f} m" for one in values["boulders"])
     return lines
+
+
+def _status(values: dict[str, Any]) -> str:
+    """Return the status with what is known of it: its probability, or why there is none."""
+    status, shares = values["status"], values["probabilities"]
+    if status is None:
+        return f"unknown: {values['reason']}"
+    if status == "none" and shares[status] < max(shares.values()):
+        return "none: what lies ahead is not known well enough to be called anything"
+    words = "none: nothing closes the drift" if status == "none" and "piles" in values else status
+    return f"{words} ({100 * shares[status]:.0f} %)"
 
 
 def _over(values: dict[str, Any]) -> str:

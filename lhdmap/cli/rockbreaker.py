@@ -236,7 +236,7 @@ def _write(folder: MapFolderWriter, arguments: argparse.Namespace, settings: Any
     """Write the folder; return the values with the paths in it."""
     from lhdmap.config import settings_table
     from lhdmap.mapfolder import MapInfo
-    from lhdmap.rockbreaker.table import joined, sampled, write_table
+    from lhdmap.rockbreaker.table import UNITS, joined, sampled, write_table
 
     values, target = outcome.values, _target(arguments)
     rows = None
@@ -245,8 +245,9 @@ def _write(folder: MapFolderWriter, arguments: argparse.Namespace, settings: Any
         write_table(folder.path / "trajectory.csv", rows)
     if not arguments.no_pictures:
         _draw(folder.path, outcome, rows)
-    values |= {"csv": str(target / "trajectory.csv") if rows is not None else None, "folder": str(target)}
-    folder.write_json("plan.json", values)
+    csv = None if rows is None else "trajectory.csv"
+    folder.write_json("plan.json", values | {"csv": csv, "csv_columns": UNITS})  # it may be moved: names only
+    values |= {"csv": None if csv is None else str(target / csv), "folder": str(target)}
     options = {"rockbreaker": settings_table(settings)["rockbreaker"]}
     folder.complete(MapInfo(_sources(arguments), options, frames=FRAMES))
     return values

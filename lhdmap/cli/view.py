@@ -19,6 +19,7 @@ from lhdmap.cli.options import add_output, add_topics, topic_overrides
 from lhdmap.cli.viewer import check_recording, started, viewer
 from lhdmap.errors import InputError, UsageError
 from lhdmap.interrupts import before_interrupt
+from lhdmap.names import in_utf8, name_of
 from lhdmap.outputs import OutputFiles, described, free_files, kind_of
 
 WINDOW = "1600x1000"
@@ -126,7 +127,7 @@ def _recorded_log(arguments: argparse.Namespace, folder: Path, console: Console)
             label="reading",
             position=lambda item: (item[1].stamp_ns - start_ns) / 1e9,
         )
-        recorder = LogRecorder(files.at(target), arguments.path.name)
+        recorder = LogRecorder(files.at(target), name_of(arguments.path))
         for role, message in messages:
             recorder.update(role, message)
         recorder.finish([*source.damage, *source.warnings])
@@ -142,7 +143,7 @@ def _has_display() -> bool:
 
 def _open_window(recording: Path) -> int:
     """Run the viewer until its window is closed."""
-    with started(viewer(str(recording))) as process:
+    with in_utf8(recording) as opened, started(viewer(str(opened))) as process:
         exit_code = process.wait()
     if exit_code != 0:
         raise InputError(f"the viewer ended with code {exit_code}; --web shows the recording in a browser")
@@ -157,8 +158,11 @@ def _serve(recording: Path, arguments: argparse.Namespace, console: Console) -> 
         if _answers(host, port):
             raise UsageError(f"port {port} is in use; --port names another, the one after it must be free too")
     ports = ("--port", str(data_port), "--web-viewer-port", str(arguments.port))
-    command = viewer("--bind", host, "--serve-web", *ports, str(recording))
-    with tempfile.TemporaryFile("w+") as said, started(command, stdout=said, stderr=said) as process:
+    with (
+        in_utf8(recording) as opened,
+        tempfile.TemporaryFile("w+") as said,
+        started(viewer("--bind", host, "--serve-web", *ports, str(opened)), stdout=said, stderr=said) as process,
+    ):
         _wait_for(process, host, arguments.port)
         if process.poll() is None:
             console.note("open this address in a browser; Ctrl-C ends")
@@ -192,9 +196,13 @@ def _screenshot(recording: Path, target: Path, *, force: bool) -> None:
     Raises:
         InputError: the viewer could not draw.
     """
-    with OutputFiles(target, force=force) as files, recording.open("rb") as data:
+    with (
+        OutputFiles(target, force=force) as files,
+        recording.open("rb") as data,
+        in_utf8(files.at(target)) as drawn,
+    ):
         picture = files.at(target)
-        command = viewer("--headless", "--screenshot-to", str(picture), "--window-size", WINDOW, "-")
+        command = viewer("--headless", "--screenshot-to", str(drawn), "--window-size", WINDOW, "-")
         with started(command, stdin=data, stdout=subprocess.PIPE, stderr=subprocess.PIPE) as process:
             try:
                 _, errors = process.communicate(timeout=SCREENSHOT_LIMIT_S)

@@ -3,11 +3,12 @@
 Each stamp of the sparser trajectory looks for the nearest of the denser one, within a tolerance (as evo does).
 Where the nearest is not exact, the denser trajectory is interpolated at the sparser's stamp: at 24 km/h a stamp that is
 5 ms off would otherwise look like an error of 33 mm. Stamps may run backwards (CARMEN logs of Intel do, 631 times): the
-search goes through a sorted index, the order of the file is kept, and nothing is interpolated then.
+search goes through a sorted index, the order given is kept (`ordering` has chosen it), and nothing is interpolated then.
 """
 
 from __future__ import annotations
 
+import itertools
 from typing import NamedTuple
 
 import numpy as np
@@ -22,6 +23,7 @@ from lhdmap.trajectory import Trajectory
 IndexArray = npt.NDArray[np.int64]
 EXACT_NS = 1_000
 """Stamps closer than this are the same stamp: float seconds of other tools keep no more than a microsecond."""
+_MOST_STRETCHES = 20  # more steps back than clocks are set in a drive: stamps of old loggers
 
 
 class Pairs(NamedTuple):
@@ -40,7 +42,7 @@ def associate(estimate: Trajectory, truth: Trajectory, tolerance_ns: int = 20_00
     """
     estimate_is_denser = len(estimate.stamps_ns) >= len(truth.stamps_ns)
     dense, sparse = (estimate, truth) if estimate_is_denser else (truth, estimate)
-    rows = nearest_rows(dense.stamps_ns, sparse.stamps_ns)
+    rows = _nearest(dense.stamps_ns, sparse.stamps_ns)
     away_ns = np.abs(dense.stamps_ns[rows] - sparse.stamps_ns)
     kept = np.flatnonzero(away_ns <= tolerance_ns)
     if len(kept) < 2:
@@ -49,6 +51,21 @@ def associate(estimate: Trajectory, truth: Trajectory, tolerance_ns: int = 20_00
     from_sparse = poses_from_quaternions(sparse.positions_m[kept], sparse.quaternions_xyzw[kept])
     sides = (from_dense, from_sparse) if estimate_is_denser else (from_sparse, from_dense)
     return Pairs(sparse.stamps_ns[kept], *sides)
+
+
+def _nearest(stamps_ns: IndexArray, wanted_ns: IndexArray) -> IndexArray:
+    """Return `nearest_rows`; stretch by stretch where both step back as often: a clock was set, and times came twice."""
+    dense, sparse = _stretches(stamps_ns), _stretches(wanted_ns)
+    if len(dense) != len(sparse) or len(dense) > _MOST_STRETCHES:
+        return nearest_rows(stamps_ns, wanted_ns)
+    parts = [a.start + nearest_rows(stamps_ns[a], wanted_ns[b]) for a, b in zip(dense, sparse, strict=True)]
+    return np.concatenate(parts)
+
+
+def _stretches(stamps_ns: IndexArray) -> list[slice]:
+    """Return the stretches of stamps that do not step back."""
+    edges = [0, *(np.flatnonzero(np.diff(stamps_ns) < 0) + 1).tolist(), len(stamps_ns)]
+    return [slice(start, end) for start, end in itertools.pairwise(edges)]
 
 
 def nearest_rows(stamps_ns: IndexArray, wanted_ns: IndexArray) -> IndexArray:
@@ -95,7 +112,12 @@ def _too_few(estimate: Trajectory, truth: Trajectory, found: int, nearest_ns: in
         f"{name} {trajectory.stamps_ns.min() / 1e9:.3f} to {trajectory.stamps_ns.max() / 1e9:.3f} s"
         for name, trajectory in (("estimate", estimate), ("truth", truth))
     ]
+    alone = [name for name, one in (("estimate", estimate), ("truth", truth)) if len(one.stamps_ns) < 2]
+    if alone:
+        return f"{' and '.join(alone)} of one pose ({', '.join(spans)}): at least 2 were wanted"
+    apart = max(estimate.stamps_ns.min(), truth.stamps_ns.min()) > min(estimate.stamps_ns.max(), truth.stamps_ns.max())
+    hint = "they share no time: are both of one clock?" if apart else "raise --tolerance if both have the same clock"
     return (
         f"{found} matching stamps: at least 2 within {figure(tolerance_ns / 1e9)} s were wanted, the nearest are "
-        f"{figure(nearest_ns / 1e9)} s apart ({', '.join(spans)}); raise --tolerance if both have the same clock"
+        f"{figure(nearest_ns / 1e9)} s apart ({', '.join(spans)}); {hint}"
     )

@@ -78,8 +78,12 @@ def error_components(aligned_estimate: Poses, truth: Poses) -> FloatArray:
     return np.column_stack([c * offset[:, 0] + s * offset[:, 1], c * offset[:, 1] - s * offset[:, 0], offset[:, 2]])
 
 
-def relative_errors(estimate: Poses, truth: Poses, delta: float, unit: str) -> RelativeErrors:
+def relative_errors(
+    estimate: Poses, truth: Poses, delta: float, unit: str, along_m: FloatArray | None = None
+) -> RelativeErrors:
     """Return the RPE over consecutive pairs that are `delta` frames, or `delta` metres of the true path, apart.
+
+    `along_m` (N,): the length of the true path up to each pose, where it is not that through all positions.
 
     Raises:
         UsageError: the unit is unknown, or delta is not positive (for frames: not whole).
@@ -91,7 +95,7 @@ def relative_errors(estimate: Poses, truth: Poses, delta: float, unit: str) -> R
     if unit == "frames":
         rows = np.arange(0, len(truth.positions_m), int(delta))
     else:
-        rows = _rows_apart(distances_along(truth.positions_m), delta)
+        rows = _rows_apart(distances_along(truth.positions_m) if along_m is None else along_m, delta)
     translation, rotation = pair_errors(estimate, truth, rows[:-1], rows[1:])
     return RelativeErrors(translation, np.degrees(rotation), delta, unit)
 
@@ -104,9 +108,14 @@ def pair_errors(estimate: Poses, truth: Poses, start: IndexArray, stop: IndexArr
     return np.linalg.norm(error.positions_m, axis=1), angles(error.rotations)
 
 
-def segments(estimate: Poses, truth: Poses, lengths_m: tuple[float, ...]) -> tuple[Segment, ...]:
-    """Return the mean segment errors for each length: translation in per cent, rotation in degrees per metre driven."""
-    along = distances_along(truth.positions_m)
+def segments(
+    estimate: Poses, truth: Poses, lengths_m: tuple[float, ...], along_m: FloatArray | None = None
+) -> tuple[Segment, ...]:
+    """Return the mean segment errors for each length: translation in per cent, rotation in degrees per metre driven.
+
+    `along_m` as in `relative_errors`.
+    """
+    along = distances_along(truth.positions_m) if along_m is None else along_m
     starts = np.concatenate([[0], _rows_apart(along, SEGMENT_START_STEP_M)[1:]]).astype(np.int64)
     return tuple(_segment(estimate, truth, along, starts, length) for length in lengths_m)
 
@@ -160,7 +169,7 @@ def reach(
     A stretch of the true path counts where there is a pair within `hole_ns` of both of its ends: an estimate that stops
     early or has a hole loses what it does not cover.
     """
-    steps_m = np.linalg.norm(np.diff(truth_positions_m, axis=0), axis=1)
+    steps_m = np.diff(distances_along(truth_positions_m, truth_stamps_ns))
     total = float(steps_m.sum())
     if total <= 0.0:
         return 1.0

@@ -28,13 +28,15 @@ WITHIN_STD = 2.0
 class PileRow(NamedTuple):
     """One attempt with what was found.
 
-    `judged`: whether a status was looked for; `problem`: why a log could not be run (empty: it could).
+    `judged`: whether a status was looked for; `problem`: why a log could not be run (empty: it could); `reason`: why there is
+    no status (empty: there is one).
     """
 
     attempt: Attempt
     found: Measured
     judged: bool = True
     problem: str = ""
+    reason: str = ""
 
     @property
     def width_error_m(self) -> float | None:
@@ -70,6 +72,7 @@ class PileRow(NamedTuple):
             "width_error_m": self.width_error_m,
             "inclination_error_deg": self.inclination_error_deg,
             "problem": self.problem or None,
+            "reason": self.reason or None,
         }
 
 
@@ -147,7 +150,7 @@ class StatusSummary(NamedTuple):
 
 
 def evaluate_pile(truth: PileTruth, run: Runner | None = None, *, at_decision: bool = False) -> Iterator[PileRow]:
-    """Yield one row an attempt: from the predictions of the file, or by running the logs where there are none.
+    """Yield one row an attempt: from its prediction in the file, or by running its log where it has none.
 
     Args:
         truth: what was read.
@@ -155,11 +158,13 @@ def evaluate_pile(truth: PileTruth, run: Runner | None = None, *, at_decision: b
         at_decision: take the estimate of the moment of decision, not the last one (which is what `pile.json` holds).
     """
     for attempt in truth.attempts:
-        if truth.has_predictions or run is None:
+        if run is None or not truth.is_run(attempt):
             yield PileRow(attempt, attempt.predicted, judged=truth.has_statuses)
             continue
         try:
-            yield PileRow(attempt, measured(run(truth.log_path(attempt)), at_decision=at_decision))
+            report = run(truth.log_path(attempt))
+            reason = report.estimate.reason
+            yield PileRow(attempt, measured(report, at_decision=at_decision), judged=not reason, reason=reason)
         except LhdmapError as error:
             yield PileRow(attempt, Measured(), judged=False, problem=str(error))
 
@@ -181,7 +186,7 @@ def measured(report: PileReport, *, at_decision: bool = False) -> Measured:
 
 
 def status_summary(rows: Iterable[PileRow]) -> StatusSummary:
-    """Count statuses; a pile that was not identified counts as `none`, a log that could not be run does not count."""
+    """Count statuses; a pile that was not identified counts as `none`; what has no status for a reason does not count."""
     counts = Counter(
         (row.attempt.truth.status, row.found.status or "none")
         for row in rows

@@ -11,6 +11,9 @@ import numpy.typing as npt
 from lhdmap.errors import InputError
 from lhdmap.messages import FloatArray
 
+JUMP_BACK_NS = 1_000_000_000
+"""Steps back of stamps that are shorter are scatter of a clock, as in CARMEN's Intel log: the path goes on over them."""
+
 
 class Poses(NamedTuple):
     """N rigid motions: `positions_m` (N, 3) and `rotations` (N, 3, 3)."""
@@ -90,9 +93,15 @@ def angles(rotations: FloatArray) -> FloatArray:
     return np.arctan2(np.linalg.norm(skew, axis=1), np.trace(rotations, axis1=1, axis2=2) - 1.0)
 
 
-def distances_along(positions_m: FloatArray) -> FloatArray:
-    """Return the path length from the first position to each (N,), metres."""
-    return np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(positions_m, axis=0), axis=1))])
+def distances_along(positions_m: FloatArray, stamps_ns: npt.NDArray[np.int64] | None = None) -> FloatArray:
+    """Return the path length from the first position to each (N,), metres.
+
+    Where stamps (N,) are given, nothing is counted from one pose to the next where time jumps back.
+    """
+    steps_m = np.linalg.norm(np.diff(positions_m, axis=0), axis=1)
+    if stamps_ns is not None:
+        steps_m[np.diff(stamps_ns) < -JUMP_BACK_NS] = 0.0
+    return np.concatenate([[0.0], np.cumsum(steps_m)])
 
 
 def yaw_rotation(heading_rad: float) -> FloatArray:

@@ -13,6 +13,7 @@ from typing import Any, TextIO
 import numpy as np
 
 from lhdmap.errors import InputError, LhdmapWarning
+from lhdmap.evaluation.ordering import file_in_order
 from lhdmap.geometry.se3 import quaternions_from_rpy
 from lhdmap.mapfolder import looks_like_log
 from lhdmap.messages import GroundTruth
@@ -26,7 +27,9 @@ ROBOT_POSE_FIELDS = 11
 
 
 def load_estimate(path: Path, *, odometry: bool = False) -> Trajectory:
-    """Return the trajectory of a TUM file or of a map folder (its odometry where asked for).
+    """Return the trajectory of a TUM file, or another table of poses, or of a map folder (its odometry where asked for).
+
+    A map folder's is in the order of its scans, a file's by time.
 
     Raises:
         InputError: there is none at `path`.
@@ -40,7 +43,10 @@ def load_estimate(path: Path, *, odometry: bool = False) -> Trajectory:
         if not (path / name).is_file():
             raise InputError(f"{path}: a map folder with {name} was wanted, the folder has none")
         return read_tum(path / name)
-    return read_tum(path)
+    found, remark = file_in_order(read_tum(path), path)
+    if remark:
+        warnings.warn(f"{path}: {remark}", LhdmapWarning, stacklevel=2)
+    return found
 
 
 def load_truth(path: Path) -> Trajectory:

@@ -11,7 +11,9 @@ from lhdmap.errors import UsageError
 from lhdmap.evaluation import metrics
 from lhdmap.evaluation.alignment import ALIGNMENTS, Alignment, align, aligned
 from lhdmap.evaluation.association import IndexArray, associate
+from lhdmap.evaluation.ordering import in_order_of_drive
 from lhdmap.evaluation.poses import Poses, distances_along, flattened
+from lhdmap.evaluation.two_clocks import clock_offset_ns, shifted
 from lhdmap.messages import FloatArray
 from lhdmap.settings import setting
 from lhdmap.trajectory import Trajectory
@@ -97,37 +99,52 @@ def evaluate_trajectory(
     chosen = settings or TrajectoryEvaluationSettings()
     if not chosen.segments_m:
         raise UsageError("no segment length was given: at least one was wanted, e.g. 5,10,20")
+    estimate, of_estimate = in_order_of_drive(estimate)
+    truth, of_truth = in_order_of_drive(truth)
+    offset_ns = clock_offset_ns(estimate, truth)
+    if offset_ns is not None:
+        estimate = shifted(estimate, offset_ns)
     pairs = associate(estimate, truth, round(chosen.tolerance_s * 1e9))
     sides = (flattened(pairs.estimate), flattened(pairs.truth)) if chosen.planar else (pairs.estimate, pairs.truth)
     reach = metrics.reach(pairs.stamps_ns, truth.stamps_ns, truth.positions_m, _hole_ns(pairs.stamps_ns))
-    return _compared(sides[0], sides[1], reach, chosen)
+    remarks = [f"the {name}: {text}" for name, text in (("estimate", of_estimate), ("truth", of_truth)) if text]
+    if offset_ns is not None:
+        remarks.append(
+            f"the stamps are of two clocks: the estimate's were moved by {offset_ns / 1e9:.3f} s, to where both move alike"
+        )
+    along_m = distances_along(sides[1].positions_m, pairs.stamps_ns)
+    return _compared(*sides, along_m, reach, chosen, remarks)
 
 
 def _compared(
-    estimate: Poses, truth: Poses, reach: float, settings: TrajectoryEvaluationSettings
+    estimate: Poses,
+    truth: Poses,
+    along: FloatArray,
+    reach: float,
+    settings: TrajectoryEvaluationSettings,
+    remarks: list[str],
 ) -> TrajectoryEvaluation:
     alignment = align(estimate, truth, settings.alignment)
     moved = aligned(estimate, alignment)
-    along = distances_along(truth.positions_m)
     distance_m = float(along[-1])
     errors = metrics.error_components(moved, truth)
     ape = metrics.statistics(metrics.absolute_errors(moved, truth))
     assert ape is not None, "association gives at least two pairs"  # noqa: S101
-    segments = metrics.segments(estimate, truth, settings.segments_m)
+    segments = metrics.segments(estimate, truth, settings.segments_m, along)
     hints = (alignment.warning, _planar_hint(estimate, truth), _no_segment(segments, distance_m))
     return TrajectoryEvaluation(
         alignment=alignment.used,
         pairs=len(along),
         distance_m=distance_m,
         ape_m=ape,
-        rpe=metrics.relative_errors(estimate, truth, settings.rpe_delta, settings.rpe_unit),
+        rpe=metrics.relative_errors(estimate, truth, settings.rpe_delta, settings.rpe_unit, along),
         segments=segments,
         reach=reach,
         end_pct=100.0 * metrics.end_error_m(estimate, truth) / distance_m if distance_m > 0 else None,
         components=metrics.Components(*(float(value) for value in np.abs(errors).mean(axis=0))),
         profile=Profile(along, truth.positions_m, moved.positions_m, errors),
         motion=alignment,
-        warnings=tuple(text for text in hints if text),
+        warnings=(*remarks, *(text for text in hints if text)),
     )
 
 

@@ -52,6 +52,18 @@ def from_quaternion(quaternion_xyzw: FloatArray, position_m: FloatArray) -> Floa
     return T
 
 
+def from_quaternions(quaternions_xyzw: FloatArray, positions_m: FloatArray) -> FloatArray:
+    """Return the poses, shape (N, 4, 4), of quaternions of any length, shape (N, 4), and positions, shape (N, 3)."""
+    norms = np.linalg.norm(quaternions_xyzw, axis=-1, keepdims=True)
+    x, y, z, w = np.moveaxis(np.asarray(quaternions_xyzw, dtype=float) / norms, -1, 0)
+    T = np.zeros((len(x), 4, 4))
+    T[:, 0, :3] = np.stack([1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)], axis=-1)
+    T[:, 1, :3] = np.stack([2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)], axis=-1)
+    T[:, 2, :3] = np.stack([2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)], axis=-1)
+    T[:, :3, 3], T[:, 3, 3] = positions_m, 1.0
+    return T
+
+
 def quaternions_from_rpy(roll_rad: FloatArray, pitch_rad: FloatArray, yaw_rad: FloatArray) -> FloatArray:
     """Return quaternions x y z w, shape (N, 4), of roll, pitch and yaw, each of shape (N,)."""
     cr, sr = np.cos(roll_rad / 2), np.sin(roll_rad / 2)

@@ -4,16 +4,19 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
-from typing import NamedTuple
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 import numpy.typing as npt
 
 from lhdmap.errors import InputError
 from lhdmap.integration.cloud import Cloud
+from lhdmap.messages import Float32Array, FloatArray
 
 LARGEST_COORDINATE_M = 131072.0  # where float32 steps reach 8 to 16 mm
+_FARTHEST_M = 4096.0  # where float32 steps reach a quarter of a millimetre
 Table = npt.NDArray[np.void]
+Real = TypeVar("Real", np.float32, np.float64)
 
 
 class FieldNames(NamedTuple):
@@ -28,14 +31,16 @@ PCD_NAMES = FieldNames(("normal_x", "normal_y", "normal_z"))
 
 def table_of(cloud: Cloud, names: FieldNames, stamp_types: list[tuple[str, str]]) -> Table:
     """Return the cloud as a structured array with the fields that it has; stamps are left for the caller to fill in."""
-    fields = [(axis, "<f4") for axis in "xyz"]
+    far = any(cloud.origin_m)
+    points = cloud.exact_m() if far else cloud.points_m
+    fields = [(axis, "<f8" if far else "<f4") for axis in "xyz"]
     fields += [(name, "<f4") for name in names.normal] if cloud.normals is not None else []
     fields += [("curvature", "<f4")] if cloud.curvature is not None else []
     fields += stamp_types if cloud.stamps_ns is not None else []
     fields += [("hits", "<u4")] if cloud.hits is not None else []
     table = np.zeros(len(cloud), dtype=fields)
     for axis, name in enumerate("xyz"):
-        table[name] = cloud.points_m[:, axis]
+        table[name] = points[:, axis]
     if cloud.normals is not None:
         for axis, name in enumerate(names.normal):
             table[name] = cloud.normals[:, axis]
@@ -55,33 +60,48 @@ def cloud_of(path: Path, table: Table, stamps_ns: npt.NDArray[np.int64] | None) 
     names = table.dtype.names or ()
     if not {"x", "y", "z"} <= set(names):
         raise InputError(f"{path}: its fields are {', '.join(names) or 'none'}; x, y and z were wanted")
-    points = _points(path, table)
+    exact = any(table.dtype[axis].base.itemsize > np.dtype(np.float32).itemsize for axis in "xyz")
+    points, origin = local_points(path, _columns(table, ("x", "y", "z"), np.float64), exact=exact)
     keep = np.isfinite(points).all(axis=1)
     normal = next((n.normal for n in (PLY_NAMES, PCD_NAMES) if set(n.normal) <= set(names)), None)
     return Cloud(
         points_m=points[keep],
-        normals=None if normal is None else _columns(table, normal)[keep],
+        normals=None if normal is None else _columns(table, normal, np.float32)[keep],
         curvature=table["curvature"][keep].astype(np.float32) if "curvature" in names else None,
         stamps_ns=None if stamps_ns is None else stamps_ns[keep],
         hits=table["hits"][keep].astype(np.uint32) if "hits" in names else None,
+        origin_m=origin,
     )
 
 
-def _points(path: Path, table: Table) -> npt.NDArray[np.float32]:
-    """Return x, y and z; refuse coordinates of a national grid, of which a float32 keeps only decimetres."""
-    points = _columns(table, ("x", "y", "z"))
-    middle_m = float(np.median(np.abs(points), axis=0).max()) if len(points) else 0.0
-    if middle_m > LARGEST_COORDINATE_M:
+def local_points(path: Path, points: FloatArray, *, exact: bool) -> tuple[Float32Array, tuple[float, float, float]]:
+    """Return coordinates (N, 3) as float32 about an origin that keeps their millimetres, and the origin.
+
+    Args:
+        path: for texts.
+        points: shape (N, 3), metres.
+        exact: whether the file holds more than 32-bit floats. What those have lost of a national grid does not come back.
+
+    Raises:
+        InputError: they are not exact, and so large that only decimetres are left.
+    """
+    finite = points[np.isfinite(points).all(axis=1)]
+    middle = np.median(finite, axis=0) if len(finite) else np.zeros(3)
+    largest_m = float(np.abs(middle).max())
+    if largest_m > LARGEST_COORDINATE_M and not exact:
         raise InputError(
-            f"{path}: its coordinates are around {middle_m:.0f} m; less than {LARGEST_COORDINATE_M:.0f} m was wanted: "
-            "shift the cloud to a local origin first"
+            f"{path}: its coordinates are around {largest_m:.0f} m, of which 32-bit floats keep no millimetres; less than "
+            f"{LARGEST_COORDINATE_M:.0f} m was wanted, or 64-bit numbers: shift the cloud to a local origin first"
         )
-    return points
-
-
-def _columns(table: Table, names: tuple[str, ...]) -> npt.NDArray[np.float32]:
+    origin = np.where(np.abs(middle) > _FARTHEST_M, np.round(middle), 0.0) if exact else np.zeros(3)
     with np.errstate(over="ignore", invalid="ignore"):
-        return np.stack([table[name].astype(np.float32) for name in names], axis=-1)
+        near = (points - origin).astype(np.float32)
+    return near, (float(origin[0]), float(origin[1]), float(origin[2]))
+
+
+def _columns(table: Table, names: tuple[str, ...], kind: type[Real]) -> npt.NDArray[Real]:
+    with np.errstate(over="ignore", invalid="ignore"):
+        return np.stack([table[name].astype(kind) for name in names], axis=-1)
 
 
 def text_table(path: Path, body: bytes, dtype: np.dtype[np.void], count: int) -> Table:
@@ -91,13 +111,13 @@ def text_table(path: Path, body: bytes, dtype: np.dtype[np.void], count: int) ->
         InputError: there are fewer rows, or something in them is no number.
     """
     names = dtype.names or ()
-    columns = sum(_width(dtype, name) for name in names)
+    columns = columns_of(dtype)
     words = body.split(None, count * columns)[: count * columns]
     if len(words) < count * columns:
         raise InputError(f"{path}: cut off: {len(words) // columns} of {count} points are there")
     table = np.zeros(count, dtype=dtype)
     at = 0
-    for name in names:
+    for name in (name for name in names if _width(dtype, name)):
         width, base = _width(dtype, name), dtype[name].base
         try:
             with np.errstate(over="ignore", invalid="ignore"):  # becomes inf: no valid point
@@ -107,6 +127,11 @@ def text_table(path: Path, body: bytes, dtype: np.dtype[np.void], count: int) ->
         table[name] = np.stack(values, axis=-1).reshape(table[name].shape)
         at += width
     return table
+
+
+def columns_of(dtype: np.dtype[np.void]) -> int:
+    """Return how many numbers a row holds."""
+    return sum(_width(dtype, name) for name in dtype.names or ())
 
 
 def _width(dtype: np.dtype[np.void], name: str) -> int:

@@ -1,4 +1,4 @@
-"""Cloud files by suffix: PLY and PCD are read and written, LAS and LAZ are written."""
+"""Cloud files by suffix: PLY, PCD, LAS and LAZ."""
 
 from __future__ import annotations
 
@@ -9,7 +9,12 @@ from lhdmap.errors import InputError, UsageError
 from lhdmap.integration import laz, pcd, ply
 from lhdmap.integration.cloud import Cloud
 
-READERS: dict[str, Callable[[Path], Cloud]] = {".ply": ply.read_ply, ".pcd": pcd.read_pcd}
+READERS: dict[str, Callable[[Path], Cloud]] = {
+    ".ply": ply.read_ply,
+    ".pcd": pcd.read_pcd,
+    ".las": laz.read_laz,
+    ".laz": laz.read_laz,
+}
 WRITERS: dict[str, Callable[[Path, Cloud], None]] = {
     ".ply": ply.write_ply,
     ".pcd": pcd.write_pcd,
@@ -19,7 +24,7 @@ WRITERS: dict[str, Callable[[Path, Cloud], None]] = {
 
 
 def read_cloud(path: Path) -> Cloud:
-    """Return the cloud of a PLY or PCD file; points that are not finite are left out.
+    """Return the cloud of a PLY, PCD, LAS or LAZ file; points that are not finite are left out.
 
     Raises:
         InputError: the file is missing, of an unknown kind, cut off or damaged.

@@ -107,7 +107,7 @@ def _dtype(entries: dict[str, list[str]]) -> np.dtype[np.void]:
         if not 0 < int(width) < 10_000:
             raise ValueError(width)
         shape = () if int(width) == 1 else (int(width),)
-        fields.append((f"_{number}" if name == "_" else name, TYPES[kind.upper(), int(size)], shape))
+        fields.append((f"_{number}" if name == "_" else name.lower(), TYPES[kind.upper(), int(size)], shape))
     return np.dtype(fields)
 
 

@@ -8,36 +8,18 @@ nanosecond adds: int(stamp_ns) + stamp_rest_ns. Only float, double and int are w
 from __future__ import annotations
 
 from pathlib import Path
-from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from lhdmap.errors import InputError
 from lhdmap.integration.cloud import Cloud
-from lhdmap.integration.cloud_fields import PLY_NAMES, Table, binary_table, cloud_of, table_of, text_table
+from lhdmap.integration.cloud_fields import PLY_NAMES, Table, binary_table, cloud_of, columns_of, table_of, text_table
+from lhdmap.integration.ply_header import Element, read_header
 
-TYPES = {
-    "char": "i1",
-    "int8": "i1",
-    "uchar": "u1",
-    "uint8": "u1",
-    "short": "i2",
-    "int16": "i2",
-    "ushort": "u2",
-    "uint16": "u2",
-    "int": "i4",
-    "int32": "i4",
-    "uint": "u4",
-    "uint32": "u4",
-    "float": "f4",
-    "float32": "f4",
-    "double": "f8",
-    "float64": "f8",
-}
 WRITTEN = {"f4": "float", "f8": "double", "i4": "int", "u4": "int"}
-ORDERS = {"ascii": "<", "binary_little_endian": "<", "binary_big_endian": ">"}
-LARGEST_HEADER = 1 << 20
+LARGEST_LIST = 4096
+COUNT = "number of "
 
 
 def write_ply(path: Path, cloud: Cloud) -> None:
@@ -63,57 +45,65 @@ def read_ply(path: Path) -> Cloud:
         InputError: it is no PLY file, or it is cut off or damaged.
     """
     data = path.read_bytes()
-    header = _header(path, data)
+    header = read_header(path, data)
     body = memoryview(data)[header.length :]
-    if header.encoding == "ascii":
-        table = text_table(path, bytes(body), header.dtype, header.points)
-    else:
-        table = binary_table(path, body, header.dtype, header.points)
+    for element in header.elements[:-1]:
+        body = _behind(path, body, header.encoding, element)
+    vertices = header.elements[-1]
+    table = _table(path, body, header.encoding, vertices, _dtype(path, body, header.encoding, vertices))
     return cloud_of(path, table, _stamps(table))
 
 
-class _Header(NamedTuple):
-    length: int
-    encoding: str
-    points: int
-    dtype: np.dtype[np.void]
+def _behind(path: Path, body: memoryview, encoding: str, element: Element) -> memoryview:
+    """Return what follows an element before the vertices, which is not needed itself."""
+    dtype = _dtype(path, body, encoding, element)
+    if encoding != "ascii":
+        return body[len(_table(path, body, encoding, element, dtype)) * dtype.itemsize :]
+    numbers = element.rows * columns_of(dtype)
+    rest = bytes(body).split(None, numbers)[numbers:]
+    return memoryview(rest[0] if rest else b"")
 
 
-def _header(path: Path, data: bytes) -> _Header:
-    if not data.startswith((b"ply\n", b"ply\r")):
-        raise InputError(f"{path}: no PLY file (it does not begin with 'ply')")
-    end = data.find(b"end_header", 0, LARGEST_HEADER)
-    newline = data.find(b"\n", end) if end >= 0 else -1
-    if newline < 0:
-        raise InputError(f"{path}: the PLY header has no end; the file is cut off or damaged")
-    lines = [line.split() for line in data[:end].decode("ascii", errors="replace").splitlines()[1:]]
-    lines = [line for line in lines if line and line[0] in ("format", "element", "property")]
-    encoding = next((line[1] for line in lines if line[0] == "format" and len(line) > 1), "")
-    if encoding not in ORDERS:
-        raise InputError(f"{path}: PLY format '{encoding}'; one of {', '.join(ORDERS)} was wanted")
-    count, fields = _vertex(path, lines, ORDERS[encoding])
-    if count > len(data):  # each point takes a byte at least: no room is made for what cannot be there
-        raise InputError(f"{path}: the header promises {count} points, the file has {len(data)} bytes")
-    return _Header(newline + 1, encoding, count, np.dtype(fields))
+def _table(path: Path, body: memoryview, encoding: str, element: Element, dtype: np.dtype[np.void]) -> Table:
+    """Return an element as a table.
+
+    Raises:
+        InputError: it is cut off, or its lists are not all of one length.
+    """
+    if encoding == "ascii":
+        table = text_table(path, bytes(body), dtype, element.rows)
+    else:
+        table = binary_table(path, body, dtype, element.rows)
+    for name in (one.name for one in element.properties if one.count_kind):
+        if (table[COUNT + name] != dtype[name].shape[0]).any():
+            raise InputError(
+                f"{path}: the list '{name}' of its element '{element.name}' has not the same length everywhere; numbers, or lists "
+                "of one length, were wanted: save the cloud without it"
+            )
+    return table
 
 
-def _vertex(path: Path, lines: list[list[str]], order: str) -> tuple[int, list[tuple[str, str]]]:
-    """Return the number of vertices and their fields; the vertex element has to come first, as all writers do."""
-    elements = [i for i, line in enumerate(lines) if line[0] == "element"]
-    if not elements or lines[elements[0]][1:2] != ["vertex"]:
-        raise InputError(f"{path}: the first element of the PLY file is not 'vertex'")
-    first, last = elements[0], elements[1] if len(elements) > 1 else len(lines)
-    fields = []
-    for line in lines[first + 1 : last]:
-        if line[0] != "property" or len(line) != 3 or line[1] not in TYPES:
-            raise InputError(f"{path}: '{' '.join(line)}' in the PLY header; a property of one number was wanted")
-        fields.append((line[2], order + TYPES[line[1]]))
-    words = lines[first]
-    if len(words) != 3 or not words[2].isdigit() or len(words[2]) > 15:
-        raise InputError(f"{path}: '{' '.join(words)}' in the PLY header; a number of points was wanted")
-    if len({name for name, _ in fields}) != len(fields):
-        raise InputError(f"{path}: a property stands twice in the PLY header")
-    return int(words[2]), fields
+def _dtype(path: Path, body: memoryview, encoding: str, element: Element) -> np.dtype[np.void]:
+    """Return the type of an element; a list is as long as the first one is, and its length stands before it."""
+    fields: list[tuple[str, str] | tuple[str, str, tuple[int]]] = []
+    for one in element.properties:
+        if one.count_kind:
+            fields.append((COUNT + one.name, one.count_kind))
+            length = _length(path, body, encoding, np.dtype(fields)) if element.rows else 0
+            fields.append((one.name, one.kind, (length,)))
+        else:
+            fields.append((one.name, one.kind))
+    return np.dtype(fields)
+
+
+def _length(path: Path, body: memoryview, encoding: str, before: np.dtype[np.void]) -> int:
+    """Return the length of a list in the first row, of which `before` is the type up to it."""
+    name = (before.names or ())[-1]
+    table = text_table(path, bytes(body), before, 1) if encoding == "ascii" else binary_table(path, body, before, 1)
+    length = int(table[name][0])
+    if not 0 <= length <= LARGEST_LIST:
+        raise InputError(f"{path}: a list of {length} numbers in the PLY file; at most {LARGEST_LIST} was wanted")
+    return length
 
 
 def _stamps(table: Table) -> npt.NDArray[np.int64] | None:

@@ -10,9 +10,7 @@ import numpy.typing as npt
 
 from lhdmap.errors import InputError
 from lhdmap.machine import Machine
-from lhdmap.messages import FloatArray, Mount
-
-BODY_FRAMES = ("base_link", "rear_link")
+from lhdmap.messages import BODY_FRAMES, FloatArray, Mount
 
 
 class Rig(NamedTuple):

@@ -19,6 +19,7 @@ class BagFile(BlockFile):
     format = "ROS 1 bag"
 
     def __init__(self, path: Path, damage: Findings) -> None:
+        super().__init__()
         self._damage = damage
         self._file: BinaryIO = path.open("rb", buffering=1 << 16)
         start = self._file.read(len(rec.MAGIC))

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator
+from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
 from typing import NamedTuple, Protocol, Self
 
+import numpy as np
+import numpy.typing as npt
+
+from lhdmap.logs.clock import ClockStep
 from lhdmap.logs.stamps import TopicStamps
 from lhdmap.messages import Record
 
@@ -71,6 +75,13 @@ class LogReader(Protocol):
         """Statistics of the stamps of each topic read so far."""
 
     @property
+    def clock_steps(self) -> list[ClockStep]:
+        """Where the clock was set while the log was recorded, as far as it was read."""
+
+    def recorded_ns(self, topic: str, stamps_ns: npt.NDArray[np.int64]) -> npt.NDArray[np.int64]:
+        """Return stamps (N,) of a topic as they stand in the log: where a clock was set, messages carry one that runs on."""
+
+    @property
     def start_ns(self) -> int | None:
         """Log time of the first message."""
 
@@ -88,6 +99,9 @@ class LogReader(Protocol):
     def stated_end_rad(self, topic: str) -> float | None:
         """Return the angle that the log states for the last beam of a scanner's first scan, None where it does not."""
 
+    def sample(self, most: Mapping[str, int]) -> Iterator[Record]:
+        """Yield about `most` messages of each topic, in short runs spread over the log; their stamps as they were recorded."""
+
     def records(self, topics: Collection[str] | None = None) -> Iterator[Record]:
         """Yield the decoded messages of `topics` (all that can be decoded by default)."""
 
@@ -95,3 +109,12 @@ class LogReader(Protocol):
 def span_s(start_ns: int | None, end_ns: int | None) -> float | None:
     """Return the time from start to end in seconds, None where either is unknown."""
     return None if start_ns is None or end_ns is None else (end_ns - start_ns) / 1e9
+
+
+RUN = 4
+"""So many messages in a row are taken of a sample: what alternates shows in it."""
+
+
+def run_stride(count: int, most: int) -> int:
+    """Return after how many of `count` messages the next run begins, so that about `most` are taken."""
+    return max(RUN * (count // max(most, 1)), RUN)

@@ -1,4 +1,4 @@
-"""Messages of a log file in log-time order, with bounded memory.
+"""Messages of a log file in log-time order (in that of the file where its clock was set back), with bounded memory.
 
 MCAP files and bags are sequences of blocks: chunks (compressed or not), or stretches of records outside of any chunk.
 A block is loaded as a whole. Blocks that overlap in time are merged with a heap; what the blocks that are open at once
@@ -13,8 +13,13 @@ from collections.abc import Callable, Iterator, Sequence
 from operator import itemgetter
 from typing import NamedTuple
 
+import numpy as np
+
+from lhdmap.logs.order import IntArray, clock_was_set_back
+
 BUDGET_BYTES = 96 << 20
 MAX_TIME_NS = (1 << 63) - 1
+_JITTER_NS = 50_000_000  # by which blocks of a recorder with several threads may overlap
 
 # Log time, channel id, first byte and end of the message in its block.
 Entry = tuple[int, int, int, int]
@@ -95,8 +100,42 @@ def _push(
 
 
 def _sorted(entries: list[Entry]) -> list[Entry]:
-    """Return the entries by time; the sort is stable and quick where they are in order already."""
-    return sorted(entries, key=itemgetter(0))
+    """Return the entries by time, or as they are where the clock was set back among them.
+
+    The sort is stable and quick where they are in order already.
+    """
+    ordered = sorted(entries, key=itemgetter(0))
+    return entries if ordered != entries and clock_was_set_back(*_times_of(entries)) else ordered
+
+
+def in_file_order(blocks: Sequence[Block], load: Load) -> Iterator[tuple[int, int, bytes]]:
+    """Yield (log time, channel id, message bytes) as they stand in the file."""
+    for block in blocks:
+        data, entries = load(block)
+        view = memoryview(data)
+        for time_ns, channel, start, end in entries:
+            yield time_ns, channel, view[start:end]  # type: ignore[misc]
+
+
+def set_back(blocks: Sequence[Block], load: Load) -> bool:
+    """Return whether a clock that was set back explains why blocks, in the order of the file, run back in time.
+
+    They are read through only where they do.
+    """
+    end_ns, falls = 0, False
+    for block in blocks:
+        falls |= block.start_ns < end_ns - _JITTER_NS
+        end_ns = max(end_ns, block.end_ns)
+    if not falls:
+        return False
+    found = [_times_of(load(block).entries) for block in blocks]
+    return clock_was_set_back(*(np.concatenate(parts) for parts in zip(*found, strict=True)))
+
+
+def _times_of(entries: list[Entry]) -> tuple[IntArray, IntArray]:
+    """Return log times and channels of entries, shape (N,) each."""
+    table = np.array([entry[:2] for entry in entries], dtype=np.int64).reshape(-1, 2)
+    return table[:, 0], table[:, 1]
 
 
 class _Cache:

@@ -17,7 +17,7 @@ from lhdmap.errors import InputError
 from lhdmap.logs.base import TopicInfo
 from lhdmap.logs.findings import Findings
 from lhdmap.logs.text_lines import text_lines
-from lhdmap.logs.text_log import Found, TextLog
+from lhdmap.logs.text_log import Found, TextLog, Wanted, every
 from lhdmap.messages import Float32Array, LaserScan, WheelPose
 
 WORDS, FIRST_RANGE, BEAMS = 706, 24, 682
@@ -59,7 +59,7 @@ class BreezyLog(TextLog):
             _ODOMETRY: TopicInfo(_ODOMETRY, "nav_msgs/msg/Odometry", self._count, "odom"),
         }
 
-    def _messages(self, topics: Collection[str]) -> Iterator[Found]:
+    def _messages(self, topics: Collection[str], wanted: Wanted = every) -> Iterator[Found]:
         wheels = _Wheels()
         for text in self._lines():
             try:
@@ -67,9 +67,10 @@ class BreezyLog(TextLog):
             except InputError as error:
                 self._notes_damage(f"a line was skipped: {error}")
                 continue
-            if _ODOMETRY in topics:
-                yield Found(_ODOMETRY, line.stamp_ns, wheels.update(line), True)
-            if _SCAN in topics:
+            pose = wheels.update(line)
+            if _ODOMETRY in topics and wanted(_ODOMETRY):
+                yield Found(_ODOMETRY, line.stamp_ns, pose, True)
+            if _SCAN in topics and wanted(_SCAN):
                 yield Found(_SCAN, line.stamp_ns, _scan(line), True)
 
 

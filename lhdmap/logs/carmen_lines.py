@@ -5,9 +5,10 @@ r1..rn m v1..vm laser_x laser_y laser_theta robot_x robot_y robot_theta tv rv fo
 without poses; `ODOM x y theta tv rv accel`; `TRUEPOS true_x true_y true_theta odom_x odom_y odom_theta`. Lengths in
 metres, angles in radians, beams from right to left.
 
-FLASER does not state its angles: 180 degrees are covered from -90 on. An odd number of beams includes both ends (181: 1
-degree, 361: 0.5); an even number leaves out the left end (180: 1 degree, the last beam at +89; 360: 0.5 degrees). That
-is CARMEN's own quirk: its 180-beam logs are 181-beam scanners whose last beam was dropped.
+FLASER does not state its angles. The SICK scanners of those logs have 181 or 361 beams over 180 degrees, or 401 over 100
+(0.25 degrees: the finest setting of an LMS), from the right end on. One beam less leaves out the left end (180: the last
+beam at +89 degrees): CARMEN's own quirk, those are the same scanners with the last beam dropped. Of any other number 180
+degrees are assumed.
 """
 
 from __future__ import annotations
@@ -26,6 +27,7 @@ _SECOND_NS = 1_000_000_000
 _MAX_SECONDS = 9_000_000_000
 _FLASER_TAIL, _ROBOTLASER_TAIL, _RAWLASER_TAIL, _POSE_WORDS = 9, 14, 3, 10
 _ROBOTLASER_HEAD = 9
+_FOV_DEG = {180: 180, 181: 180, 360: 180, 361: 180, 400: 100, 401: 100}  # carmen_laser_guess_fov
 
 
 class LaserLine(NamedTuple):
@@ -69,9 +71,15 @@ def flaser(words: list[bytes]) -> LaserLine:
     if count < 2:
         raise InputError("a scan of less than two beams")
     ranges, rest = _floats32(words[2 : 2 + count]), words[2 + count :]
-    increment = math.pi / (count if count % 2 == 0 else count - 1)
+    fov_rad = math.radians(_FOV_DEG.get(count, 180))
+    increment = fov_rad / (count if count % 2 == 0 else count - 1)
     poses = _pose(rest[0:3]), _pose(rest[3:6])
-    return LaserLine(stamp_of(rest[6]), -math.pi / 2, increment, math.pi, 0.0, ranges, *poses)
+    return LaserLine(stamp_of(rest[6]), -fov_rad / 2, increment, fov_rad, 0.0, ranges, *poses)
+
+
+def has_known_fov(beams: int) -> bool:
+    """Return whether FLASER lines of so many beams are those of a scanner that CARMEN knows."""
+    return beams in _FOV_DEG
 
 
 def robotlaser(words: list[bytes]) -> LaserLine:

@@ -16,7 +16,7 @@ from lhdmap.logs import carmen_lines as lines
 from lhdmap.logs.base import TopicInfo
 from lhdmap.logs.carmen_survey import FRAMES, PARSERS, CarmenSurvey, survey
 from lhdmap.logs.findings import Findings
-from lhdmap.logs.text_log import Found, TextLog
+from lhdmap.logs.text_log import Found, TextLog, Wanted, every
 from lhdmap.messages import GroundTruth, LaserScan, Mount, WheelPose
 
 _SCAN, _ODOMETRY, _TRANSFORMS = "sensor_msgs/msg/LaserScan", "nav_msgs/msg/Odometry", "tf2_msgs/msg/TFMessage"
@@ -57,15 +57,17 @@ class CarmenLog(TextLog):
         stated = first is not None and topic not in ("FLASER", "RLASER")
         return first.angle_min_rad + first.fov_rad if first is not None and stated else None
 
-    def _messages(self, topics: Collection[str]) -> Iterator[Found]:
+    def _messages(self, topics: Collection[str], wanted: Wanted = every) -> Iterator[Found]:
         if _MOUNTS in topics:
             yield from self._mounts()
         for line in self._lines():
             end = line.find(b" ")
             name = line[:end].decode("ascii", "replace") if end > 0 else ""
-            pose_topic = self._pose_topics.get(name)
-            if (name in topics and name in self._lasers) or (pose_topic is not None and pose_topic in topics):
-                yield from self._parsed(name, line.split(), topics)
+            on_it = {name} if name in self._lasers else set()
+            on_it |= {self._pose_topics[name]} if name in self._pose_topics else set()
+            now = [topic for topic in on_it if topic in topics and wanted(topic)]
+            if now:
+                yield from self._parsed(name, line.split(), now)
 
     def _mounts(self) -> Iterator[Found]:
         for name in self._lasers:
@@ -134,6 +136,18 @@ def _remark(found: CarmenSurvey, lasers: list[str], notes: Findings) -> None:
         if name in found.no_return_m:
             notes.add(f"{name}: {found.no_return_m[name]:g} m stands for no return; ranges count up to "
                       f"{found.range_max_m[name]:g} m")  # fmt: skip
-        if name in ("FLASER", "RLASER") and len(first.ranges_m) % 2 == 0:
-            last_deg = math.degrees(first.angle_min_rad + (len(first.ranges_m) - 1) * first.angle_increment_rad)
-            notes.add(f"{name}: {len(first.ranges_m)} beams for 180 deg: the last beam is taken at {last_deg:+.1f} deg")
+        if name in ("FLASER", "RLASER"):
+            _remark_fov(name, first, notes)
+
+
+def _remark_fov(name: str, first: lines.LaserLine, notes: Findings) -> None:
+    beams, fov_deg = len(first.ranges_m), math.degrees(first.fov_rad)
+    step_deg = math.degrees(first.angle_increment_rad)
+    if not lines.has_known_fov(beams):
+        notes.add(
+            f"{name}: its field of view is a guess: {beams} beams are no scanner that CARMEN knows, {fov_deg:.0f} deg in steps of "
+            f"{step_deg:.3g} are assumed"
+        )
+    elif beams % 2 == 0:
+        last_deg = math.degrees(first.angle_min_rad) + (beams - 1) * step_deg
+        notes.add(f"{name}: {beams} beams for {fov_deg:.0f} deg: the last beam is taken at {last_deg:+.4g} deg")

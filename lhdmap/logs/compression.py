@@ -11,7 +11,9 @@ import lz4.frame
 import zstandard
 
 MAX_BLOCK_BYTES = 256 << 20
+ZSTD_MAGIC = b"\x28\xb5\x2f\xfd"
 _STEP = 1 << 16
+_ZSTD_STEP = 1 << 10  # of which zstd can make 32 MiB
 
 
 class _Stream(Protocol):
@@ -61,6 +63,21 @@ def decompress(data: bytes, compression: str, size: int) -> tuple[bytes, str | N
     return out, problem
 
 
+def inflated(data: bytes) -> bytes:
+    """Return the bytes of a message; one that its recorder compressed alone (ROS 2, zstd) is unpacked.
+
+    No message in CDR begins with these bytes, and none of ROS 1 with a sequence number below four billion.
+    """
+    if data[:4] != ZSTD_MAGIC:
+        return data
+    data = bytes(data)
+    try:
+        size = zstandard.frame_content_size(data)
+    except zstandard.ZstdError:
+        size = -1
+    return decompress(data, "zstd", size if size >= 0 else MAX_BLOCK_BYTES + 1)[0]
+
+
 def _quick(data: bytes, compression: str, size: int) -> tuple[bytes, str | None]:
     """Decompress in one call where the claimed size is a sane one."""
     if size > MAX_BLOCK_BYTES or compression != "zstd":
@@ -78,9 +95,9 @@ def _stepwise(data: bytes, compression: str) -> tuple[bytes, str | None]:
     stream = _STREAMS[compression]()
     parts: list[bytes] = []
     total = 0
-    for start in range(0, len(data), _STEP):
-        step = data[start : start + _STEP]
-        problem = _feed(stream, step, parts)
+    step = _ZSTD_STEP if compression == "zstd" else _STEP
+    for start in range(0, len(data), step):
+        problem = _feed(stream, data[start : start + step], parts)
         if problem is not None:
             return b"".join(parts), problem
         total += len(parts[-1])

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import BinaryIO, NamedTuple, Protocol
 
 from lhdmap.logs.base import Channel
-from lhdmap.logs.blocks import Block, Entry, Loaded, in_time_order
+from lhdmap.logs.blocks import Block, Entry, Loaded, in_file_order, in_time_order, set_back
 from lhdmap.logs.compression import decompress
 from lhdmap.logs.findings import Findings
 
@@ -24,9 +24,10 @@ class Contents(NamedTuple):
 
 
 class Container(Protocol):
-    """An open file of messages."""
+    """An open file of messages; `remarks`: what is odd but usable in how they are stored."""
 
     format: str
+    remarks: Findings
 
     def contents(self) -> Contents:
         """Return the table of contents; where the file has none that can be trusted, read through it once."""
@@ -46,6 +47,10 @@ class BlockFile(ABC):
     _channels: dict[int, Channel]
     _contents: Contents | None
     _damage: Findings
+    _set_back: bool | None = None
+
+    def __init__(self) -> None:
+        self.remarks = Findings()
 
     def contents(self) -> Contents:
         """Return channels, counts and log times, from the index where it is whole."""
@@ -54,7 +59,7 @@ class BlockFile(ABC):
         return self._contents
 
     def messages(self, wanted: Collection[int]) -> Iterator[tuple[int, int, bytes]]:
-        """Yield log time, channel id and bytes in log-time order."""
+        """Yield log time, channel id and bytes in log-time order; in that of the file where the clock was set back."""
         self.contents()
         keep = frozenset(wanted)
 
@@ -62,7 +67,9 @@ class BlockFile(ABC):
             data, entries = self._load(block)
             return Loaded(data, [entry for entry in entries if entry[1] in keep])
 
-        return in_time_order(self._blocks, load)
+        if self._set_back is None:
+            self._set_back = set_back(self._blocks, self._load)
+        return (in_file_order if self._set_back else in_time_order)(self._blocks, load)
 
     def close(self) -> None:
         """Close the file."""

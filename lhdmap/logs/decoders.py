@@ -125,7 +125,8 @@ def _text(cursor: Cursor) -> tuple[Message, ...]:
     return (Text(0, cursor.text()),)
 
 
-def _transforms(cursor: Cursor) -> tuple[Message, ...]:
+def transforms(cursor: Cursor) -> tuple[Message, ...]:
+    """Decode a TFMessage; a transform that is no pose has NaN in it: those beside it in the message are right."""
     return tuple(_transform(cursor) for _ in range(cursor.count(least_bytes=64)))
 
 
@@ -133,9 +134,10 @@ def _transform(cursor: Cursor) -> Mount:
     stamp, parent = cursor.header()
     child = cursor.text()
     pose = np.array(cursor.numbers(_POSE))
-    if not (np.abs(pose) < _MAX_METRES).all() or not 0.5 < float(pose[3:] @ pose[3:]) < 2.0:
-        raise InputError(f"a transform to '{child}' that is no pose")
-    return Mount(stamp, parent, child.lstrip("/"), se3.from_quaternion(pose[3:], pose[:3]))
+    named = bool(parent and child.lstrip("/"))
+    is_pose = (np.abs(pose) < _MAX_METRES).all() and 0.5 < float(pose[3:] @ pose[3:]) < 2.0
+    T = se3.from_quaternion(pose[3:], pose[:3]) if named and is_pose else np.full((4, 4), math.nan)
+    return Mount(stamp, parent, child.lstrip("/"), T)
 
 
 LASER_SCAN = "sensor_msgs/msg/LaserScan"
@@ -149,8 +151,8 @@ DECODERS: dict[str, Decoder] = {
     "nav_msgs/msg/Odometry": _odometry,
     "lhd_msgs/msg/MachineCommand": _command,
     "std_msgs/msg/String": _text,
-    "tf2_msgs/msg/TFMessage": _transforms,
-    "tf/msg/tfMessage": _transforms,
+    "tf2_msgs/msg/TFMessage": transforms,
+    "tf/msg/tfMessage": transforms,
 }
 # Types whose messages carry no stamp of their own, or one that says nothing about a measurement.
 UNSTAMPED_TYPES = frozenset({"std_msgs/msg/String", "tf2_msgs/msg/TFMessage", "tf/msg/tfMessage"})

@@ -8,9 +8,10 @@ class Findings:
 
     def __init__(self) -> None:
         self._counts: dict[str, int] = {}
+        self._parts: dict[str, Findings] = {}
 
     def __len__(self) -> int:
-        return len(self._counts)
+        return len(self._counts) + sum(len(part) for part in self._parts.values())
 
     def add(self, text: str) -> None:
         """Note `text` once more."""
@@ -20,6 +21,11 @@ class Findings:
         """Note `text` unless it is noted already: for what is met again whenever the same place is read."""
         self._counts.setdefault(text, 1)
 
+    def part(self, name: str) -> Findings:
+        """Return what notes for one file of several; its lines come with the file's name."""
+        return self._parts.setdefault(name, Findings())
+
     def lines(self) -> list[str]:
         """Return the texts, each with how often it was noted where that is more than once."""
-        return [text if count == 1 else f"{text} ({count} times)" for text, count in self._counts.items()]
+        own = [text if count == 1 else f"{text} ({count} times)" for text, count in self._counts.items()]
+        return own + [f"{name}: {line}" for name, part in self._parts.items() for line in part.lines()]

@@ -10,9 +10,12 @@ from lhdmap.logs.bag_log import BagFile
 from lhdmap.logs.base import LogReader
 from lhdmap.logs.breezy_log import BreezyLog
 from lhdmap.logs.carmen_log import CarmenLog
+from lhdmap.logs.compression import ZSTD_MAGIC
 from lhdmap.logs.decoded import DecodedLog
 from lhdmap.logs.folder_log import BagFolder
 from lhdmap.logs.mcap_log import McapFile
+from lhdmap.logs.packed import SUFFIXES as PACKED
+from lhdmap.logs.packed import PackedFile
 from lhdmap.logs.sqlite_log import MAGIC as SQLITE_MAGIC
 from lhdmap.logs.sqlite_log import SqliteFile
 from lhdmap.outputs import described, kind_of
@@ -32,6 +35,10 @@ def _sqlite(path: Path) -> LogReader:
     return DecodedLog(path, SqliteFile)
 
 
+def _packed(path: Path) -> LogReader:
+    return DecodedLog(path, PackedFile)
+
+
 def _folder(path: Path) -> LogReader:
     return DecodedLog(path, BagFolder)
 
@@ -44,8 +51,8 @@ _BY_SUFFIX: dict[str, Opener] = {
     ".log": CarmenLog,
     ".dat": BreezyLog,
 }
-_BY_START: dict[bytes, Opener] = {b"\x89MCAP": _mcap, b"#ROSBAG": _bag, SQLITE_MAGIC: _sqlite}
-_COMPRESSED = (".gz", ".bz2")
+_BY_START: dict[bytes, Opener] = {b"\x89MCAP": _mcap, b"#ROSBAG": _bag, SQLITE_MAGIC: _sqlite, ZSTD_MAGIC: _packed}
+_TEXTS = (CarmenLog, BreezyLog)  # which unpack .gz and .bz2 line by line
 # What people pass by mistake, and what it is.
 _NOT_LOGS = {
     **dict.fromkeys((".ply", ".pcd", ".laz", ".las", ".xyz", ".e57"), "a point cloud"),
@@ -55,7 +62,10 @@ _NOT_LOGS = {
     ".rrd": "a Rerun recording",
     ".yaml": "a description of a log (give its folder instead)",
 }
-WANTED = "MCAP, ROS 1 bag, ROS 2 bag folder or .db3, CARMEN .clf/.log (also .gz, .bz2) or BreezySLAM .dat was wanted"
+WANTED = (
+    "MCAP, ROS 1 bag, ROS 2 bag folder or .db3 (also .zst, .gz, ...), CARMEN .clf/.log (also .gz, .bz2) or "
+    "BreezySLAM .dat was wanted"
+)
 
 
 def open_log(path: Path | str) -> LogReader:
@@ -87,10 +97,11 @@ def _opener(path: Path) -> Opener:
     if path.is_dir():
         return _folder
     suffixes = [suffix.lower() for suffix in path.suffixes]
-    if suffixes and suffixes[-1] in _COMPRESSED:
-        suffixes.pop()
+    packed = suffixes.pop() if suffixes and suffixes[-1] in PACKED else ""
     suffix = suffixes[-1] if suffixes else ""
     found = _BY_SUFFIX.get(suffix) or _by_start(path)
+    if packed and suffix not in _NOT_LOGS and not (found in _TEXTS and packed in (".gz", ".bz2")):
+        return _packed
     if found is None:
         raise InputError(f"{path}: {_NOT_LOGS.get(suffix, 'an unknown format')} is no log that can be read; {WANTED}")
     return found

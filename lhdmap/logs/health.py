@@ -15,11 +15,21 @@ from lhdmap.logs.finding import Finding, Severity
 from lhdmap.logs.formats import open_log
 from lhdmap.logs.inventory import Inventory, take_inventory
 from lhdmap.logs.scan_health import ScanWatch
+from lhdmap.logs.scan_repair import AS_IT_IS
 from lhdmap.logs.stamp_health import StampWatch
+from lhdmap.logs.survey import Survey, take_survey
 from lhdmap.logs.topics import SCAN, is_ground_truth, missing_scanner, roles_and_doubt
 from lhdmap.logs.value_health import ValueWatch
 from lhdmap.messages import LaserScan, Message, Record
 
+# Words of readers' remarks on what was guessed or left out.
+_GUESSED = (
+    "times of its points",
+    "field of view is a guess",
+    "not used; it is read as",
+    "not named in metadata.yaml",
+    "another clock",
+)
 _KEY_SCAN_STEP_M, _KEY_SCAN_PERIOD_S = 0.5, 0.3
 # Wraps the records while they are read, for a progress display: reader and records in, records out.
 Progress = Callable[[LogReader, Iterator[Record]], Iterator[Record]]
@@ -74,40 +84,81 @@ def examine(path: Path, overrides: Mapping[str, str] | None = None, progress: Pr
 
 def _examined(reader: LogReader, overrides: Mapping[str, str], progress: Progress) -> Examination:
     roles, findings = _roles(reader, overrides)
+    survey = take_survey([reader], roles)
     watches = _Watches()
     for record in progress(reader, reader.records()):
-        watches.update(record.topic, record.message)
+        message = survey.repaired(record.topic, record.message)
+        if message is not None:
+            watches.update(record.topic, message)
+    findings += survey.findings
     findings += [
         Finding(Severity.PROBLEM, "", f"damaged: {line}", "all whole messages are used") for line in reader.damage
     ]
-    findings += _topic_findings(reader, watches)
+    findings += _topic_findings(reader, watches, survey)
     findings += _missing(reader, roles, watches)
+    findings += _mounts(survey, roles, watches)
     findings += _key_scans(roles, watches)
-    findings += [Finding(Severity.NOTE, "", line) for line in reader.remarks if "stamp" not in line]
-    findings = _scanner_verdicts(findings, roles)
-    return Examination(reader.path, _verdict(findings), findings, take_inventory(reader, roles))
+    findings += _clocks(reader)
+    findings += [_of_remark(line) for line in reader.remarks if not _told_elsewhere(line)]
+    used = {role: topic for role, topic in roles.items() if role not in survey.left_out}
+    return Examination(reader.path, _verdict(findings), findings, take_inventory(reader, used))
 
 
 def _roles(reader: LogReader, overrides: Mapping[str, str]) -> tuple[dict[str, str], list[Finding]]:
+    """Return the roles of the topics, and the doubt about the front scanner, which no command can do without."""
     roles, doubt = roles_and_doubt(reader.topics(), overrides)
     if doubt and overrides:
         raise InputError(doubt)
-    return roles, [Finding(Severity.PROBLEM, "", doubt, "give that option to the other commands too")] if doubt else []
+    return roles, [
+        Finding(Severity.FATAL, "", doubt, "give that option to this and the other commands")
+    ] if doubt else []
 
 
-def _topic_findings(reader: LogReader, watches: _Watches) -> list[Finding]:
+def _topic_findings(reader: LogReader, watches: _Watches, survey: Survey) -> list[Finding]:
     found = []
     for topic, watch in watches.stamps.items():
         if is_ground_truth(topic):
             continue
         found += watch.findings(reader.stamps[topic], reader.start_ns or 0)
-        found += watches.scans[topic].findings(watch.period_s, _stated_end(reader, topic))
+        stated = None if survey.repairs.get(topic, AS_IT_IS).degrees else _stated_end(reader, topic)
+        found += watches.scans[topic].findings(watch.period_s, stated)
         found += watches.values[topic].findings()
     return found
 
 
 def _stated_end(reader: LogReader, topic: str) -> float | None:
     return reader.stated_end_rad(topic) if reader.topics()[topic].type_name == SCAN else None
+
+
+def _clocks(reader: LogReader) -> list[Finding]:
+    """Return where the clock was set, and topics with a clock of their own."""
+    start_ns = min((seen.first_ns for seen in reader.stamps.values() if seen.count), default=0)
+    advice = "the order of the file is kept, and time runs on as if the clock had not been set"
+    return [Finding(Severity.REMARK, "", step.text(start_ns), advice) for step in reader.clock_steps]
+
+
+def _of_remark(line: str) -> Finding:
+    """Return a reader's remark as a finding; how a format is read is a note, what was guessed or left out is more."""
+    return Finding(Severity.REMARK if any(word in line for word in _GUESSED) else Severity.NOTE, "", line)
+
+
+def _told_elsewhere(remark: str) -> bool:
+    """Return whether a remark of the reader is of stamps and clocks, which have findings of their own."""
+    return ("stamp" in remark and "another clock" not in remark) or remark.startswith("the clock was set")
+
+
+def _mounts(survey: Survey, roles: Mapping[str, str], watches: _Watches) -> list[Finding]:
+    """Return which sensors have no mount, and what was odd in the transforms."""
+    found = []
+    frames = {topic: watch.frame_id for topic, watch in watches.scans.items() if watch.frame_id}
+    frames |= {topic: watch.frame_id for topic, watch in watches.values.items() if watch.frame_id}
+    mounted = {roles[role] for role in ("front", "rear", "points", "inclinometer") if role in roles}
+    for topic, frame in frames.items():
+        is_scanner = topic in watches.scans and bool(watches.scans[topic].frame_id)
+        if survey.frames.mount(frame) is None and (is_scanner or topic in mounted):
+            advice = "the machine file's is used, else a level sensor at base_link"
+            found.append(Finding(Severity.REMARK, topic, f"no mount of its frame '{frame}' in the log", advice))
+    return found + [Finding(Severity.REMARK, "", line) for line in survey.frames.remarks]
 
 
 def _missing(reader: LogReader, roles: Mapping[str, str], watches: _Watches) -> list[Finding]:
@@ -119,17 +170,11 @@ def _missing(reader: LogReader, roles: Mapping[str, str], watches: _Watches) -> 
         found.append(Finding(Severity.FATAL, "", str(missing_scanner(topics)), "record the scanner's topic"))
     elif scanners == [roles.get("rear")]:
         found.append(
-            Finding(Severity.PROBLEM, "", str(missing_scanner(topics, roles["rear"])), "or record the front one")
+            Finding(Severity.FATAL, "", str(missing_scanner(topics, roles["rear"])), "or record the front one")
         )
     elif not any(name in watches.stamps for name in scanners):
         text = "no scan in the log: its scanner topics hold no whole message"
         found.append(Finding(Severity.FATAL, "", text, "record it again"))
-    frames = {frame for watch in watches.values.values() for frame in watch.mounted_frames}
-    for name, watch in watches.scans.items():
-        if watch.frame_id and watch.frame_id not in frames:
-            text = f"no mount of its frame '{watch.frame_id}' in the log"
-            advice = "the machine file's is used, else a level scanner at base_link"
-            found.append(Finding(Severity.REMARK, name, text, advice))
     if "inclinometer" not in roles:
         found.append(Finding(Severity.NOTE, "", "no inclinometer: the drive is treated as level"))
     if "wheel_odometry" not in roles and "tachometer" not in roles:
@@ -154,17 +199,6 @@ def _key_scans(roles: Mapping[str, str], watches: _Watches) -> list[Finding]:
         return []
     text = f"key scans only: {path_m / count:.2f} m between scans"
     return [Finding(Severity.PROBLEM, front, text, "too far for odometry: build the map with given poses")]
-
-
-def _scanner_verdicts(findings: list[Finding], roles: Mapping[str, str]) -> list[Finding]:
-    """Lower what is fatal for a scanner that the log can do without."""
-    needed = {"", roles.get("front", roles.get("points", ""))}
-    return [
-        finding._replace(severity=Severity.PROBLEM)
-        if finding.severity is Severity.FATAL and finding.topic not in needed
-        else finding
-        for finding in findings
-    ]
 
 
 def _verdict(findings: list[Finding]) -> Verdict:

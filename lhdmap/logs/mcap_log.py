@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import zlib
+from collections.abc import Collection, Iterator
 from pathlib import Path
 from typing import BinaryIO
 
 from lhdmap.errors import InputError
 from lhdmap.logs import mcap_records as rec
 from lhdmap.logs.blocks import Entry
+from lhdmap.logs.compression import inflated
 from lhdmap.logs.container import BlockFile, Contents
 from lhdmap.logs.findings import Findings
 from lhdmap.logs.mcap_scan import Scan
@@ -23,6 +25,7 @@ class McapFile(BlockFile):
     format = "mcap"
 
     def __init__(self, path: Path, damage: Findings) -> None:
+        super().__init__()
         self._damage = damage
         self._file: BinaryIO = path.open("rb", buffering=1 << 16)
         self._size = path.stat().st_size
@@ -37,6 +40,11 @@ class McapFile(BlockFile):
         scan.run()
         self._blocks = scan.blocks
         self._contents = self._summary()
+
+    def messages(self, wanted: Collection[int]) -> Iterator[tuple[int, int, bytes]]:
+        """Yield log time, channel id and bytes in log-time order; messages compressed one by one are unpacked."""
+        for time_ns, channel, data in super().messages(wanted):
+            yield time_ns, channel, inflated(data)
 
     def _entries(self, data: bytes) -> tuple[list[Entry], str | None]:
         return rec.messages(data, self._tables)

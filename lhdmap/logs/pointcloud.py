@@ -1,4 +1,4 @@
-"""`sensor_msgs/PointCloud2` to a `PointCloud`: any order of fields, time fields of the usual drivers."""
+"""`sensor_msgs/PointCloud2` to a `PointCloud`: any order of fields, time fields of the usual drivers (`cloud_times`)."""
 
 from __future__ import annotations
 
@@ -8,13 +8,13 @@ import numpy as np
 import numpy.typing as npt
 
 from lhdmap.errors import InputError
+from lhdmap.logs.cloud_times import CloudTimes
 from lhdmap.logs.cursor import UINT8, Cursor, Layout
 from lhdmap.messages import Message, PointCloud
 
 _FIELD = Layout("IB", 4)
 _KINDS = {1: "i1", 2: "u1", 3: "i2", 4: "u2", 5: "i4", 6: "u4", 7: "f4", 8: "f8"}
 _TIME_FIELDS = ("t", "time", "time_offset", "offset_time", "timestamp", "time_stamp", "timeStamp", "ts")
-_MAX_SWEEP_S = 10.0
 
 
 class _Shape(NamedTuple):
@@ -24,8 +24,10 @@ class _Shape(NamedTuple):
     row_step: int
 
 
-def point_cloud(cursor: Cursor) -> tuple[Message, ...]:
-    """Decode a cloud; points that are not finite are dropped together with their times.
+def point_cloud(cursor: Cursor, times: CloudTimes | None = None) -> tuple[Message, ...]:
+    """Decode a cloud; points that are not finite, or at the scanner itself, are no returns and dropped with their times.
+
+    `times` knows the times of the clouds before, and notes what is odd.
 
     Raises:
         InputError: no x, y, z, or sizes that do not fit the data.
@@ -37,9 +39,10 @@ def point_cloud(cursor: Cursor) -> tuple[Message, ...]:
     shape = _Shape(height, width, cursor.uint32(), cursor.uint32())
     table = _table(cursor.view(), shape, fields, ">" if big else "<")
     points = np.stack([table[name].astype(np.float32) for name in "xyz"], axis=1)
-    finite = np.asarray(np.isfinite(points).all(axis=1))
-    times = _times(table, stamp)
-    return (PointCloud(stamp, frame, points[finite], times[finite] if len(times) else times),)
+    returned = np.asarray(np.isfinite(points).all(axis=1) & points.any(axis=1))
+    field = _time_field(table)
+    raw = np.empty(0) if field is None else table[field][returned]
+    return (PointCloud(stamp, frame, points[returned], (times or CloudTimes()).seconds(raw, stamp, frame)),)
 
 
 def _fields(cursor: Cursor) -> dict[str, tuple[int, int]]:
@@ -81,27 +84,3 @@ def _table(data: memoryview, shape: _Shape, fields: dict[str, tuple[int, int]], 
 
 def _time_field(table: npt.NDArray[Any]) -> str | None:
     return next((name for name in _TIME_FIELDS if name in (table.dtype.names or ())), None)
-
-
-def _times(table: npt.NDArray[Any], stamp_ns: int) -> npt.NDArray[np.float32]:
-    """Return seconds after the stamp, shape (N,) or (0,).
-
-    Integers are nanoseconds, floats seconds (nanoseconds where they are that large); both may be absolute times.
-    """
-    name = _time_field(table)
-    if name is None or not len(table):
-        return np.empty(0, np.float32)
-    raw = table[name]
-    times = raw.astype(np.float64) / 1e9 if raw.dtype.kind in "iu" else raw.astype(np.float64)
-    if np.nanmax(np.abs(times), initial=0.0) > _MAX_SWEEP_S:  # absolute times, or a unit that is not known
-        times = _relative(raw, stamp_ns)
-    good = np.isfinite(times) & (np.abs(times) <= _MAX_SWEEP_S)
-    return np.where(good, times, 0.0).astype(np.float32)
-
-
-def _relative(raw: npt.NDArray[Any], stamp_ns: int) -> npt.NDArray[np.float64]:
-    if raw.dtype.kind in "iu":
-        return (raw.astype(np.int64) - stamp_ns) / 1e9
-    seconds = raw.astype(np.float64)
-    in_nanoseconds = float(np.nanmedian(seconds)) > 1e12
-    return (seconds - stamp_ns) / 1e9 if in_nanoseconds else seconds - stamp_ns / 1e9

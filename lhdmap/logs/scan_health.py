@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections import Counter
+from collections.abc import Sequence
 
 import numpy as np
 import numpy.typing as npt
@@ -50,7 +51,10 @@ class ScanWatch:
         self._count += 1
 
     def findings(self, period_s: float | None, stated_end_rad: float | None) -> list[Finding]:
-        """Return what is to be said; `period_s`: the usual time between scans; the stated angle of the last beam."""
+        """Return what is to be said beside what the survey says.
+
+        `period_s`: the usual time between scans; the stated angle of the last beam.
+        """
         first = self._first
         if first is None:
             return []
@@ -59,7 +63,7 @@ class ScanWatch:
             *self._frozen(),
             *self._geometry(),
             *_stated_end(self.topic, first, stated_end_rad),
-            *_limits(self.topic, first),
+            *_unusual_limits(self.topic, first),
             *_timing(self.topic, first, period_s),
             *self._own_body(),
         ]
@@ -85,12 +89,7 @@ class ScanWatch:
     def _validity(self) -> list[Finding]:
         share = self._valid / max(self._beams, 1)
         found = []
-        if share < _DEAD_SHARE:
-            text = f"dead: only {100 * share:.1f} % of the beams have a valid range"
-            found.append(
-                Finding(Severity.FATAL, self.topic, text, "check the scanner, its window and its range limits")
-            )
-        elif share < _WEAK_SHARE:
+        if _DEAD_SHARE <= share < _WEAK_SHARE:
             text = f"only {100 * share:.0f} % of the beams have a valid range"
             found.append(Finding(Severity.PROBLEM, self.topic, text, "check the scanner's window and its range limits"))
         if 0 < self._dead < self._count:
@@ -150,6 +149,16 @@ class ScanWatch:
         return [Finding(Severity.REMARK, self.topic, text, advice)]
 
 
+def fatal_findings(topic: str, scans: Sequence[LaserScan]) -> list[Finding]:
+    """Return what makes a scanner useless, of a sample of its scans."""
+    beams = sum(len(scan.ranges_m) for scan in scans)
+    share = sum(int(np.count_nonzero(_valid(scan.ranges_m, scan))) for scan in scans) / max(beams, 1)
+    if share >= _DEAD_SHARE:
+        return []
+    text = f"dead: only {100 * share:.1f} % of the beams have a valid range"
+    return [Finding(Severity.FATAL, topic, text, "check the scanner, its window and its range limits")]
+
+
 def _valid(ranges: npt.NDArray[np.float32], scan: LaserScan) -> npt.NDArray[np.bool_]:
     """Return which ranges are hits: within the limits, and not the zero that some drivers give for no return."""
     return np.isfinite(ranges) & (ranges > 0.0) & (ranges >= scan.range_min_m) & (ranges <= scan.range_max_m)
@@ -158,10 +167,7 @@ def _valid(ranges: npt.NDArray[np.float32], scan: LaserScan) -> npt.NDArray[np.b
 def _stated_end(topic: str, scan: LaserScan, stated_rad: float | None) -> list[Finding]:
     """Compare the stated angle of the last beam with start, increment and number of beams."""
     size, increment = len(scan.ranges_m), scan.angle_increment_rad
-    if size > 1 and increment == 0.0:
-        text, advice = "the angle increment is zero", "the scanner's driver is misconfigured: all beams coincide"
-        return [Finding(Severity.FATAL, topic, text, advice)]
-    if stated_rad is None or size < 2 or not math.isfinite(stated_rad):
+    if stated_rad is None or size < 2 or increment == 0.0 or not math.isfinite(stated_rad):
         return []
     last_rad = scan.angle_min_rad + (size - 1) * increment
     off = (stated_rad - last_rad) / increment
@@ -177,15 +183,9 @@ def _stated_end(topic: str, scan: LaserScan, stated_rad: float | None) -> list[F
     return [Finding(severity, topic, text, "start and increment are used, the stated end is not")]
 
 
-def _limits(topic: str, scan: LaserScan) -> list[Finding]:
+def _unusual_limits(topic: str, scan: LaserScan) -> list[Finding]:
     low, high = scan.range_min_m, scan.range_max_m
-    if math.isnan(low) or math.isnan(high) or high <= max(low, 0.0):
-        text, advice = (
-            f"the range limits are impossible ({low:g} to {high:g} m)",
-            "no beam is valid: set the driver's limits",
-        )
-        return [Finding(Severity.FATAL, topic, text, advice)]
-    if low < 0 or high > _MAX_RANGE_M:
+    if low < 0 or _MAX_RANGE_M < high < math.inf:
         return [Finding(Severity.REMARK, topic, f"the range limits are unusual ({low:g} to {high:g} m)")]
     return []
 

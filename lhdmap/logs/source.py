@@ -5,34 +5,50 @@ from __future__ import annotations
 import heapq
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import ExitStack
-from dataclasses import replace
 from operator import itemgetter
 from pathlib import Path
 from types import TracebackType
 from typing import Self
 
+import numpy as np
+import numpy.typing as npt
+
 from lhdmap.errors import InputError
 from lhdmap.logs.base import LogReader, TopicInfo
+from lhdmap.logs.finding import Severity
 from lhdmap.logs.formats import open_log
 from lhdmap.logs.inventory import Inventory, take_inventory
+from lhdmap.logs.kinds import of_one_type
+from lhdmap.logs.survey import Survey, take_survey, transform_topics
 from lhdmap.logs.topics import assign_topics, missing_scanner
 from lhdmap.messages import Message
+
+_MOUNTS = "tf_static"
 
 
 class LogSource:
     """A log of one or more files; a context manager. `overrides` names topics by role (`{"front": "/scan"}`).
 
     After entering, `roles` says which topic plays which role (of all files together), `start_ns` and `end_ns` which log
-    times are covered. `warnings` and `damage` fill while reading.
+    times are covered, `survey` what was found in a quick look: sensors that say nothing have lost their roles.
+    `warnings` and `damage` fill while reading. `force`: a log that the survey calls unusable is used nevertheless.
     """
 
-    def __init__(self, paths: Sequence[Path | str] | Path | str, overrides: Mapping[str, str] | None = None) -> None:
+    def __init__(
+        self,
+        paths: Sequence[Path | str] | Path | str,
+        overrides: Mapping[str, str] | None = None,
+        *,
+        force: bool = False,
+    ) -> None:
         listed = [paths] if isinstance(paths, (str, Path)) else list(paths)
         if not listed:
             raise InputError("no log was given")
         self.paths = [Path(path) for path in listed]
         self.roles: dict[str, str] = {}
         self._overrides = dict(overrides or {})
+        self._force = force
+        self.survey = Survey()
         self._readers: list[LogReader] = []
         self._stack = ExitStack()
 
@@ -45,6 +61,7 @@ class LogSource:
                 raise InputError(f"{self._names()}: {missing_scanner(self.topics(), self.roles.get('rear'))}")
             for reader in self._readers:
                 reader.truth_topics = frozenset({self.roles.get("ground_truth", "")})
+            self._look_through()
             self._stack = stack.pop_all()
         return self
 
@@ -60,6 +77,19 @@ class LogSource:
         except InputError as error:
             raise InputError(f"{self._names()}: {error}") from error
 
+    def _look_through(self) -> None:
+        """Take the survey and act on it."""
+        self.survey = survey = take_survey(self._readers, self.roles)
+        if survey.fatal and not self._force:
+            first = survey.fatal[0]
+            where = f"{first.topic}: " if first.topic else ""
+            raise InputError(
+                f"{self._names()}: {where}{first.text}; {first.advice} (--force goes on nevertheless; lhdmap doctor tells more)"
+            )
+        self.roles = {role: topic for role, topic in self.roles.items() if role not in survey.left_out}
+        if survey.frames.transforms():
+            self.roles.setdefault(_MOUNTS, next(iter(transform_topics(self._readers))))
+
     @property
     def damage(self) -> list[str]:
         """What was cut off, broken or skipped so far, with the file it concerns."""
@@ -68,7 +98,12 @@ class LogSource:
     @property
     def warnings(self) -> list[str]:
         """What was odd so far, with the file it concerns."""
-        return [f"{reader.path}: {line}" for reader in self._readers for line in reader.remarks]
+        told = (Severity.PROBLEM, Severity.FATAL)
+        found = [finding for finding in self.survey.findings if finding.severity in told]
+        lines = [f"{self.paths[0]}: {finding.topic}: {finding.text}; {finding.advice}" for finding in found]
+        lines += [f"{self.paths[0]}: {line}" for line in self.survey.frames.remarks]
+        lines += [f"{reader.path}: {line}" for reader in self._readers for line in reader.remarks]
+        return lines + (self._typed()[1] if len(self._readers) > 1 else [])
 
     @property
     def start_ns(self) -> int | None:
@@ -87,23 +122,60 @@ class LogSource:
         return 0.0 if start is None or end is None else (end - start) / 1e9
 
     def topics(self) -> dict[str, TopicInfo]:
-        """Return the topics of all files together, counts added up."""
-        found: dict[str, TopicInfo] = {}
-        for reader in self._readers:
-            for name, info in reader.topics().items():
-                before = found.get(name)
-                if before is not None and before.type_name != info.type_name:
-                    raise InputError(f"{reader.path}: {name} is {info.type_name}, in another file {before.type_name}")
-                found[name] = info if before is None else replace(info, count=_sum(before.count, info.count))
-        return found
+        """Return the topics of all files together, counts added up; of several types of a topic one is chosen."""
+        return self._typed()[0]
+
+    def _typed(self) -> tuple[dict[str, TopicInfo], list[str]]:
+        return of_one_type(info for reader in self._readers for info in reader.topics().values())
 
     def messages(self, roles: Collection[str] | None = None) -> Iterator[tuple[str, Message]]:
-        """Yield (role, message) of the wanted roles (all that the log fills by default) in log-time order."""
+        """Yield (role, message) of the wanted roles (all that the log fills by default) in log-time order.
+
+        Transforms come first, whenever they were sent: they hold for the whole log.
+        """
         wanted = {topic: role for role, topic in self.roles.items() if roles is None or role in roles}
-        streams = [reader.records(set(wanted)) for reader in self._readers]
+        mounts = self.survey.frames.transforms() if _MOUNTS in wanted.values() else []
+        measured = self._measured({topic: role for topic, role in wanted.items() if role != _MOUNTS})
+        first = next(measured, None)
+        start_ns = (self.start_ns or 0) if first is None else first[1].stamp_ns
+        yield from ((_MOUNTS, mount._replace(stamp_ns=start_ns)) for mount in mounts)
+        if first is not None:
+            yield first
+            yield from measured
+
+    def _measured(self, wanted: Mapping[str, str]) -> Iterator[tuple[str, Message]]:
+        """Yield role and message of the wanted topics, scans as they were meant."""
+        kinds = {topic: info.type_name for topic, info in self.topics().items()}
+        streams = [
+            reader.records(
+                {name for name, info in reader.topics().items() if name in wanted and info.type_name == kinds[name]}
+            )
+            for reader in self._readers
+        ]
         merged = streams[0] if len(streams) == 1 else heapq.merge(*streams, key=itemgetter(1))
-        for topic, _, message in merged:
-            yield wanted[topic], message
+        for topic, _, raw in merged:
+            message = self.survey.repaired(topic, raw)
+            if message is not None:
+                yield wanted[topic], message
+
+    def first(self, role: str) -> Message | None:
+        """Return the first message of a role, None where there is none; what is counted of the messages stays as it is."""
+        topic = self.roles.get(role)
+        if topic is None:
+            return None
+        found = (record.message for reader in self._readers for record in reader.sample({topic: 1}))
+        return next(found, None)
+
+    def recorded_ns(self, role: str, stamps_ns: npt.NDArray[np.int64]) -> npt.NDArray[np.int64]:
+        """Return stamps (N,) of a role's messages as they stand in the log.
+
+        Where its clock was set, messages carry one that runs on.
+        """
+        topic = self.roles[role]
+        for reader in self._readers:
+            if topic in reader.stamps:
+                stamps_ns = reader.recorded_ns(topic, stamps_ns)
+        return stamps_ns
 
     def inventory(self) -> list[Inventory]:
         """Return what is in each file; rates and gaps are there once the messages have been read."""
@@ -111,7 +183,3 @@ class LogSource:
 
     def _names(self) -> str:
         return ", ".join(str(path) for path in self.paths)
-
-
-def _sum(first: int | None, second: int | None) -> int | None:
-    return None if first is None or second is None else first + second

@@ -2,21 +2,24 @@
 
 from __future__ import annotations
 
+import os
 import sqlite3
 from collections.abc import Collection, Iterator
 from pathlib import Path
 from urllib.parse import quote
 
+import numpy as np
+
 from lhdmap.errors import InputError
 from lhdmap.logs.base import Channel
 from lhdmap.logs.blocks import MAX_TIME_NS
-from lhdmap.logs.compression import decompress
+from lhdmap.logs.compression import inflated
 from lhdmap.logs.container import Contents
 from lhdmap.logs.findings import Findings
+from lhdmap.logs.order import clock_was_set_back
 from lhdmap.logs.sqlite_salvage import Salvage
 
 MAGIC = b"SQLite format 3\0"
-_ZSTD_MAGIC = b"\x28\xb5\x2f\xfd"
 _MAX_MESSAGE_BYTES = 256 << 20
 # What the sqlite3 module raises for a damaged file (names in the schema that are no text among it).
 _DAMAGED = (sqlite3.Error, UnicodeDecodeError, OverflowError)
@@ -24,6 +27,8 @@ _PAGE_SIZE, _PAGE_COUNT, _CHANGE_COUNTER, _VALID_FOR = slice(16, 18), slice(28, 
 _TOPICS = "SELECT id, name, type, serialization_format FROM topics"
 _COUNTS = "SELECT topic_id, COUNT(*), MIN(timestamp), MAX(timestamp) FROM messages GROUP BY topic_id"
 _MESSAGES = "SELECT id, topic_id, timestamp, data FROM messages ORDER BY timestamp, id"
+_AS_WRITTEN = "SELECT id, topic_id, timestamp, data FROM messages ORDER BY id"
+_TIMES = "SELECT timestamp, topic_id FROM messages ORDER BY id"
 
 
 class SqliteFile:
@@ -32,7 +37,7 @@ class SqliteFile:
     format = "ROS 2 bag (sqlite3)"
 
     def __init__(self, path: Path, damage: Findings) -> None:
-        self._path, self._damage = path, damage
+        self._path, self._damage, self.remarks = path, damage, Findings()
         with path.open("rb") as file:
             header = file.read(100)
         if not header.startswith(MAGIC):
@@ -40,6 +45,7 @@ class SqliteFile:
         self._database: sqlite3.Connection | None = None
         self._salvage: Salvage | None = None
         self._contents: Contents | None = None
+        self._set_back: bool | None = None
         if _is_cut(header, path.stat().st_size):
             damage.add(f"cut off at byte {path.stat().st_size}: the end of the database is missing")
             self._start_salvage()
@@ -59,22 +65,31 @@ class SqliteFile:
         return self._contents
 
     def messages(self, wanted: Collection[int]) -> Iterator[tuple[int, int, bytes]]:
-        """Yield log time, topic id and bytes in log-time order."""
+        """Yield log time, topic id and bytes in log-time order; in the order of writing where the clock was set back."""
         self.contents()
         keep = frozenset(wanted)
         last = (-1, -1)
         if self._database is not None and self._salvage is None:
             try:
-                for rowid, topic, time_ns, data in self._database.execute(_MESSAGES):
+                for rowid, topic, time_ns, data in self._database.execute(self._query()):
                     last = (time_ns, rowid)
                     if topic in keep and _valid(time_ns, data):
-                        yield time_ns, topic, self._inflated(data)
+                        yield time_ns, topic, inflated(data)
             except _DAMAGED as error:
                 self._damage.add(f"the database is damaged ({error}): its pages are searched for messages")
             else:
                 return
         for time_ns, topic, data in self._need_salvage().messages(keep, after=last):
-            yield time_ns, topic, self._inflated(data)
+            yield time_ns, topic, inflated(data)
+
+    def _query(self) -> str:
+        """Return how to ask for the messages."""
+        assert self._database is not None  # noqa: S101  # asked for where there is one
+        if self._set_back is None:
+            rows = [row for row in self._database.execute(_TIMES) if all(isinstance(value, int) for value in row)]
+            times, topics = np.array(rows, dtype=np.int64).reshape(-1, 2).T
+            self._set_back = clock_was_set_back(times, topics)
+        return _AS_WRITTEN if self._set_back else _MESSAGES
 
     def close(self) -> None:
         """Close the file."""
@@ -82,11 +97,6 @@ class SqliteFile:
             self._database.close()
         if self._salvage is not None:
             self._salvage.close()
-
-    def _inflated(self, data: bytes) -> bytes:
-        if not data.startswith(_ZSTD_MAGIC):
-            return data
-        return decompress(data, "zstd", _MAX_MESSAGE_BYTES + 1)[0]
 
     def _start_salvage(self) -> None:
         self._salvage = Salvage(self._path)
@@ -103,7 +113,9 @@ def _connect(path: Path) -> sqlite3.Connection:
     log = path.with_name(path.name + "-wal")
     immutable = "" if log.exists() and log.stat().st_size else "&immutable=1"
     try:
-        database = sqlite3.connect(f"file:{quote(str(path))}?mode=ro{immutable}", uri=True, check_same_thread=False)
+        database = sqlite3.connect(
+            f"file:{quote(os.fsencode(path))}?mode=ro{immutable}", uri=True, check_same_thread=False
+        )
     except sqlite3.Error as error:
         raise InputError(f"{path}: the database cannot be opened ({error})") from error
     database.text_factory = lambda raw: raw.decode("utf-8", "replace")

@@ -10,6 +10,7 @@ from lhdmap.logs.finding import Finding, Severity
 from lhdmap.logs.stamps import TopicStamps
 
 _SAMPLES = 4096
+_LEFT_OUT, _LEFT_OUT_SHARE = 3, 0.02  # of the longest steps: pauses, and clocks that were set
 _LONGEST = 50
 _GAP_PERIODS, _GAP_LEAST_S = 4.0, 0.3
 _OFFSET_S, _OFFSET_SPREAD_S = 1.0, 0.5
@@ -50,11 +51,16 @@ class StampWatch:
         """Return what is to be said; `start_ns`: where the log begins."""
         return [*self._gaps(start_ns), *self._order(seen), *self._offset(seen)]
 
+    def _mean_s(self) -> float:
+        """Return the mean time between messages without the longest ones."""
+        kept = len(self._steps) - max(_LEFT_OUT, int(_LEFT_OUT_SHARE * len(self._steps)))
+        return float(np.mean(np.sort(self._steps)[:kept])) / 1e9 if kept > 0 else 0.0
+
     def _gaps(self, start_ns: int) -> list[Finding]:
         period_s = self.period_s
         if not period_s or period_s <= 0:
             return []
-        usual_s = max(period_s, float(np.mean(self._steps)) / 1e9)  # the mean counts where messages come in bursts
+        usual_s = max(period_s, self._mean_s())  # the mean counts where messages come in bursts
         limit_ns = max(_GAP_PERIODS * usual_s, _GAP_LEAST_S) * 1e9
         gaps = [(step, at) for step, at in self._longest if step > limit_ns]
         if not gaps:

@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Collection, Iterator
+from collections.abc import Callable, Collection, Iterator, Mapping
 from pathlib import Path
 from types import TracebackType
 from typing import NamedTuple, Self
 
-from lhdmap.logs.base import TopicInfo, span_s
+import numpy as np
+import numpy.typing as npt
+
+from lhdmap.logs.base import RUN, TopicInfo, run_stride, span_s
+from lhdmap.logs.clock import ClockStep
 from lhdmap.logs.findings import Findings
 from lhdmap.logs.stamps import StampKeeper, TopicStamps
 from lhdmap.logs.text_lines import text_lines
@@ -22,6 +26,14 @@ class Found(NamedTuple):
     log_time_ns: int
     message: Message
     stamped: bool
+
+
+Wanted = Callable[[str], bool]
+
+
+def every(_: str) -> bool:
+    """Want each message."""
+    return True
 
 
 class TextLog(ABC):
@@ -65,6 +77,15 @@ class TextLog(ABC):
         return self._keeper.topics
 
     @property
+    def clock_steps(self) -> list[ClockStep]:
+        """Where the clock was set: not looked for, since old loggers let stamps and log times run backwards all the time."""
+        return []
+
+    def recorded_ns(self, topic: str, stamps_ns: npt.NDArray[np.int64]) -> npt.NDArray[np.int64]:  # noqa: ARG002
+        """Return stamps (N,) of a topic as they stand in the log."""
+        return stamps_ns
+
+    @property
     def start_ns(self) -> int | None:
         """Log time of the first message."""
         return self._start_ns
@@ -87,6 +108,20 @@ class TextLog(ABC):
         """Return the angle that the log states for the last beam, None where it does not."""
         return None
 
+    def sample(self, most: Mapping[str, int]) -> Iterator[Record]:
+        """Yield about `most` messages of each topic, in short runs spread over the log; their stamps as they were recorded."""
+        strides = {
+            name: run_stride(info.count or 0, most[name]) for name, info in self.topics().items() if name in most
+        }
+        met = dict.fromkeys(strides, 0)
+
+        def wanted(topic: str) -> bool:
+            met[topic] += 1
+            return (met[topic] - 1) % strides[topic] < RUN
+
+        for topic, log_ns, message, _ in self._messages(strides.keys(), wanted):
+            yield Record(topic, log_ns, message)
+
     def records(self, topics: Collection[str] | None = None) -> Iterator[Record]:
         """Yield the messages of `topics` (all by default) in the order of the file."""
         self._keeper = keeper = StampKeeper()
@@ -98,7 +133,8 @@ class TextLog(ABC):
     def _survey(self) -> None: ...
 
     @abstractmethod
-    def _messages(self, topics: Collection[str]) -> Iterator[Found]: ...
+    def _messages(self, topics: Collection[str], wanted: Wanted = every) -> Iterator[Found]:
+        """Yield the messages of `topics`; `wanted(topic)` is asked before one is parsed."""
 
     def _lines(self) -> Iterator[bytes]:
         self._damage = Findings()

@@ -7,9 +7,10 @@ import math
 import numpy as np
 
 from lhdmap.logs.finding import Finding, Severity
-from lhdmap.messages import GroundTruth, Inclination, Joints, Message, Mount, Pressure, Tachometer, WheelPose
+from lhdmap.messages import GroundTruth, Inclination, Joints, Message, PointCloud, Pressure, Tachometer, WheelPose
 
 _MANY = 50
+_FEW = 20
 _MAX_TILT_RAD = math.radians(40.0)
 _GRAVITY_MPS2, _GRAVITY_TOLERANCE_MPS2 = 9.81, 0.5
 _MAX_JUMP_M = 5.0
@@ -18,12 +19,12 @@ _MAX_JUMP_M = 5.0
 class ValueWatch:
     """Gathers least and greatest values of one topic and how often its content was the same as before.
 
-    `path_m`: length of the path of a topic of poses; `mounted_frames`: sensor frames whose mount it gives.
+    `path_m`: length of the path of a topic of poses.
     """
 
     def __init__(self, topic: str) -> None:
         self.topic = topic
-        self.mounted_frames: set[str] = set()
+        self.frame_id = ""
         self._kind: type[Message] | None = None
         self._count = self._repeated = 0
         self._last: tuple[float, ...] = ()
@@ -35,9 +36,8 @@ class ValueWatch:
 
     def update(self, message: Message) -> None:
         """Take in one message."""
-        if isinstance(message, Mount):
-            self.mounted_frames.add(message.child_frame)
-            return
+        if isinstance(message, (Inclination, PointCloud)):
+            self.frame_id = message.frame_id
         values = _values(message)
         if not values:
             return
@@ -53,11 +53,26 @@ class ValueWatch:
         self._extend(np.array(values))
         self._count += 1
 
+    @property
+    def never_changes(self) -> bool:
+        """Whether all of many messages said the same, to the last digit."""
+        return self._count >= _FEW and self._repeated == self._count - 1
+
+    @property
+    def is_zero(self) -> bool:
+        """Whether the last message said zero."""
+        return not any(self._last)
+
+    @property
+    def last_text(self) -> str:
+        """What the last message said."""
+        return ", ".join(f"{value:.4g}" for value in self._last)
+
     def findings(self) -> list[Finding]:
         """Return what is to be said."""
         found = []
-        if self._count >= _MANY and self._repeated == self._count - 1:
-            text = f"its value never changes ({', '.join(f'{value:.4g}' for value in self._last)})"
+        if self._count >= _MANY and self.never_changes:
+            text = f"its value never changes ({self.last_text})"
             found.append(Finding(Severity.REMARK, self.topic, text, "is the sensor connected?"))
         if self._kind is Inclination:
             found += self._tilt()

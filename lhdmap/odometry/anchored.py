@@ -17,6 +17,7 @@ from lhdmap.odometry.settings import AnchorSettings, OdometrySettings, RangeFlow
 from lhdmap.odometry.slant import NO_RISE, slants
 from lhdmap.odometry.steps import BY_DEFINITION, Matched, marginal_information
 from lhdmap.odometry.surface_map import empty_map, insert_all
+from lhdmap.odometry.wheel_model import WheelModel
 
 _RECENT_SCANS = 12
 _YOUNG_SCANS = 4
@@ -44,6 +45,7 @@ class AnchoredMatcher:
     def __init__(
         self,
         motion: Motion,
+        wheels: WheelModel,
         settings: OdometrySettings,
         anchor: AnchorSettings,
         wide: SearchSettings,
@@ -51,7 +53,8 @@ class AnchoredMatcher:
     ) -> None:
         self._flow = range_flow
         self._first: FlowReference | None = None
-        self._motion, self._noise_m, self._anchor, self._wide = motion, settings.range_noise_m, anchor, wide
+        self._motion, self._wheels = motion, wheels
+        self._noise_m, self._anchor, self._wide = settings.range_noise_m, anchor, wide
         self._model = MatchModel(
             settings.range_noise_m,
             anchor.cutoff_sigmas,
@@ -145,7 +148,7 @@ class AnchoredMatcher:
         if self._trusted(result):
             return self._freed(hits, result, prior)
         place = Place(self._map, np.concatenate(self._recent), self._model)
-        found = jump(place, hits, result, prior, self._motion, self._wide, self._owed)
+        found = jump(place, hits, result, prior, self._motion, self._wheels, self._wide, self._owed)
         if found is None:
             return result
         self._doubt, self._jumped = _DOUBT_SCANS, True

@@ -14,12 +14,13 @@ from lhdmap.odometry.motion import Motion
 from lhdmap.odometry.search import search
 from lhdmap.odometry.settings import SearchSettings
 from lhdmap.odometry.surface_map import SurfaceMap
+from lhdmap.odometry.wheel_model import WheelModel
 
 _JUMP_PRIOR = 0.01
-# A jump must bring that much more support, and more where wheels speak against it: the logarithm of the odds (Student's t, for
-# wheels that slip or lag) over the nats that support is worth. Measured: crowds win by chance with more, slip stays with less.
+# A jump must bring that much more support, and more where wheels speak against it: the logarithm of the odds over the nats that
+# support is worth. Measured: crowds win by chance with more, slip stays with less.
 NOTHING_OWED = np.zeros(3)
-_GAIN, _NATS_PER_SUPPORT, _WHEELS_FREEDOM = 0.02, 22.0, 4.0
+_GAIN, _NATS_PER_SUPPORT = 0.02, 22.0
 
 
 class Place(NamedTuple):
@@ -36,6 +37,7 @@ def jump(
     near: Match,
     prior: Prior,
     motion: Motion,
+    wheels: WheelModel,
     s: SearchSettings,
     owed: FloatArray = NOTHING_OWED,
 ) -> Match | None:
@@ -46,7 +48,8 @@ def jump(
         hits: the scan.
         near: the match that was found from the prediction.
         prior: the prediction.
-        motion: tells how far to search, and whether wheels have measured.
+        motion: tells how far to search.
+        wheels: tell how much they speak against a pose.
         s: limits and steps of the search.
         owed: by how much jumps a moment ago left the motion (3,): wheels speak against staying there, and for the way back.
     """
@@ -59,7 +62,7 @@ def jump(
     # A jump contradicts the prior by definition: it must not hold the match back, so it is weakened here.
     for start in starts[(np.abs(starts) < 1e29).all(axis=1)]:
         found = match(place.walls, hits, weakened(prior), start, place.model)
-        dissent = _dissent(found, prior, motion, owed) - _dissent(best, prior, motion, owed)
+        dissent = _dissent(found, prior, wheels, owed) - _dissent(best, prior, wheels, owed)
         if found.support > best.support + _GAIN + dissent / _NATS_PER_SUPPORT:
             best = found
     return None if best is near else best
@@ -77,12 +80,9 @@ def weakened(prior: Prior) -> Prior:
     return Prior(prior.pose, _JUMP_PRIOR * prior.information)
 
 
-def _dissent(result: Match, prior: Prior, motion: Motion, owed: FloatArray) -> float:
-    """Return how much (nats) the wheels speak against a pose: with slip and lag, large errors are likelier than normal."""
-    if not motion.measured:
-        return 0.0
-    error = left_by(result, prior) + owed
-    return 0.5 * _WHEELS_FREEDOM * math.log1p(float(error @ prior.information @ error) / _WHEELS_FREEDOM)
+def _dissent(result: Match, prior: Prior, wheels: WheelModel, owed: FloatArray) -> float:
+    """Return how much (nats) the wheels speak against a pose."""
+    return wheels.dissent_nats(left_by(result, prior) + owed, prior.information)
 
 
 def _reach(motion: Motion, s: SearchSettings) -> FloatArray:

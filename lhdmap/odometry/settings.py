@@ -15,7 +15,7 @@ class OdometrySettings:
         "anchored",
         doc="'anchored': scans against the local wall map; 'range_flow': scan pairs alone (the paper's method).",
         choices=("anchored", "range_flow"),
-        source="issue of the odometry; findings, section 3",
+        source="measured: prototypes",
     )
     range_noise_m: float = setting(
         0.012,
@@ -134,7 +134,7 @@ class AnchorSettings:
         maximum=0.5,
     )
     insert_m: float = setting(
-        0.06, unit="m", doc="Travel between scans that enter the map.", minimum=0.0, source="findings, section 3"
+        0.06, unit="m", doc="Travel between scans that enter the map.", minimum=0.0, source="measured: prototypes"
     )
     insert_deg: float = setting(
         2.0, unit="deg", doc="Turn between scans that enter the map.", minimum=0.0, source="lhdmap"
@@ -144,7 +144,7 @@ class AnchorSettings:
         unit="sigma",
         doc="Distance to the wall beyond which a hit has no weight (redescending).",
         minimum=1.0,
-        source="findings: 2; measured: 3 loses less in rough walls",
+        source="prototypes: 2; measured: 3 loses less in rough walls",
     )
     min_cells: float = setting(
         4.0,
@@ -202,10 +202,10 @@ class SearchSettings:
     """Wide, cheap search for the pose when the prediction fails: starts, jumps, after a blackout."""
 
     reach_m: float = setting(
-        1.0, unit="m", doc="Half width of the search.", minimum=0.1, source="findings: 0.75 m wanted"
+        1.0, unit="m", doc="Half width of the search.", minimum=0.1, source="prototypes: 0.75 m wanted"
     )
     turn_deg: float = setting(
-        70.0, unit="deg", doc="Largest turn searched.", minimum=1.0, source="findings: jumps up to 61 deg"
+        70.0, unit="deg", doc="Largest turn searched.", minimum=1.0, source="prototypes: jumps up to 61 deg"
     )
     cell_m: float = setting(0.1, unit="m", doc="Cell of the likelihood field.", minimum=0.02)
     step_deg: float = setting(2.0, unit="deg", doc="Step of the heading.", minimum=0.1)

@@ -112,12 +112,12 @@ class Approaches:
     def _withdraw(self, now: PileEstimate) -> None:
         """Take the decision back where what it was on is not the end: the drift goes on behind it, or nothing closes it."""
         decided = self._decision
-        if decided is not None and (now.status == "none" or _elsewhere(decided.estimate, now)):
+        if decided is not None and (now.status in (None, "none") or _elsewhere(decided.estimate, now)):
             self._decision = None
 
     def _sure(self, snapshot: Snapshot) -> bool:
         estimate, settings = snapshot.estimate, self._settings
-        if estimate.status == "none":
+        if estimate.status is None or estimate.status == "none":
             return False
         chance = estimate.probabilities[estimate.status]
         if snapshot.distance_m <= settings.deadline_m + settings.update_m + _TOE_STD_M:
@@ -126,7 +126,7 @@ class Approaches:
 
 
 def _rank(report: PileReport) -> int:
-    return _RANK.get(report.last.estimate.status, 0) if report.last is not None else 0
+    return _RANK.get(report.last.estimate.status or "none", 0) if report.last is not None else 0
 
 
 def _same(one: PileReport, other: PileReport) -> bool:

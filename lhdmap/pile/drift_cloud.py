@@ -23,7 +23,7 @@ from lhdmap.pile.slope_status import status_probabilities
 
 VOXEL_M = (0.2, 0.2, 0.1)
 NORMAL_RADIUS_M = 0.75
-_DRIFT_EXTENT_M = 8.0
+_DRIFT_EXTENT_M, _SLENDER, _NETWORK_M = 8.0, 1.5, 16.0
 _WALL_SHARE = 0.25
 _LEAST_DENSE = 0.7
 _STEEP_NZ, _SLOPE_NZ = 0.4, (0.2, 0.97)
@@ -79,11 +79,25 @@ class Slope(NamedTuple):
 
 
 def drift_shell(points_m: FloatArray) -> Shell | None:
-    """Return the shell of points (N, 3), z up, where they are a drift: metres long, a quarter of the surface as steep as walls."""
-    if float(np.ptp(points_m[:, :2], axis=0).max()) < _DRIFT_EXTENT_M:
+    """Return the shell of points (N, 3), z up, where they are a drift: long, a quarter of the surface as steep as walls."""
+    if not _is_long(points_m):
         return None
     shell = _shell(points_m)
     return shell if shell.dense > _LEAST_DENSE and _wall_share(shell) > _WALL_SHARE else None
+
+
+def _is_long(points_m: FloatArray) -> bool:
+    """Return whether points have the extent of a drift; what is as wide as long has to be a network of several."""
+    along = points_m[:, :2] @ _principal(points_m[:, :2])
+    length, width = sorted(np.ptp(along, axis=0).tolist(), reverse=True)
+    return bool(length >= _DRIFT_EXTENT_M and (length >= _SLENDER * width or length >= _NETWORK_M))
+
+
+def _principal(xy: FloatArray) -> FloatArray:
+    """Return the principal axes of points (N, 2) as columns."""
+    offset = xy - xy.mean(axis=0)
+    axes: FloatArray = np.linalg.eigh(offset.T @ offset)[1]
+    return axes
 
 
 def measure_drift(shell: Shell) -> tuple[PileEstimate, dict[str, Any]]:

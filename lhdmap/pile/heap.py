@@ -1,4 +1,4 @@
-"""A pile in a plain cloud (PLY, PCD): no poses, no time; slopes of its faces, volume, and whether it is a pile at all.
+"""A pile in a plain cloud (PLY, PCD, LAS, LAZ): no poses, no time; slopes of its faces, volume, and whether it is a pile at all.
 
 A heap seen from above becomes a height map; a drift (walls on both sides) is searched for what closes it.
 """
@@ -26,6 +26,8 @@ from lhdmap.pile.slope_status import status_probabilities
 FEWEST_POINTS = 200
 _LEAST_RISE = 0.02
 _LIMIT_SHARE = 0.02
+_LYING = ("too_shallow", "loadable")
+_PLACES = ("center_m", "left_limit_m", "right_limit_m", "toe_m", "face_m")
 
 
 class CloudPile(NamedTuple):
@@ -54,7 +56,7 @@ def run_cloud(path: Path, up: str = "auto", floor: Path | None = None) -> CloudP
     """Read a cloud file and measure its pile.
 
     Args:
-        path: PLY or PCD file.
+        path: PLY, PCD, LAS or LAZ file.
         up: which of its axes points up: x, y, z, -x, -y, -z, or auto.
         floor: a cloud of the same place without the pile, in the same frame; volumes are then those above it.
 
@@ -62,8 +64,11 @@ def run_cloud(path: Path, up: str = "auto", floor: Path | None = None) -> CloudP
         InputError: a file cannot be read or holds too few points.
         UsageError: the axis has no such name.
     """
-    points = _points(path)
-    return measure_cloud(points, up, None if floor is None else _points(floor))
+    points_m, origin_m = _points(path)
+    if floor is None:
+        return _placed(measure_cloud(points_m, up), origin_m)
+    floor_m, floor_origin_m = _points(floor)
+    return _placed(measure_cloud(points_m, up, floor_m + (floor_origin_m - origin_m)), origin_m)
 
 
 def measure_cloud(points_m: FloatArray, up: str = "auto", empty_m: FloatArray | None = None) -> CloudPile:
@@ -111,9 +116,19 @@ def measure_heap(points_m: FloatArray, floor: Floor | None = None) -> CloudPile:
         reason = f"flat: nothing of note rises more than {rise:.3g} m above its floor"
         return CloudPile(_without_face(heap, points_m, reason), _extra(heap, points_m, "flat", reason))
     if not heap.faces:
-        reason = "material, but no face: the surface is rough everywhere"
-        return CloudPile(_without_face(heap, points_m, reason), _extra(heap, points_m, "rough", reason))
-    return CloudPile(_estimate(heap, points_m), _extra(heap, points_m, "heap", ""))
+        reason = "material, but no face: the surface is rough everywhere, and no drift is seen around it"
+        volume, volume_std = volume_m3(heap, points_m)
+        unknown = replace(PileEstimate.unknown(reason), volume_m3=volume, volume_std_m3=volume_std)
+        return CloudPile(unknown, _extra(heap, points_m, "rough", reason))
+    estimate = _estimate(heap, points_m)
+    if estimate.status in _LYING:
+        return CloudPile(estimate, _extra(heap, points_m, "heap", ""))
+    reason = (
+        f"the largest face stands at {heap.faces[0].slope_deg:.0f}°, steeper than what lies loose, and no drift is seen around "
+        "it: whether that is a pile, a wall or something else cannot be said"
+    )
+    extra = _extra(heap, points_m, "steep", reason) | {"volume_m3": None, "volume_std_m3": None}
+    return CloudPile(PileEstimate.unknown(reason), extra)
 
 
 def volume_m3(heap: Heap, points_m: FloatArray) -> tuple[float, float]:
@@ -134,11 +149,25 @@ def volume_m3(heap: Heap, points_m: FloatArray) -> tuple[float, float]:
     return volume, math.sqrt((area * share * heap.floor.std_m) ** 2 + (0.5 * hidden) ** 2 + noise**2)
 
 
-def _points(path: Path) -> FloatArray:
-    points = read_cloud(path).points_m.astype(np.float64)
-    if len(points) < FEWEST_POINTS:
-        raise InputError(f"{path}: {len(points)} points; at least {FEWEST_POINTS} were wanted for a pile")
-    return points
+def _points(path: Path) -> tuple[FloatArray, FloatArray]:
+    """Return the points of a file about an origin (3,) near them, and that origin: a national grid's numbers are large."""
+    cloud = read_cloud(path)
+    if len(cloud) < FEWEST_POINTS:
+        raise InputError(f"{path}: {len(cloud)} points; at least {FEWEST_POINTS} were wanted for a pile")
+    return cloud.points_m.astype(np.float64), np.array(cloud.origin_m)
+
+
+def _placed(found: CloudPile, origin_m: FloatArray) -> CloudPile:
+    """Return what was measured about an origin (3,) in the coordinates of the file."""
+    if not origin_m.any():
+        return found
+    pile, extra = found.estimate, dict(found.extra)
+    places = {name: getattr(pile, name) + origin_m for name in _PLACES}
+    rocks = tuple(rock._replace(center_m=rock.center_m + origin_m) for rock in pile.boulders)
+    attack = pile.attack._replace(point_m=pile.attack.point_m + origin_m) if pile.attack else None
+    if "floor_m" in extra:
+        extra["floor_m"] += float((rotation_to_up(extra["up"]) @ origin_m)[2])
+    return CloudPile(replace(pile, boulders=rocks, attack=attack, **places), extra)
 
 
 def _floor_of(points_m: FloatArray) -> Floor:
@@ -272,8 +301,7 @@ def _face_json(face: HeapFace) -> dict[str, float]:
 
 def _turned(estimate: PileEstimate, R: FloatArray) -> PileEstimate:
     """Return the estimate with its points in the cloud's own axes; a heading is one only where z points up."""
-    names = ("center_m", "left_limit_m", "right_limit_m", "toe_m", "face_m")
-    turned = {name: getattr(estimate, name) @ R.T for name in names}
+    turned = {name: getattr(estimate, name) @ R.T for name in _PLACES}
     rocks = tuple(Boulder(R @ rock.center_m, rock.size_m) for rock in estimate.boulders)
     attack = estimate.attack if np.allclose(R[:, 2], (0.0, 0.0, 1.0)) else None
     if attack is not None:

@@ -32,6 +32,7 @@ class AttackPoint(NamedTuple):
 class PileEstimate:
     """One estimate of the pile; lengths in metres in the frame `map`.
 
+    `status`: None where it was not looked for or cannot be said; `reason` says why, and there are no `probabilities` then.
     `probabilities`: of each status, they add up to 1. `inclination_deg` has the sign of Table 6: 0 is floor, -50 a pile, -90 a
     wall, beyond an overhang; `heights_m`: lowest and highest of the heights over the floor at the toe that it was fitted to.
     `left_limit_m`, `right_limit_m` (3,): E_L and E_R at the toe. `toe_m` (K, 3): the toe from left to right. `face_m` (N, 3):
@@ -39,7 +40,7 @@ class PileEstimate:
     NaN.
     """
 
-    status: str = "none"
+    status: str | None = "none"
     probabilities: dict[str, float] = field(default_factory=lambda: {"none": 1.0})
     center_m: FloatArray = field(default_factory=lambda: np.full(3, math.nan))
     left_limit_m: FloatArray = field(default_factory=lambda: np.full(3, math.nan))
@@ -57,6 +58,12 @@ class PileEstimate:
     face_m: FloatArray = field(default_factory=lambda: np.zeros((0, 3)))
     residuals_m: FloatArray = field(default_factory=lambda: np.zeros(0))
     warnings: tuple[str, ...] = ()
+    reason: str = ""
+
+    @classmethod
+    def unknown(cls, reason: str, warnings: tuple[str, ...] = ()) -> PileEstimate:
+        """Return an estimate without status and measures, because `reason`."""
+        return cls(status=None, probabilities={}, reason=reason, warnings=warnings)
 
     @property
     def found(self) -> bool:
@@ -83,6 +90,7 @@ class Approach(NamedTuple):
 class PileReport:
     """Outcome of a drive: the decision (None: not identified), the last estimate, and how it came about.
 
+    `reason`: why no pile was looked for (empty: it was); status and probabilities are then null.
     `around_m` (N, 3): hits around the pile in the map, thinned, for pictures; `warnings`: what is to be said of the log.
     `piles`: all that was decided on the drive, this one too, in the order of time: the decision and the last estimate of each.
     """
@@ -94,18 +102,32 @@ class PileReport:
     around_m: FloatArray = field(default_factory=lambda: np.zeros((0, 3)))
     warnings: tuple[str, ...] = ()
     piles: tuple[Approach, ...] = ()
+    reason: str = ""
+
+    @property
+    def estimate(self) -> PileEstimate:
+        """What is said of the pile: the last estimate, without measures where it is none; unknown where none was looked for."""
+        if self.last is not None:
+            return _of_a_pile(self.last.estimate)
+        return PileEstimate.unknown(self.reason) if self.reason else PileEstimate()
 
     def to_json(self) -> dict[str, Any]:
-        """Return the content of `pile.json`: the last estimate, and when and how far away it was decided."""
-        best = self.last.estimate if self.last is not None else PileEstimate()
-        table = estimate_json(_of_a_pile(best))
-        table["warnings"] = [*self.warnings, *best.warnings]
+        """Return the content of `pile.json`: the last estimate, and when and how far away it was decided.
+
+        A warning is said once, at the top.
+        """
+        best = self.estimate
+        table = estimate_json(best)
+        table["warnings"] = list(dict.fromkeys([*self.warnings, *best.warnings]))
         table["method"] = self.method
         table["identified"] = self.decision is not None
         table["decided_at_ns"] = self.decision.stamp_ns if self.decision else None
         table["distance_at_decision_m"] = _number(self.decision.distance_m) if self.decision else None
         table["decision"] = estimate_json(self.decision.estimate) if self.decision else None
         table["piles"] = [_approach_json(one) for one in self.piles]
+        for part in (table["decision"], *table["piles"]):
+            if part is not None:
+                part["warnings"] = [text for text in part["warnings"] if text not in table["warnings"]]
         return table
 
 
@@ -120,7 +142,7 @@ def _approach_json(pile: Approach) -> dict[str, Any]:
 
 def _of_a_pile(estimate: PileEstimate) -> PileEstimate:
     """Return the estimate, or only status, probabilities and warnings where what was measured does not close the drift."""
-    if estimate.status != "none":
+    if estimate.status != "none":  # an unknown one has no measures
         return estimate
     return PileEstimate(probabilities=estimate.probabilities, warnings=estimate.warnings)
 
@@ -130,7 +152,8 @@ def estimate_json(estimate: PileEstimate) -> dict[str, Any]:
     attack = estimate.attack
     return {
         "status": estimate.status,
-        "probabilities": {name: float(estimate.probabilities.get(name, 0.0)) for name in STATUSES},
+        "reason": estimate.reason or None,
+        "probabilities": _shares(estimate),
         "center_m": _vector(estimate.center_m),
         "left_limit_m": _vector(estimate.left_limit_m),
         "right_limit_m": _vector(estimate.right_limit_m),
@@ -148,6 +171,12 @@ def estimate_json(estimate: PileEstimate) -> dict[str, Any]:
         "attack_heading_rad": None if attack is None else _number(attack.heading_rad),
         "warnings": list(estimate.warnings),
     }
+
+
+def _shares(estimate: PileEstimate) -> dict[str, float] | None:
+    if estimate.status is None:
+        return None
+    return {name: float(estimate.probabilities.get(name, 0.0)) for name in STATUSES}
 
 
 def _number(value: float) -> float | None:

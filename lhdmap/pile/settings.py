@@ -49,5 +49,5 @@ class PileSettings:
         unit="deg",
         minimum=0.001,
         doc="Constant error of pitch and mounting tilt, standard deviation, before the floor has told.",
-        source="inclinometer filtered; findings, section 1",
+        source="inclinometer filtered; prototypes",
     )

@@ -8,30 +8,35 @@ import warnings
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, Literal, TypeVar
 
 from lhdmap.config import Settings, settings_table
 from lhdmap.errors import InputError, LhdmapWarning
 from lhdmap.integration.cloud_io import write_cloud
 from lhdmap.logs.source import LogSource
 from lhdmap.machine import Machine
-from lhdmap.mapfolder import FRAMES, MapFolderWriter, MapInfo
+from lhdmap.mapfolder import FRAMES, Diagnostics, MapFolderWriter, MapInfo
 from lhdmap.messages import Message
 from lhdmap.outputs import free_folder
 from lhdmap.pipeline.beside import Beside, HelperDied, Here
+from lhdmap.pipeline.cost import CompileClock, Spent, cost, peak_memory_mib
 from lhdmap.pipeline.given import GROUND_TRUTH, given_rows
 from lhdmap.pipeline.inspection import Inspection, Inspector, PileBeside
 from lhdmap.pipeline.interruption import Interruption
 from lhdmap.pipeline.mapping import MappingPipeline
 from lhdmap.pipeline.mounts import machine_of
-from lhdmap.pipeline.outcome import ROLES_READ, Inputs, Outcome, cost, odometry_of, ways_of
+from lhdmap.pipeline.outcome import ROLES_READ, Inputs, Outcome, odometry_of, ways_of
+from lhdmap.pipeline.refusal import require_a_map
 from lhdmap.provenance import file_entry, source_entry
+from lhdmap.report.page import fill_in_cost
 from lhdmap.report.recording import Thinning
 from lhdmap.trajectory import Trajectory
 
 _ASKED = "interrupted: what was read so far is being written; Ctrl-C once more ends at once"
 _BESIDE_FROM_S = 60.0  # a process takes most of a second to start
+_Stamped = TypeVar("_Stamped", Trajectory, Diagnostics)
 Progress = Callable[[Iterable[tuple[str, Message]], float], Iterable[tuple[str, Message]]]
 
 
@@ -41,7 +46,8 @@ class BuildRequest:
 
     `poses`: given poses for the cloud and the final trajectory (`given.given_rows`); empty: the odometry's.
     `helper`: whether a second process may look for the pile, record and report; what comes out is the same.
-    `force`: replace a map folder that is there. `recorded_as`: names of logs in `map.json`, where they are moved later.
+    `force`: replace a map folder that is there, and try a log that the survey calls unusable. `recorded_as`: names of logs in
+    `map.json`, where they are moved later.
     """
 
     logs: Sequence[Path]
@@ -58,7 +64,7 @@ class BuildRequest:
     @property
     def inputs(self) -> Inputs:
         """What the map is made of."""
-        return Inputs(self.logs, self.settings, self.topics, self.target.name, bool(self.poses))
+        return Inputs(self.logs, self.settings, self.topics, self.target.name, self.poses, self.force)
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,11 +85,12 @@ def build_map(request: BuildRequest) -> BuildResult:
         InputError: a log cannot be used, or holds no scan.
         KeyboardInterrupt: Ctrl-C was pressed; what was finished is kept in the partial folder.
     """
-    started = time.monotonic()
+    started, compiling = time.monotonic(), CompileClock()
     free_folder(request.target, force=request.force, inputs=request.logs)
     given = given_rows(request.poses, request.logs, request.topics) if request.poses else None
     with (
-        LogSource(list(request.logs), request.topics) as source,
+        compiling,
+        LogSource(list(request.logs), request.topics, force=request.force) as source,
         MapFolderWriter(request.target, force=request.force, inputs=request.logs) as folder,
     ):
         hashes, pool = _hash_in_background(request.logs)
@@ -93,21 +100,36 @@ def build_map(request: BuildRequest) -> BuildResult:
             pipeline = MappingPipeline(
                 request.settings,
                 machine_of(source, request.machine),
-                _sweep_sink(inspector),
+                _sweep_sink(inspector, request.settings.recording.scan_interval_s),
                 primary,
                 pile=PileBeside(inspector),
             )
             _run(pipeline, source, request.progress, interruption)
-            folder.write_odometry(odometry_of(pipeline))  # an interruption of what follows must not lose it
-            folder.write_diagnostics(pipeline.records.diagnostics())
+            as_recorded = partial(source.recorded_ns, primary)
+            # An interruption of what follows must not lose it.
+            folder.write_odometry(_stamped(odometry_of(pipeline), as_recorded))
+            folder.write_diagnostics(_stamped(pipeline.records.diagnostics(), as_recorded))
             ways = ways_of(pipeline, given)
-            folder.write_trajectory(ways.final)
-            outcome = Outcome(request.inputs, source, pipeline, ways, started)
-            beside_mib = _write(folder, request, source, outcome, inspector)
-        info = MapInfo(request.logs, _options(request), outcome.summary, outcome.warnings, _frames(request))
-        final = folder.complete(info, {path: _entry(request, path, future) for path, future in hashes.items()})
-    summary = outcome.summary | {"map": str(final)} | cost(started, outcome.duration_s, beside_mib)
-    return BuildResult(final, summary, outcome.warnings, ways.final)
+            if given is None and not interruption.asked:
+                require_a_map(source.paths[0], pipeline.records, ways.rows)
+            final = _stamped(ways.final, as_recorded)
+            folder.write_trajectory(final)
+            outcome = Outcome(request.inputs, source, pipeline, ways)
+            beside = _write(folder, request, source, outcome, inspector)
+        known = {path: _entry(request, path, future) for path, future in hashes.items()}
+        own = Spent(peak_memory_mib(), compiling.seconds)
+        figures = outcome.summary | cost(started, outcome.duration_s, own, beside)  # one for page, map.json and screen
+        fill_in_cost(folder.path / "report.html", figures)
+        info = MapInfo(request.logs, _options(request), figures, outcome.warnings, _frames(request))
+        path = folder.complete(info, known)
+    return BuildResult(path, figures | {"map": str(path)}, outcome.warnings, final)
+
+
+def _stamped(rows: _Stamped, stamps_of: Callable[[Any], Any]) -> _Stamped:
+    """Return poses or diagnostics under the stamps that their scans have in the log."""
+    if isinstance(rows, Trajectory):
+        return rows._replace(stamps_ns=stamps_of(rows.stamps_ns))
+    return rows._replace(stamp_ns=stamps_of(rows.stamp_ns))
 
 
 def _run(pipeline: MappingPipeline, source: LogSource, progress: Progress | None, interruption: Interruption) -> None:
@@ -130,8 +152,8 @@ def _run(pipeline: MappingPipeline, source: LogSource, progress: Progress | None
 
 def _write(
     folder: MapFolderWriter, request: BuildRequest, source: LogSource, outcome: Outcome, inspector: Inspector
-) -> float:
-    """Write the rest of the map but `map.json`; return the memory that a process beside this one took, MiB."""
+) -> Spent:
+    """Write the rest of the map but `map.json`; return what a process beside this one needed."""
     shown = outcome.report(), outcome.pipeline.machine or Machine(bodies={})
     inspector.tell(Inspection.write, *shown)
     write_cloud(folder.path / "cloud.ply", outcome.cloud)
@@ -139,13 +161,13 @@ def _write(
     if outcome.pile is not None:
         folder.write_json("pile.json", outcome.pile.to_json())
     try:
-        peak_mib = inspector.ask(Inspection.peak_memory_mib)
+        spent = inspector.ask(Inspection.spent)
     except HelperDied as error:
         outcome.warnings.append(f"{error}; the recording has no scans in it")
         with _inspection(Here, request, source, folder.path) as here:
             here.ask(Inspection.write, *shown)
-        return 0.0
-    return peak_mib if isinstance(inspector, Beside) else 0.0
+        return Spent()
+    return spent if isinstance(inspector, Beside) else Spent()
 
 
 def _inspector(request: BuildRequest, source: LogSource, folder: Path) -> Inspector:
@@ -163,8 +185,8 @@ def _cores() -> int:
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
-def _sweep_sink(inspector: Inspector) -> Callable[[str, int, Any], None]:
-    thinning = Thinning()
+def _sweep_sink(inspector: Inspector, interval_s: float) -> Callable[[str, int, Any], None]:
+    thinning = Thinning(interval_s)
 
     def take(role: str, stamp_ns: int, points_map: Any) -> None:
         if thinning.take(stamp_ns, role):

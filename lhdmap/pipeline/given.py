@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from lhdmap.errors import InputError
+from lhdmap.evaluation.ordering import file_in_order
 from lhdmap.geometry import se3
 from lhdmap.logs.source import LogSource
 from lhdmap.messages import GroundTruth
@@ -24,7 +25,7 @@ def given_rows(poses: str, logs: Sequence[Path], topics: Mapping[str, str]) -> R
     Raises:
         InputError: the file is not usable, or the log has no ground truth.
     """
-    trajectory = _ground_truth(logs, topics) if poses == GROUND_TRUTH else read_tum(Path(poses))
+    trajectory = _ground_truth(logs, topics) if poses == GROUND_TRUTH else _of_file(Path(poses))
     farthest_m = float(np.abs(trajectory.positions_m).max(initial=0.0))
     if farthest_m > _FARTHEST_M:
         raise InputError(
@@ -37,6 +38,11 @@ def given_rows(poses: str, logs: Sequence[Path], topics: Mapping[str, str]) -> R
     rpy = se3.rpy_from_quaternions(trajectory.quaternions_xyzw[order][once])
     rpy[:, 2] = np.unwrap(rpy[:, 2])
     return Rows(stamps[once], np.column_stack([trajectory.positions_m[order][once], rpy]))
+
+
+def _of_file(path: Path) -> Trajectory:
+    """Return the poses of a file in any order: they are looked up by their stamps."""
+    return file_in_order(read_tum(path), path).trajectory
 
 
 def _ground_truth(logs: Sequence[Path], topics: Mapping[str, str]) -> Trajectory:

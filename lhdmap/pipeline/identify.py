@@ -22,7 +22,8 @@ from lhdmap.pile.result import Approach, PileReport, Snapshot
 from lhdmap.pipeline.given import given_rows
 from lhdmap.pipeline.mapping import MappingPipeline, own_boxes
 from lhdmap.pipeline.mounts import Mounts, level_sensor, machine_of
-from lhdmap.pipeline.pile import PileWatch, PlacedScan
+from lhdmap.pipeline.pile import NO_INCLINOMETER, PileWatch, PlacedScan
+from lhdmap.pipeline.said import said_once
 from lhdmap.pipeline.sweep_times import SweepTimes
 from lhdmap.pipeline.track import FinalTrack, Rows
 
@@ -66,8 +67,10 @@ def identify(
         _feed(pipeline, source)
     if pipeline.pile is None or not len(pipeline.track):
         raise InputError(f"{log}: no usable scan of a front scanner in it; lhdmap doctor tells what is wrong")
-    level = () if pipeline.has_inclinometer else (_LEVEL,)
-    return _warned(pipeline.pile.report(), (*told, *source.damage, *pipeline.warnings, *level))
+    told = (*told, *source.damage, *pipeline.warnings)
+    if not pipeline.has_inclinometer:
+        return _warned(PileReport(None, None, method=settings.pile.method, reason=NO_INCLINOMETER), (*told, _LEVEL))
+    return _warned(pipeline.pile.report(), told)
 
 
 def _feed(pipeline: MappingPipeline, source: LogSource) -> None:
@@ -84,14 +87,14 @@ def _in_cloud(source: LogSource, settings: Settings, machine: Machine | None) ->
         raise InputError(f"{source.paths[0]}: no usable cloud in it; lhdmap doctor tells what is wrong")
     estimate = measure_cloud(pipeline.sweeps.cloud().points_m.astype(np.float64), "z").estimate
     last = Snapshot(pipeline.track.last_ns or 0, math.nan, estimate)
-    decision = last if estimate.found and estimate.status != "none" else None
+    decision = last if estimate.found and estimate.status not in (None, "none") else None
     piles = () if decision is None else (Approach(decision, last),)
     return PileReport(decision, last, (last,), "cloud", piles=piles)
 
 
 def _warned(report: PileReport, told: Sequence[str]) -> PileReport:
     """Return the report with what is to be said of its log, each once."""
-    return replace(report, warnings=(*report.warnings, *dict.fromkeys(told)))
+    return replace(report, warnings=tuple(said_once((*report.warnings, *told))))
 
 
 def identify_along(

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import resource as process_resource
-import sys
 import threading
 from pathlib import Path
 
@@ -12,12 +10,14 @@ from lhdmap.machine import Machine
 from lhdmap.messages import FloatArray
 from lhdmap.pile.result import PileReport
 from lhdmap.pipeline.beside import Beside, Here
+from lhdmap.pipeline.cost import CompileClock, Spent, peak_memory_mib
 from lhdmap.pipeline.pile import PileWatch, PlacedScan
 from lhdmap.report import charts
 from lhdmap.report.data import ReportData
 from lhdmap.report.page import write_report
 from lhdmap.report.pile_recording import add_pile
-from lhdmap.report.recording import RecordingWriter, record_run
+from lhdmap.report.recording import RecordingWriter
+from lhdmap.report.run_recording import record_run
 
 
 class Inspection:
@@ -26,8 +26,9 @@ class Inspection:
     def __init__(self, folder: Path, title: str, start_ns: int, settings: Settings) -> None:
         self._folder = folder
         self._pile = PileWatch(settings)
-        self._recording = RecordingWriter(folder / "recording.rrd", title, start_ns)
+        self._recording = RecordingWriter(folder / "recording.rrd", title, start_ns, settings.recording)
         self._written = False
+        self._compiling = CompileClock().start()
         threading.Thread(target=charts.load, name="charts").start()
 
     def look(self, scan: PlacedScan) -> None:
@@ -46,17 +47,18 @@ class Inspection:
         """Complete the recording and write the report."""
         record_run(self._recording, data, machine)
         if data.pile is not None:
-            add_pile(self._recording, data.pile)
+            add_pile(self._recording, data.pile, said=data.warnings)
         self._recording.close()
         self._written = True
         write_report(data, self._folder / "report.html")
 
-    def peak_memory_mib(self) -> float:
-        """Return the most memory that the process has had in RAM, MiB."""
-        return peak_memory_mib()
+    def spent(self) -> Spent:
+        """Return what the process has needed."""
+        return Spent(peak_memory_mib(), self._compiling.seconds)
 
     def close(self) -> None:
         """Close the recording; what was recorded before an interruption is kept."""
+        self._compiling.stop()
         if not self._written:
             self._recording.close()
 
@@ -77,9 +79,3 @@ class PileBeside:
     def report(self) -> PileReport:
         """Return what it says of the pile."""
         return self._inspector.ask(Inspection.pile)
-
-
-def peak_memory_mib() -> float:
-    """Return the most memory that this process has had in RAM, MiB."""
-    unit = 1024.0**2 if sys.platform == "darwin" else 1024.0
-    return process_resource.getrusage(process_resource.RUSAGE_SELF).ru_maxrss / unit

@@ -7,7 +7,7 @@ integrated once a later pose is known, so that its motion is interpolated and no
 from __future__ import annotations
 
 import math
-from collections import deque
+from collections import Counter, deque
 from functools import partial
 from typing import Literal
 
@@ -44,7 +44,7 @@ from lhdmap.pipeline.sweep_times import SweepTimes
 from lhdmap.pipeline.sweeps import ScanSink, SweepIntegration
 from lhdmap.pipeline.track import Track
 from lhdmap.proprioception.attitude import AttitudeFilter
-from lhdmap.proprioception.slip import SlipEstimator
+from lhdmap.proprioception.slip import SkidFactor
 from lhdmap.proprioception.wheels import WheelOdometry
 from lhdmap.smoothing.realign import AlignedScan
 from lhdmap.smoothing.smoother import Smoother
@@ -54,6 +54,7 @@ _WARM_SCANS, _FEWEST_WARM_SCANS, _WARM_NS = 50, 6, 1_500_000_000
 _TILTED = 0.01  # rise of the scan plane ahead (m/m)
 _PATIENCE_SCANS = 3  # after a pause of the whole log, wheels may come within as many scans before they count as silent
 _QUEUE_SCANS = 2000  # a sensor that stops must not hold back scans without bound
+_MOMENT_NS = 5_000_000
 _EARLY = 10_000  # inclinations that wait for their mount at most
 
 
@@ -79,7 +80,7 @@ class MappingPipeline:
         self.mounts = Mounts(machine)
         self.attitude = AttitudeFilter(settings.attitude)
         self.wheels = WheelOdometry(settings.wheels, machine or _DEFAULT_MACHINE)
-        self.slip = SlipEstimator(settings.slip, settings.wheels.scale_std)
+        self.slip = SkidFactor(settings.slip)
         self.odometry: PlanarOdometry | None = None  # begins once the first scans have told the speed
         self.sweeps = SweepIntegration(settings, machine, self.mounts, on_sweep)
         self.clouds = CloudOdometry(settings.cloud_odometry) if primary == "points" else None
@@ -93,7 +94,8 @@ class MappingPipeline:
         self._cloud = cloud
         self.rear = RearScans(self.mounts, self.wheels, machine or _DEFAULT_MACHINE)
         self.has_inclinometer = False
-        self._newest_ns = self._time_ns = -(2**62)
+        self.wheel_sources: Counter[str] = Counter()  # scans that wheels told the motion of, by sensor
+        self._newest_ns = self._time_ns = self._before_ns = -(2**62)
         self._clock_ns = -(2**62)
         self._scan_ns = (self._clock_ns, self._clock_ns)  # of the newest scan: its stamp, and that made rising
         self._disordered = False
@@ -105,7 +107,7 @@ class MappingPipeline:
 
     def update(self, role: str, message: Message) -> None:
         """Take one message of the log."""
-        if isinstance(message, LaserScan):
+        if isinstance(message, (LaserScan, PointCloud)):
             message = self._sweep_times.checked(role, message)
         match message:
             case LaserScan() | PointCloud() if role == self._primary:
@@ -204,7 +206,9 @@ class MappingPipeline:
         """Start the odometry with the speed that a dry run over the first scans finds."""
         waiting = [first, *list(self._waiting)[: _WARM_SCANS - 1]]
         inputs, before_ns = [], self._time_ns
-        for scan, time_ns in ((scan, time_ns) for scan, time_ns in waiting if isinstance(scan, LaserScan)):
+        for scan, time_ns in waiting:
+            if not isinstance(scan, LaserScan) or _says_nothing(scan, time_ns - before_ns):
+                continue
             inputs.append(self._input(scan, before_ns, time_ns + half_sweep_ns(scan)))
             before_ns = time_ns + half_sweep_ns(scan)
         return self._odometry(starting_velocity(self._odometry, inputs))
@@ -236,6 +240,11 @@ class MappingPipeline:
             if self.clouds is not None:
                 self._process_cloud(self.clouds, scan, stamp_ns)
             return
+        in_bunches = self.odometry is not None and self.odometry.clock.bunched
+        if _says_nothing(scan, stamp_ns - self._before_ns) and not (in_bunches and scan.ranges_m.size):
+            self.records.add_scan(scan.stamp_ns, max(stamp_ns, self._time_ns + 1))
+            return
+        self._before_ns = stamp_ns
         if self.odometry is None:
             self.odometry = self._begin((scan, stamp_ns))
             if self._sees_again(scan, stamp_ns):
@@ -273,6 +282,7 @@ class MappingPipeline:
         motion = self.wheels.motion_between(self._time_ns, time_ns) if self._time_ns > 0 else None
         prior = None
         if motion is not None:
+            self.wheel_sources[motion.source] += 1
             x, y, turn = (float(value) for value in motion.delta)
             prior = CloudPrior(se3.from_rpy(0.0, 0.0, turn, (x, y, 0.0)), motion.covariance)
         T_level_base = se3.from_rpy(*self._attitude_at(time_ns), 0.0) if self.has_inclinometer else None
@@ -312,6 +322,7 @@ class MappingPipeline:
         motion = self.wheels.motion_between(before_ns, time_ns) if before_ns > 0 else None
         if motion is None:
             return None
+        self.wheel_sources[motion.source] += 1
         forward_sigma, turn_sigma = math.sqrt(motion.covariance[0, 0]), math.sqrt(motion.covariance[2, 2])
         turn = None if motion.source == "tachometer" else float(motion.delta[2])
         half = 0.5 * float(motion.delta[2])  # the way's direction is the heading's in the middle of the step
@@ -321,14 +332,20 @@ class MappingPipeline:
     def _record(self, stamp_ns: int, time_ns: int, step: OdometryStep | CloudStep) -> None:
         wheel_mps = self.wheels.speed_at(time_ns)
         speed_mps = float(step.velocity[0])
-        slip = math.nan
-        if wheel_mps is not None:
-            slip = self.slip.update(time_ns, wheel_mps, speed_mps)
-        match_ = (step.residual_m, step.support)
-        self.records.add_processed(
-            stamp_ns, match_, step.information, step.substitute, (step.degenerate, step.lost), slip
-        )
+        match_, flags = (step.residual_m, step.support), (step.degenerate, step.lost)
+        wheels = step.wheels, self._slip(time_ns, wheel_mps, math.nan if step.degenerate else speed_mps)
+        self.records.add_processed(stamp_ns, match_, step.information, step.substitute, flags, wheels)
         self.records.add_motion(time_ns, speed_mps, wheel_mps, self.wheels.articulation_at(time_ns))
+
+    def _slip(self, time_ns: int, wheel_mps: float | None, seen_mps: float) -> float:
+        """Return the skid factor; `seen_mps` is NaN where the walls did not show the speed, which is then the wheels' own."""
+        scale = 1.0 if self.odometry is None else self.odometry.wheels.scale
+        return self.slip.update(time_ns, math.nan if wheel_mps is None else wheel_mps / scale, seen_mps)
+
+
+def _says_nothing(scan: LaserScan, after_ns: int) -> bool:
+    """Return whether a scan is none: without beams, or without a hit a moment after another one."""
+    return not scan.ranges_m.size or (after_ns < _MOMENT_NS and not bool((scan.ranges_m < scan.range_max_m).any()))
 
 
 def own_boxes(machine: Machine | None, margin_m: float) -> FloatArray:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from lhdmap.geometry import se3
-from lhdmap.integration.self_filter import BODY_FRAMES
+from lhdmap.logs.frames import FrameTree
 from lhdmap.logs.source import LogSource
 from lhdmap.machine import Machine
 from lhdmap.messages import FloatArray, Joints, Mount
@@ -18,21 +18,20 @@ class Mounts:
 
     def __init__(self, machine: Machine | None) -> None:
         self._machine = machine
-        self._edges: dict[str, Mount] = {}
+        self._tree = FrameTree()
         self._found: dict[str, Mount] = {}
         self._roles: dict[str, str] = {}
         self.warnings: list[str] = []
 
     def update(self, mount: Mount) -> None:
         """Take one static transform of the log."""
-        if np.isfinite(mount.T_parent_child).all():
-            self._edges[mount.child_frame] = mount
+        self._tree.add(mount)
 
     def of(self, frame: str, role: str) -> Mount:
         """Return the mount of a sensor frame on `base_link` or `rear_link`."""
         self._roles[role] = frame
         if frame not in self._found:
-            self._found[frame] = self._chain(frame) or self._assumed(frame, role)
+            self._found[frame] = self._tree.mount(frame) or self._assumed(frame, role)
         return self._found[frame]
 
     def on_rear_body(self, role: str) -> bool:
@@ -42,20 +41,7 @@ class Mounts:
 
     def known(self, frame: str) -> bool:
         """Return whether the log itself says where this frame sits."""
-        return self._chain(frame) is not None
-
-    def _chain(self, frame: str) -> Mount | None:
-        """Follow the transforms from the sensor up to a body; None where they do not lead to one."""
-        T = np.eye(4)
-        child, seen = frame, set()
-        while child not in BODY_FRAMES:
-            edge = self._edges.get(child)
-            if edge is None or child in seen:
-                return None
-            seen.add(child)
-            T = edge.T_parent_child @ T
-            child = edge.parent_frame
-        return Mount(0, child, frame, T)
+        return self._tree.mount(frame) is not None
 
     def _assumed(self, frame: str, role: str) -> Mount:
         if self._machine is not None and (found := self._machine.mounts.get(_BY_ROLE.get(role, role))):
@@ -83,10 +69,7 @@ def machine_of(source: LogSource, given: Machine | None) -> Machine | None:
 
 def _bends(source: LogSource) -> bool:
     """Return whether the log's joints are those of an articulated machine: wheels of a robot are joints, too."""
-    if "joints" not in source.roles:
-        return False
-    with LogSource(source.paths, source.roles) as other:  # what `source` counts of its messages stays as it is
-        first = next((message for _, message in other.messages(["joints"])), None)
+    first = source.first("joints")
     return isinstance(first, Joints) and "articulation" in first.positions_rad
 
 

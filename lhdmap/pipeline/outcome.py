@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import contextlib
-import time
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -17,11 +17,15 @@ from lhdmap.integration.cloud import Cloud
 from lhdmap.logs.source import LogSource
 from lhdmap.machine import Machine
 from lhdmap.messages import Joints, LaserScan, PointCloud
+from lhdmap.names import name_of
 from lhdmap.pile.result import PileReport
 from lhdmap.pipeline.beside import HelperDied
+from lhdmap.pipeline.given import GROUND_TRUTH
 from lhdmap.pipeline.identify import identify_along
-from lhdmap.pipeline.inspection import peak_memory_mib
 from lhdmap.pipeline.mapping import MappingPipeline
+from lhdmap.pipeline.pile import NO_FRONT, NO_INCLINOMETER, OFF, PileSink
+from lhdmap.pipeline.refusal import key_scans_remark
+from lhdmap.pipeline.said import said_once
 from lhdmap.pipeline.sweep_times import SweepTimes
 from lhdmap.pipeline.sweeps import SweepIntegration
 from lhdmap.pipeline.track import FinalTrack, Rows, resample, trajectory_of
@@ -31,18 +35,23 @@ from lhdmap.smoothing.smoother import corrected
 from lhdmap.trajectory import Trajectory
 
 ROLES_READ = ("front", "rear", "points", "inclinometer", "joints", "tachometer", "wheel_odometry", "tf_static")
+_ROLES_PLACED = ("front", "rear", "points", "joints", "tf_static")  # what is read of a log whose poses are given
+_OF_ODOMETRY = ("odometry:", "wheels:", "wheel odometry:", "tachometer:", "inclinometer:")
+_WITNESSES = {"articulated": "tachometer", "tachometer": "tachometer", "wheel_pose": "wheel odometry"}
+_FEWEST_TOLD = 0.1  # of the scans
 _GAP_S = 10.0
 _HOLE_S, _HOLE_M = 1.0, 2.0
 
 
 class Inputs(NamedTuple):
-    """What a map is made of: logs, settings, topics by role, title of the map, and whether poses were given."""
+    """What a map is made of: logs, settings, topics by role, title of the map, given poses; whether bad logs are tried."""
 
     logs: Sequence[Path]
     settings: Settings
     topics: Mapping[str, str]
     title: str
-    posed: bool
+    poses: str = ""
+    force: bool = False
 
 
 class Ways(NamedTuple):
@@ -89,9 +98,7 @@ class Outcome:
         InputError: the scans hold no hit at all.
     """
 
-    def __init__(
-        self, inputs: Inputs, source: LogSource, pipeline: MappingPipeline, ways: Ways, started: float
-    ) -> None:
+    def __init__(self, inputs: Inputs, source: LogSource, pipeline: MappingPipeline, ways: Ways) -> None:
         self.pipeline, self.ways = pipeline, ways
         self._inputs, self._source = inputs, source
         rows = ways.rows
@@ -100,9 +107,11 @@ class Outcome:
         distance_m = float(np.linalg.norm(np.diff(rows.poses[:, :3], axis=0), axis=1).sum())
         if not len(self.cloud.points_m) and pipeline.records.degenerate_share == 1.0:
             raise InputError(f"{source.paths[0]}: its scans hold no hit; lhdmap doctor tells what is wrong")
-        self.pile = self._pile()
-        self.warnings = [*source.warnings, *source.damage, *pipeline.warnings, *sweeps.warnings, *_remarks(pipeline)]
-        self.warnings += _holes(rows) if inputs.posed else []
+        self.pile_reason = self._no_pile()
+        self.pile = None if self.pile_reason else self._pile(pipeline.pile)
+        told = [*source.warnings, *source.damage, *_of_the_run(pipeline, inputs), *sweeps.warnings]
+        told += _holes(rows) if inputs.poses else _remarks(pipeline)
+        self.warnings = said_once([*told, *_of_the_pile(self.pile)])
         stamps, records = ways.odometry.stamps_ns, pipeline.records
         self.duration_s = source.duration_s or float(stamps[-1] - stamps[0]) * 1e-9
         self.summary: dict[str, Any] = {
@@ -110,19 +119,26 @@ class Outcome:
             "scans_processed": records.processed,
             "duration_s": self.duration_s,
             "distance_m": distance_m,
-            **cost(started, self.duration_s),
-            "degenerate_share": records.degenerate_share,
-            "lost_stretches": records.lost_stretches,
+            "poses": inputs.poses or None,
+            "degenerate_share": None if inputs.poses else records.degenerate_share,
+            "lost_stretches": 0 if inputs.poses else records.lost_stretches,
             "closures": ways.closures,
-            "pile": self.pile.to_json()["status"] if self.pile is not None else None,
+            "pile": None if self.pile is None else self.pile.estimate.status,
+            "pile_reason": self.pile_reason or (None if self.pile is None else self.pile.estimate.reason or None),
         }
 
-    def _pile(self) -> PileReport | None:
-        """Return what is said of the pile, on the final poses; None where none was looked for."""
-        stage, inputs = self.pipeline.pile, self._inputs
-        if stage is None or not self.pipeline.has_inclinometer:
-            return None
-        if not self.ways.moved:
+    def _no_pile(self) -> str:
+        """Return why no pile is looked for; empty where one is."""
+        if self._inputs.settings.pile.method == "off":
+            return OFF
+        if self.pipeline.pile is None:
+            return NO_FRONT
+        return "" if self.pipeline.has_inclinometer or self._inputs.poses else NO_INCLINOMETER
+
+    def _pile(self, stage: PileSink | None) -> PileReport:
+        """Return what is said of the pile, on the final poses."""
+        inputs = self._inputs
+        if stage is not None and not self.ways.moved:
             with contextlib.suppress(HelperDied):  # looked for anew below, and told of when the report is written
                 return self.pipeline.path.moved(stage.report())
         return identify_along(self.ways.rows, inputs.logs, inputs.settings, self.pipeline.machine, inputs.topics)
@@ -130,22 +146,30 @@ class Outcome:
     def report(self) -> ReportData:
         """Return the data of the HTML page and of the recording."""
         records, inputs = self.pipeline.records, self._inputs
-        return ReportData(
+        data = ReportData(
             title=inputs.title,
-            summary=Summary(**{key: value for key, value in self.summary.items() if key != "pile"}),
-            topics=_topic_rows(self._source),
+            summary=Summary(**{key: value for key, value in self.summary.items() if key in Summary.__slots__}),
+            topics=_topic_rows(self._source, inputs),
             trajectory=self.ways.final,
-            odometry=self.ways.odometry,
             cloud=self.cloud,
-            diagnostics=records.diagnostics(),
-            odometry_speed=records.speed(),
-            tachometer_speed=records.tachometer(),
             articulation=records.articulation(),
             has_inclinometer=self.pipeline.has_inclinometer,
             pile=self.pile,
+            pile_reason=self.pile_reason,
             warnings=self.warnings,
             settings_text=settings_toml(inputs.settings),
-            provenance={"log": ", ".join(path.name for path in inputs.logs)},
+            provenance={"log": ", ".join(name_of(path) for path in inputs.logs)} | _given(inputs),
+            poses=_poses_name(inputs),
+        )
+        if inputs.poses:  # what the scans say of the motion took no part
+            return data
+        return replace(
+            data,
+            odometry=self.ways.odometry,
+            diagnostics=records.diagnostics(),
+            odometry_speed=records.speed(),
+            tachometer_speed=records.tachometer(),
+            witness=_witness(self.pipeline),
         )
 
 
@@ -157,7 +181,7 @@ def integrate_again(inputs: Inputs, pipeline: MappingPipeline, rows: Rows) -> Sw
     sweeps = SweepIntegration(inputs.settings, pipeline.machine, pipeline.mounts, None)
     wheels = WheelOdometry(inputs.settings.wheels, pipeline.machine or Machine())
     track, times, sweep_times = FinalTrack(rows), iter(pipeline.records.times_ns), SweepTimes()
-    with LogSource(list(inputs.logs), inputs.topics) as source:
+    with LogSource(list(inputs.logs), inputs.topics, force=inputs.force) as source:
         for role, message in source.messages(
             [role for role in ("front", "rear", "points", "joints") if role in source.roles]
         ):
@@ -165,17 +189,10 @@ def integrate_again(inputs: Inputs, pipeline: MappingPipeline, rows: Rows) -> Sw
                 wheels.update(message)
             elif isinstance(message, (LaserScan, PointCloud)):
                 time_ns = next(times, message.stamp_ns) if role == "front" else message.stamp_ns
-                message = sweep_times.checked(role, message) if isinstance(message, LaserScan) else message
+                message = sweep_times.checked(role, message)
                 sweeps.add_final(role, time_ns, message, track, wheels)
     sweeps.wait(track, wheels)
     return sweeps
-
-
-def cost(started: float, duration_s: float, beside_mib: float = 0.0) -> dict[str, float]:
-    """Return what a run that `started` at a monotonic time has cost so far."""
-    wall_s = max(time.monotonic() - started, 1e-6)
-    peak = peak_memory_mib() + beside_mib
-    return {"wall_s": wall_s, "realtime_factor": duration_s / wall_s, "peak_memory_mib": peak}
 
 
 def _moments(pipeline: MappingPipeline) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.int64]]:
@@ -184,15 +201,47 @@ def _moments(pipeline: MappingPipeline) -> tuple[npt.NDArray[np.int64], npt.NDAr
     return np.array(records.stamps_ns, dtype=np.int64), np.array(records.times_ns, dtype=np.int64)
 
 
-def _topic_rows(source: LogSource) -> list[TopicRow]:
+def _topic_rows(source: LogSource, inputs: Inputs) -> list[TopicRow]:
     used = {topic: role for role, topic in source.roles.items()}
+    read = (
+        (*_ROLES_PLACED, "ground_truth")[: None if inputs.poses == GROUND_TRUTH else -1] if inputs.poses else ROLES_READ
+    )
     rows = []
     for inventory in source.inventory():
         for topic in inventory.topics.values():
             role = used.get(topic.name)
-            remark = f"used as {role}" if role in ROLES_READ else "not an input"
+            remark = f"used as {role}" if role in read else "not an input"
             rows.append(TopicRow(topic.name, topic.type_name, topic.count, topic.rate_hz, remark))
     return rows
+
+
+def _poses_name(inputs: Inputs) -> str:
+    return inputs.poses if inputs.poses in ("", GROUND_TRUTH) else name_of(Path(inputs.poses))
+
+
+def _given(inputs: Inputs) -> dict[str, str]:
+    return {"poses, given": _poses_name(inputs)} if inputs.poses else {}
+
+
+def _of_the_run(pipeline: MappingPipeline, inputs: Inputs) -> list[str]:
+    """Return what the stages found odd; with given poses without those that took no part."""
+    return [text for text in pipeline.warnings if not (inputs.poses and text.startswith(_OF_ODOMETRY))]
+
+
+def _of_the_pile(pile: PileReport | None) -> Sequence[str]:
+    """Return the warnings of a pile that was found: what nothing closes has none to be measured wrong."""
+    return () if pile is None or pile.estimate.status in (None, "none") else pile.estimate.warnings
+
+
+def _witness(pipeline: MappingPipeline) -> str:
+    """Return which sensors told of the motion beside the scans; empty where none did."""
+    told, steps = pipeline.wheel_sources, sum(pipeline.wheel_sources.values())
+    if pipeline.odometry is not None:
+        wheels = pipeline.odometry.wheels
+        steps = 0 if wheels.trust.warning() else steps - wheels.stale.steps
+    if steps <= _FEWEST_TOLD * len(pipeline.records.stamps_ns):
+        return ""
+    return " and ".join(dict.fromkeys(_WITNESSES[source] for source in sorted(told)))
 
 
 def _remarks(pipeline: MappingPipeline) -> list[str]:
@@ -206,6 +255,7 @@ def _remarks(pipeline: MappingPipeline) -> list[str]:
         remarks.append(
             f"odometry: in {100 * share:.0f} % of the scans a direction is weakly observed (smooth walls, or too far away?)"
         )
+    remarks += key_scans_remark(pipeline.records)
     gap_s = float(np.diff(pipeline.records.times_ns).max(initial=0.0)) * 1e-9
     if gap_s > _GAP_S:
         remarks.append(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import NamedTuple, Protocol
 
 import numba as nb
@@ -14,6 +15,13 @@ from lhdmap.pile.face import Registration
 from lhdmap.pile.figure9_stage import Figure9Stage
 from lhdmap.pile.result import PileReport
 from lhdmap.pile.stage import PileStage, ScanHits
+
+OFF = "no pile was looked for: pile.method is off"
+NO_FRONT = (
+    "no pile was looked for: there is no front scanner in the log; lhdmap pile looks in the cloud of a 3D scanner"
+)
+NO_SCAN = "no pile was looked for: no scan of the front scanner has a pose"
+NO_INCLINOMETER = "no pile was looked for: there is no inclinometer in the log"
 
 
 class PlacedScan(NamedTuple):
@@ -63,7 +71,10 @@ class PileWatch:
 
     def report(self) -> PileReport:
         """Return what is said of the pile so far."""
-        return PileReport(None, None, method=self._method) if self._stage is None else self._stage.report()
+        if self._stage is None:
+            return PileReport(None, None, method=self._method, reason=OFF)
+        report = self._stage.report()
+        return report if report.history or report.piles else replace(report, reason=NO_SCAN)
 
 
 @nb.njit(cache=True, nogil=True)

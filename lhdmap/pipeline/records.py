@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import sys
 
 import numpy as np
 import numpy.typing as npt
@@ -21,6 +22,7 @@ class ScanRecords:
         self._rows: list[tuple[float, ...]] = []
         self._processed_ns: list[int] = []
         self._substitutes: list[str] = []
+        self._wheels: list[str] = []
         self._lost: list[bool] = []
         self._curves: list[tuple[int, float, float, float]] = []
 
@@ -36,12 +38,13 @@ class ScanRecords:
         information: FloatArray,
         substitute: str,
         flags: tuple[bool, bool],
-        slip: float,
+        wheels: tuple[str, float],
     ) -> None:
-        """Add a processed scan: match as (residual m, support), information (3,), flags as (degenerate, lost), slip."""
+        """Add a processed scan: match (residual m, support), information (3,), flags (degenerate, lost), wheels (use, slip)."""
         self._processed_ns.append(stamp_ns)
-        self._rows.append((*match, *(float(v) for v in information), float(flags[0]), slip))
-        self._substitutes.append(substitute)
+        self._rows.append((*match, *(float(v) for v in information), float(flags[0]), wheels[1]))
+        self._substitutes.append(sys.intern(substitute))
+        self._wheels.append(sys.intern(str(wheels[0])))
         self._lost.append(flags[1])
 
     def add_motion(
@@ -70,6 +73,11 @@ class ScanRecords:
         return int(np.count_nonzero(lost[1:] & ~lost[:-1]))
 
     @property
+    def all_lost(self) -> bool:
+        """Whether none of the scans after the first could be placed."""
+        return len(self._lost) > 1 and all(self._lost[1:])
+
+    @property
     def degenerate_share(self) -> float:
         """Share of processed scans with an unobserved direction."""
         return float(np.mean([row[5] for row in self._rows])) if self._rows else 0.0
@@ -88,6 +96,7 @@ class ScanRecords:
             table[:, 5] > 0.5,
             self._substitutes,
             table[:, 6],
+            self._wheels,
         )
 
     def speed(self) -> SpeedSeries | None:

@@ -16,6 +16,9 @@ from lhdmap.messages import FloatArray
 from lhdmap.pile.result import PileReport
 from lhdmap.trajectory import Trajectory
 
+STANDS_MPS = 0.2
+"""What is slower, machine and wheels, is taken to stand."""
+
 
 class TopicRow(NamedTuple):
     """One topic of the log: number of messages, mean rate, and a remark (what it is used as, gaps)."""
@@ -41,6 +44,13 @@ class AngleSeries(NamedTuple):
     angle_rad: FloatArray
 
 
+class SlipSeries(NamedTuple):
+    """Slip over time: `stamps_ns` (M,) and `share` (M,), NaN where nothing moves or it is not known."""
+
+    stamps_ns: npt.NDArray[np.int64]
+    share: FloatArray
+
+
 @dataclass(frozen=True, slots=True)
 class Summary:
     """The headline figures; the names are those of `build-map --json`."""
@@ -55,11 +65,16 @@ class Summary:
     degenerate_share: float | None = None
     lost_stretches: int = 0
     closures: int = 0
+    compile_s: float | None = None
 
 
 @dataclass(frozen=True, slots=True)
 class ReportData:
-    """All that the HTML page shows; each part that is None or empty is said in words."""
+    """All that the HTML page shows; each part that is None or empty is said in words.
+
+    `witness`: which sensors told of the motion beside the scans (empty: none); `poses`: where given poses came from (empty: the
+    path is that of the odometry); `pile_reason`: why no pile was looked for.
+    """
 
     title: str
     summary: Summary
@@ -74,6 +89,21 @@ class ReportData:
     articulation: AngleSeries | None = None
     has_inclinometer: bool = True
     pile: PileReport | None = None
+    pile_reason: str = ""
+    witness: str = ""
+    poses: str = ""
     warnings: Sequence[str] = ()
     settings_text: str = ""
     provenance: Mapping[str, str] = field(default_factory=dict)
+
+    def slip(self) -> SlipSeries | None:
+        """Return the slip where wheels or machine move: at a stand it is noise over nothing. None: it is not known at all."""
+        if self.diagnostics is None:
+            return None
+        stamps_ns = np.asarray(self.diagnostics.stamp_ns)
+        fastest = np.zeros(len(stamps_ns))
+        for speed in (self.odometry_speed, self.tachometer_speed):
+            if speed is not None and len(speed.stamps_ns):
+                fastest = np.maximum(fastest, np.abs(np.interp(stamps_ns, speed.stamps_ns, speed.speed_mps)))
+        share = np.where(fastest >= STANDS_MPS, np.asarray(self.diagnostics.slip, dtype=float), np.nan)
+        return SlipSeries(stamps_ns, share) if np.isfinite(share).any() else None

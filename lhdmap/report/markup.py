@@ -6,12 +6,14 @@ import html
 from collections.abc import Iterable, Sequence
 from importlib import resources
 
+from lhdmap.names import shown
+
 
 def document(title: str, body: str) -> str:
     """Return a whole page with the style in it; `body` is markup, `title` is text."""
     style = resources.files("lhdmap.report").joinpath("style.css").read_text(encoding="utf-8")
     title = html.escape(title)
-    return (
+    return shown(
         f'<!DOCTYPE html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n<title>{title}</title>\n'
         '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
         f"<style>\n{style}</style>\n</head>\n<body>\n<h1>{title}</h1>\n{body}</body>\n</html>\n"
@@ -23,14 +25,29 @@ def section(title: str, body: str) -> str:
     return f"<section>\n<h2>{title}</h2>\n{body}</section>\n" if body else ""
 
 
-def cards(figures: Iterable[tuple[str, str, str]]) -> str:
-    """Return cards of name, value and meaning."""
-    inner = "".join(
+def cards(figures: Iterable[tuple[str, str, str]], more: str = "") -> str:
+    """Return cards of name, value and meaning; `more` is markup after the last one."""
+    return f"<div class=cards>\n{card_list(figures)}{more}</div>\n"
+
+
+def card_list(figures: Iterable[tuple[str, str, str]]) -> str:
+    """Return the cards of name, value and meaning without a frame around them."""
+    return "".join(
         f"<div class=card><b>{html.escape(value)}</b><span>{html.escape(name)}</span>"
         f"<p>{html.escape(meaning)}</p></div>\n"
         for name, value, meaning in figures
     )
-    return f"<div class=cards>\n{inner}</div>\n"
+
+
+def terms(words: Iterable[tuple[str, str]]) -> str:
+    """Return words and what they mean, folded away."""
+    rows = "".join(f"<dt>{html.escape(word)}</dt><dd>{html.escape(meaning)}</dd>\n" for word, meaning in words)
+    return f"<details><summary>What the words mean</summary><dl>\n{rows}</dl></details>\n" if rows else ""
+
+
+def paragraph(words: str) -> str:
+    """Return a paragraph of text."""
+    return f"<p>{html.escape(words)}</p>\n"
 
 
 def listed(items: Iterable[str], kind: str) -> str:

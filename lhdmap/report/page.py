@@ -3,17 +3,20 @@
 from __future__ import annotations
 
 import html
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
-from lhdmap.report import charts, cloud_charts, markup, path_charts, pile_page, series_charts, text
+from lhdmap.report import charts, cloud_charts, glossary, markup, path_charts, pile_page, series_charts, text
 from lhdmap.report.data import ReportData, TopicRow
 
-FLAGGED_NOTE = (
-    "Information is what the scan alone says about the motion: ten times more is a standard deviation three times "
-    "smaller. In a smooth drift the value along the machine falls, because walls look the same everywhere. Where a "
-    "direction was not observed (shaded), its motion came from the wheels or the last motion."
+DEVIATION_NOTE = (
+    "How well each scan alone fixes the machine's motion: one standard deviation, smaller is better; what goes beyond the top "
+    "of the scale is drawn at its edge. In a smooth drift the deviation along the machine rises, because walls look the same "
+    "everywhere. Where a direction was not observed (shaded), {}."
 )
+COST = "<!-- cost -->"
+_COST_WORDS = "real time"  # that will stand there
 
 
 def write_report(data: ReportData, path: Path) -> None:
@@ -30,17 +33,47 @@ def render_report(data: ReportData) -> str:
             markup.section("Path", _path(data)),
             markup.section("Against the truth", _truth(data)),
             markup.section("Cloud", _cloud(data)),
-            "" if data.pile is None else pile_page.pile_sections(data.pile),
-            markup.section("Speed and slip", _speed(data)),
-            markup.section("Information over the drive", _information(data)),
+            _pile(data),
+            *_of_odometry(data),
             markup.section("What was in the log", _topics(data.topics)),
             markup.section("How it was made", _provenance(data)),
         ]
-    return markup.document(data.title, "".join(sections))
+    body = "".join(sections)
+    return markup.document(
+        data.title, body + markup.section("Words", glossary.list_of(body.replace(COST, _COST_WORDS)))
+    )
+
+
+def fill_in_cost(path: Path, figures: Mapping[str, Any]) -> None:
+    """Put what a run cost (names of `build-map --json`) into its page: it is known only once all else is written."""
+    cards = markup.card_list(_cards(text.cost_figures(text.summary_of(figures))))
+    path.write_text(path.read_text(encoding="utf-8").replace(COST, cards, 1), encoding="utf-8")
 
 
 def _headline(data: ReportData) -> str:
-    return markup.cards((figure.name, figure.value, figure.meaning) for figure in text.headline(data))
+    known = data.summary.realtime_factor is not None
+    figures = [*text.headline(data), *(text.cost_figures(data.summary) if known else ())]
+    return markup.cards(_cards(figures), "" if known else COST)
+
+
+def _cards(figures: Iterable[text.Figure]) -> Iterator[tuple[str, str, str]]:
+    return ((figure.name, figure.value, figure.meaning) for figure in figures)
+
+
+def _pile(data: ReportData) -> str:
+    if data.pile is None:
+        return pile_page.unsought_section(data.pile_reason) if data.pile_reason else ""
+    return pile_page.pile_sections(data.pile, said=data.warnings)
+
+
+def _of_odometry(data: ReportData) -> list[str]:
+    """Return the sections of how the motion was found; where poses were given, it was not."""
+    if data.poses:
+        return []
+    return [
+        markup.section("Speed and slip", _speed(data)),
+        markup.section("How well the scans fix the motion", _deviations(data)),
+    ]
 
 
 def _warnings(data: ReportData) -> str:
@@ -51,7 +84,7 @@ def _warnings(data: ReportData) -> str:
 def _path(data: ReportData) -> str:
     above = "Path of base_link (middle of the front axle) from above."
     plan = markup.picture(charts.svg_uri(path_charts.plan_chart(data)), above)
-    if not data.has_inclinometer:
+    if not (data.has_inclinometer or data.poses):
         return plan
     side = "Height of base_link over the distance driven; the scales differ."
     return plan + markup.picture(charts.svg_uri(path_charts.profile_chart(data)), side)
@@ -97,17 +130,18 @@ def _speed(data: ReportData) -> str:
     if data.odometry_speed is None and data.tachometer_speed is None:
         return "<p>No speed was recorded.</p>\n"
     caption = "Speed of the machine by odometry" + (
-        " and by the tachometer; slip is how much faster the wheels turn than the machine moves."
+        " and by the tachometer; slip is how much faster the wheels turn than the machine moves, drawn where one of them does."
         if data.tachometer_speed is not None
         else ". The log has no tachometer, so slip is not known."
     )
     return markup.picture(charts.svg_uri(series_charts.speed_chart(data)), caption)
 
 
-def _information(data: ReportData) -> str:
+def _deviations(data: ReportData) -> str:
     if data.diagnostics is None or not len(data.diagnostics.stamp_ns):
         return "<p>No diagnostics were recorded.</p>\n"
-    return markup.picture(charts.svg_uri(series_charts.information_chart(data, data.diagnostics)), FLAGGED_NOTE)
+    note = DEVIATION_NOTE.format(text.weak_motion(data.witness))
+    return markup.picture(charts.svg_uri(series_charts.deviation_chart(data, data.diagnostics)), note)
 
 
 def _topics(topics: Sequence[TopicRow]) -> str:

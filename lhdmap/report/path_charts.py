@@ -79,7 +79,7 @@ def _lines(data: ReportData) -> list[tuple[str, FloatArray, str, str]]:
         lines.append(("truth", data.evaluation.truth_in_estimate_frame_m(), charts.TRUTH, "-"))
     if data.odometry is not None and not _same(data.odometry, data.trajectory):
         lines.append(("odometry alone", data.odometry.positions_m, charts.ODOMETRY, "--"))
-    lines.append(("final trajectory", data.trajectory.positions_m, charts.FINAL, "-"))
+    lines.append(("given poses" if data.poses else "final trajectory", data.trajectory.positions_m, charts.FINAL, "-"))
     return lines
 
 

@@ -58,7 +58,7 @@ def above_chart(report: PileReport, pile: PileEstimate) -> Figure:
     """Draw the hits around the face from above by what they are taken for, toe, limits, boulders and the attack point."""
     frame = Ahead.of(pile)
     side = frame.half_m + 1.0
-    figure = charts.new_figure(0.9 * charts.WIDTH_IN * 2.0 * side / (_BEFORE_M + _BEYOND_M) + 1.1)
+    figure = charts.new_figure(min(0.9 * charts.WIDTH_IN * 2.0 * side / (_BEFORE_M + _BEYOND_M) + 1.1, 7.5))
     axes = figure.add_subplot()
     _segments(axes, frame, pile, report.around_m)
     face, toe = frame.local(pile.face_m), frame.local(pile.toe_m)

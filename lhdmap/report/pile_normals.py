@@ -30,6 +30,7 @@ _NEAREST_M = 3.0
 _DOT = 30.0  # a mark's size in points at a depth of one metre
 _HIGHEST_M = 3.2  # the roof would hide what lies under it
 _REACH_M = (-3.6, 5.0)
+_TRIAD_X_M, _TRIAD_M = -2.6, 0.9
 
 
 class NormalCloud(NamedTuple):
@@ -80,11 +81,14 @@ def normals_chart(report: PileReport, pile: PileEstimate) -> Figure:
         rasterized=True,
     )
     _toe(axes, frame, pile)
+    _triad(axes, frame.half_m)
     axes.set(aspect="equal", xticks=[], yticks=[])
     axes.grid(visible=False)
     for side in axes.spines.values():
         side.set_visible(False)
-    bar = figure.colorbar(image, cax=axes.inset_axes((1.015, 0.05, 0.018, 0.9)), label="n_y, left wall … right wall")
+    bar = figure.colorbar(
+        image, cax=axes.inset_axes((1.015, 0.05, 0.018, 0.9)), label="n_y: left wall -1, pile 0, right wall +1"
+    )
     bar.ax.grid(visible=False)
     charts.legend_above(axes)
     return figure
@@ -98,6 +102,18 @@ def _toe(axes: Axes, frame: Ahead, pile: PileEstimate) -> None:
     axes.plot(*ends.T, "D", color=charts.INK, markersize=4.5, label="limits")
     for (x, y), name, shift in zip(ends, ("E_L", "E_R"), (6.0, -20.0), strict=True):
         axes.annotate(name, (x, y), (shift, -14.0), textcoords="offset points", fontsize=11.0)
+
+
+def _triad(axes: Axes, half_m: float) -> None:
+    """Draw the axes that n_y is said in, on the floor between machine and pile: x into the pile, y to the left, z up."""
+    origin = np.array([_TRIAD_X_M, 0.3 * half_m, 0.0])
+    length = min(_TRIAD_M, 0.6 * half_m)
+    for name, axis in (("x", [1.0, 0.0, 0.0]), ("y", [0.0, 1.0, 0.0]), ("z", [0.0, 0.0, 1.0])):
+        (start, end), _ = _projected(np.vstack([origin, origin + length * np.array(axis)]))
+        arrow = {"arrowstyle": "-|>", "color": charts.INK, "linewidth": 1.4, "shrinkA": 0.0, "shrinkB": 0.0}
+        axes.annotate("", end, start, arrowprops=arrow, annotation_clip=False)
+        x, y = end + 0.14 * (end - start)
+        axes.text(x, y, name, ha="center", va="center", fontsize=10.0)
 
 
 def _projected(local_m: FloatArray) -> tuple[FloatArray, FloatArray]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -29,9 +29,11 @@ RELIEF = (
     "Dashed: the limits."
 )
 NORMALS = (
-    "The cloud from behind and above the machine, coloured by n_y, the part of its normal across the drift (Fig. 10 of the "
-    "autonomous loading paper): blue is left wall, red is right wall, and where it is near zero there is pile or floor. A red and "
-    "a blue patch side by side on the face are the flanks of something that stands out of it."
+    "The cloud from behind and above the machine. The normal of a surface is the direction that it faces; n_y is the part of it "
+    "along the axis y, which points to the left (small axes: x into the pile, y to the left, z up). The left wall faces right "
+    "(n_y = -1, blue), the right wall faces left (n_y = +1, red), pile and floor face the machine or the roof (n_y near 0, pale). "
+    "A red and a blue patch side by side on the face are the flanks of something that stands out. As Fig. 10 of the paper on "
+    "autonomous loading."
 )
 CONVERGENCE = "How the estimate came about on the way to the pile, bands of two standard deviations; dashed: where it was decided."
 _MEANING = {
@@ -48,19 +50,32 @@ def write_pile_report(report: PileReport, path: Path, title: str) -> None:
     path.write_text(markup.document(title, pile_sections(report, drawn=True)), encoding="utf-8")
 
 
-def pile_sections(report: PileReport, *, drawn: bool = False) -> str:
+def unsought_section(reason: str, warnings: Collection[str] = ()) -> str:
+    """Return the section where nothing can be said of a pile, because `reason`."""
+    words = markup.paragraph(reason[:1].upper() + reason[1:] + ".")
+    return markup.section("Ore pile", words + markup.listed(warnings, "warning"))
+
+
+def pile_sections(report: PileReport, *, drawn: bool = False, said: Collection[str] = ()) -> str:
     """Return the sections as markup: for a page of their own, and within another.
 
-    `drawn`: with pictures also where the last estimate is none, to see why.
+    `drawn`: with pictures also where the last estimate is none, to see why; `said`: warnings that the page has already.
     """
-    pile = report.last.estimate if report.last is not None else PileEstimate()
-    parts = [markup.section("Ore pile", markup.cards(_figures(report, pile)) + markup.listed(pile.warnings, "warning"))]
+    pile = report.last.estimate if report.last is not None else report.estimate
+    warned = [text for text in dict.fromkeys((*report.warnings, *pile.warnings)) if text not in said]
+    if pile.status is None:
+        return unsought_section(pile.reason, warned)
+    parts = [markup.section("Ore pile", markup.cards(_figures(report)) + markup.listed(warned, "warning"))]
     if not pile.found or (pile.status == "none" and not drawn):
-        words = "No face was found that closes the drift, so there is nothing to draw.\n"
-        return "".join([*parts, f"<p>{words}</p>\n"])
+        return "".join(
+            [*parts, markup.paragraph("No face was found that closes the drift, so there is nothing to draw.")]
+        )
+    if pile.status == "none":
+        words = "What stands ahead is drawn all the same, so that one sees why it is none; face and toe are what a fit made of it."
+        parts.append(markup.paragraph(words))
     with charts.styled():
         if len(pile.face_m) and np.isfinite([pile.left_limit_m, pile.right_limit_m]).all():
-            parts.append(markup.section("The pile from above", _picture(pile_charts.above_chart(report, pile), ABOVE)))
+            parts.append(markup.section("From above", _picture(pile_charts.above_chart(report, pile), ABOVE)))
             parts.append(markup.section("The face from the side", _picture(pile_charts.cut_chart(report, pile), CUT)))
             parts.append(
                 markup.section("The face from the machine", _picture(pile_charts.relief_chart(report, pile), RELIEF))
@@ -85,10 +100,10 @@ def _over(heights_m: tuple[float, float]) -> str:
     return f", seen from {max(low, 0.0):.1f} to {high:.1f} m over the floor" if math.isfinite(high) else ""
 
 
-def _figures(report: PileReport, pile: PileEstimate) -> Iterator[tuple[str, str, str]]:
-    """Yield name, value and meaning of the headline figures; ± is one standard deviation."""
-    chance = 100.0 * pile.probabilities.get(pile.status, 0.0)
-    yield "status", pile.status.replace("_", " "), f"{_MEANING[pile.status]}; probability {chance:.0f} %"
+def _figures(report: PileReport) -> Iterator[tuple[str, str, str]]:
+    """Yield name, value and meaning of the headline figures; ± is one standard deviation; of none there are no measures."""
+    pile = report.estimate
+    yield "status", _words(pile), _status_meaning(pile)
     if pile.found:
         width = f"{_deviation(pile.width_std_m, 2, ' m')}, one standard deviation; wall to wall before the face"
         yield "width", f"{pile.width_m:.2f} m", width
@@ -98,14 +113,29 @@ def _figures(report: PileReport, pile: PileEstimate) -> Iterator[tuple[str, str,
         volume = f"{_deviation(pile.volume_std_m3, 1, ' m³')}; above the floor, as far up as the face was seen"
         yield "volume", f"{pile.volume_m3:.1f} m³", volume
     if report.decision is not None:
-        distance = report.decision.distance_m
-        status = report.decision.estimate.status.replace("_", " ")
-        yield "decided", f"{distance:.1f} m", f"before the toe, as {status}"
-    else:
-        yield "decided", "no", "not identified: no status was sure enough"
+        distance, status = f"{report.decision.distance_m:.1f} m", _words(report.decision.estimate)
+        meaning = (
+            f"decided {distance} before the toe, the foot of the pile: so far away the machine was when it was sure enough that "
+            f"this is {status}; what it saw later went into the figures"
+        )
+        yield "before the pile", distance, meaning
+    elif pile.status != "none":
+        yield "decided", "no", f"it was never sure enough that it is {_words(pile)}"
     if pile.found:
         sizes = ", ".join(f"{rock.size_m:.1f} m" for rock in pile.boulders)
         yield "boulders", str(len(pile.boulders)), sizes or "nothing oversized stands out of the face"
+
+
+def _words(pile: PileEstimate) -> str:
+    return "unknown" if pile.status is None else pile.status.replace("_", " ")
+
+
+def _status_meaning(pile: PileEstimate) -> str:
+    """Return what the status means, with its probability where that is what the status follows from."""
+    shares, status = pile.probabilities, pile.status or "none"
+    if status == "none" and shares.get(status, 0.0) < max(shares.values(), default=0.0):
+        return "what lies ahead is not known well enough to be called anything"
+    return f"{_MEANING[status]}; probability {100.0 * shares.get(status, 0.0):.0f} %"
 
 
 def _tables(pile: PileEstimate) -> str:
@@ -129,7 +159,7 @@ def _piles(report: PileReport) -> str:
     """Return a row for each pile or wall that was decided, in the order of time."""
     rows = [
         (
-            one.last.estimate.status.replace("_", " ") + (" (the one above)" if one.last is report.last else ""),
+            _words(one.last.estimate) + (" (the one above)" if one.last is report.last else ""),
             f"{one.last.estimate.width_m:.2f} {_deviation(one.last.estimate.width_std_m, 2, '')}",
             f"{one.last.estimate.inclination_deg:.1f} {_deviation(one.last.estimate.inclination_std_deg, 1, '')}",
             f"{one.decision.distance_m:.1f}",

@@ -6,6 +6,7 @@ Entities: `map/pile/…`, `map/around` (static), `pile/…` (curves of the estim
 from __future__ import annotations
 
 import math
+from collections.abc import Collection
 from pathlib import Path
 from typing import Any
 
@@ -22,6 +23,13 @@ CURVES = (
     ("Inclination, deg", ("pile/inclination/**",)),
     ("Probability", ("pile/probability/**",)),
 )
+_LEGEND = {
+    "face": ("points, red to blue", "the pile's face: stands out of the fit, lies behind it"),
+    "toe": ("pink line", "toe, the foot of the pile"),
+    "limits": ("yellow points E_L, E_R", "left and right limit of the pile"),
+    "boulders": ("orange ball", "boulder, with its size"),
+    "attack": ("green arrow", "where to drive into the pile"),
+}
 _PROUD_M = 0.5  # end of the colours
 _ARROW_M = 2.5
 _DIVERGING = np.array([[67, 147, 195], [240, 240, 240], [214, 96, 77]], dtype=float)
@@ -36,26 +44,32 @@ def write_pile_recording(report: PileReport, path: Path, title: str) -> None:
         add_pile(writer, report, report.around_m)
 
 
-def add_pile(writer: RecordingWriter, report: PileReport, around_m: FloatArray | None = None) -> None:
-    """Add the last estimate and its course to a recording; nothing is drawn where no face was found.
+def add_pile(
+    writer: RecordingWriter, report: PileReport, around_m: FloatArray | None = None, said: Collection[str] = ()
+) -> None:
+    """Add the last estimate and its course to a recording; nothing is drawn where it is none.
 
-    `around_m` (N, 3): hits around the pile, where the recording has no cloud of its own.
+    `around_m` (N, 3): hits around the pile, where the recording has no cloud of its own; `said`: texts that are in it already.
     """
     writer.curves = (*writer.curves, *CURVES)
     _add_course(writer, report)
     for one in report.piles:
         writer.add_text(f"pile decided: {one.decision.estimate.status}", one.decision.stamp_ns, "INFO")
-    if report.last is None or not report.last.estimate.found:
+    pile = report.estimate
+    if not pile.found:
         return
-    pile = report.last.estimate
     writer.widen(np.vstack([pile.toe_m, pile.face_m]))
     for text in pile.warnings:
-        writer.add_text(text)
+        if text not in said:
+            writer.add_text(text)
     for name, shape in _shapes(pile).items():
         writer.add_shape(f"map/pile/{name}", shape)
+        if name in _LEGEND:
+            writer.explain(*_LEGEND[name])
     normals = normal_cloud(report, pile)
     if len(normals.across):
         writer.add_shape("map/pile/n_y", _dots(normals.points_m, across_colours(normals.across), 2.0))
+        writer.explain("points, dark blue and dark red", "walls that face right (n_y = -1) and left (n_y = +1)")
     if around_m is not None and len(around_m):
         writer.add_shape("map/around", _dots(around_m))
         writer.widen(around_m)

@@ -12,7 +12,7 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
-from typing import Any, Self
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 import numpy.typing as npt
@@ -22,16 +22,26 @@ from lhdmap.integration.cloud import Cloud
 from lhdmap.machine import Machine
 from lhdmap.mapfolder import Diagnostics
 from lhdmap.messages import Float32Array, FloatArray
-from lhdmap.report.data import ReportData
+from lhdmap.names import in_utf8, shown
 from lhdmap.report.recording_end import load_quietly, write_out
-from lhdmap.report.recording_layout import RUN_CURVES, blueprint
+from lhdmap.report.recording_layout import RUN_CURVES, blueprint, whole_of
 from lhdmap.settings import setting
 from lhdmap.trajectory import Trajectory
 
 APPLICATION = "lhdmap"
 TIMELINE = "time"
+SCAN = 0xF2F2F2FF
 Stamps = npt.NDArray[np.int64]
 _VIRIDIS = np.array([[59, 82, 139], [33, 145, 140], [94, 201, 98], [253, 231, 37]], dtype=float)
+
+
+class PathStyle(NamedTuple):
+    """How a path is drawn: its name, its colour (in a word, and as 0xRRGGBBAA), and at which share of it the name stands."""
+
+    label: str
+    colour: str
+    rgba: int
+    label_at: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,6 +89,7 @@ class RecordingWriter:
         self._floor: tuple[Stamps, FloatArray] | None = None
         self._bounds: FloatArray | None = None
         self._drawn: set[str] = set()
+        self._legend: dict[str, None] = {}  # in the order of the first mention
         self.curves = RUN_CURVES
         self._scans: deque[tuple[int, FloatArray, str]] = deque()
         loader = ThreadPoolExecutor(max_workers=1, thread_name_prefix="recording")
@@ -119,23 +130,33 @@ class RecordingWriter:
         while self._scans:
             stamp_ns, points_map, name = self._scans.popleft()
             self._at(stamp_ns)
-            points = self._rr.Points3D(points_map, colors=0xE69F00FF, radii=self._points_px(2.0))
+            points = self._rr.Points3D(points_map, colors=SCAN, radii=self._points_px(2.0))
             self._stream.log(f"map/scan/{name}", points)
+            self.explain("white points", "the newest scan")
 
     def add_text(self, text: str, stamp_ns: int | None = None, level: str = "WARN") -> None:
         """Record a line of the text log; one without a stamp stands at the start."""
         self._at(self._start_ns if stamp_ns is None else stamp_ns)
-        self._stream.log("log", self._rr.TextLog(text, level=level))
+        self._stream.log("log", self._rr.TextLog(shown(text), level=level))
 
     def add_shape(self, entity: str, shape: Any) -> None:
         """Record something that is there all the time."""
         self._stream.log(entity, shape, static=True)
 
-    def add_path(self, name: str, trajectory: Trajectory, rgba: int) -> None:
-        """Record a whole trajectory as a line, 0xRRGGBBAA."""
-        step = max(1, len(trajectory.positions_m) // 5000)
-        line = self._rr.LineStrips3D([trajectory.positions_m[::step]], colors=rgba, radii=self._points_px(1.2))
+    def add_path(self, name: str, trajectory: Trajectory, drawn: PathStyle) -> None:
+        """Record a whole trajectory as a line that carries its name."""
+        positions = trajectory.positions_m
+        step = max(1, len(positions) // 5000)
+        line = self._rr.LineStrips3D([positions[::step]], colors=drawn.rgba, radii=self._points_px(1.4))
         self._stream.log(f"map/path/{name}", line, static=True)
+        at = positions[int(drawn.label_at * (len(positions) - 1))]
+        label = self._rr.Points3D([at], colors=drawn.rgba, radii=self._points_px(3.0), labels=[drawn.label])
+        self._stream.log(f"map/path/{name}/name", label, static=True)
+        self.explain(f"{drawn.colour} line", drawn.label)
+
+    def explain(self, drawn: str, meaning: str) -> None:
+        """Add a line to the legend, once: what it looks like and what it is."""
+        self._legend.setdefault(f"| {drawn} | {meaning} |")
 
     def add_motion(self, trajectory: Trajectory, machine: Machine) -> None:
         """Record the final trajectory: the machine moves along it, and the cloud is coloured by height over it."""
@@ -174,7 +195,8 @@ class RecordingWriter:
             size = self._points_px(self._settings.point_size_px)
             part = self._rr.Points3D(cloud.points_m[rows], colors=colours[rows], radii=size)
             self._stream.log(f"map/cloud/{number:03d}", part)
-        self.widen(np.percentile(cloud.points_m[:: max(1, len(cloud) // 20_000)], [0.5, 99.5], axis=0))
+        self.explain("points, blue to yellow", "the map, by height over the floor")
+        self.widen(whole_of(cloud.points_m))
 
     def add_curve(self, entity: str, stamps_ns: Stamps, values: FloatArray, rgba: int, name: str) -> None:
         """Record a curve over time: stamps (M,), values (M,)."""
@@ -183,7 +205,7 @@ class RecordingWriter:
         self._stream.send_columns(entity, [self._times(stamps_ns)], self._rr.Scalars.columns(scalars=values))
 
     def add_diagnostics(self, found: Diagnostics) -> None:
-        """Record the standard deviations that the information stands for, residual, flags and slip."""
+        """Record the standard deviations that the information stands for, residual and flags."""
         stamps = found.stamp_ns
         along, across, heading = (
             1.0 / np.sqrt(np.maximum(values, 1e-12))
@@ -194,11 +216,9 @@ class RecordingWriter:
         self.add_curve("scan_match/deviation/heading", stamps, 1e3 * heading, 0x009E73FF, "heading, mrad")
         self.add_curve("scan_match/weak", stamps, found.degenerate.astype(float), 0xCC79A7FF, "direction not observed")
         self.add_curve("scan_match/residual", stamps, 1e3 * found.residual, 0x999999FF, "residual, mm")
-        if np.isfinite(found.slip).any():
-            self.add_curve("motion/slip", stamps, 100.0 * found.slip, 0xD55E00FF, "slip, %")
 
     def close(self) -> None:
-        """Add the layout of the viewer and close the file.
+        """Add the legend and the layout of the viewer and close the file.
 
         Raises:
             InputError: it could not be written.
@@ -206,8 +226,13 @@ class RecordingWriter:
         if self._failed:
             return
         self._log_scans()
+        if self._legend:
+            words = "\n".join(["| drawn | what it is |", "| --- | --- |", *self._legend])
+            self.add_shape("legend", self._rr.TextDocument(words, media_type="text/markdown"))
         used = tuple(view for view in self.curves if any(self._has(entity) for entity in view[1]))
-        self._stream.send_blueprint(blueprint(self._bounds, self._end_ns - self._start_ns, used))
+        self._stream.send_blueprint(
+            blueprint(self._bounds, self._end_ns - self._start_ns, used, legend=bool(self._legend))
+        )
         try:
             write_out(self._stream, self._path)
         except InputError:
@@ -233,6 +258,7 @@ class RecordingWriter:
         """Record boxes (K, 2, 3) of lower and upper corners, fixed to their parent entity."""
         if len(corners_m):
             sizes, centres = corners_m[:, 1] - corners_m[:, 0], corners_m.mean(axis=1)
+            self.explain("yellow boxes", "the machine")
             boxes = self._rr.Boxes3D(centers=centres, sizes=sizes, colors=0xF0C419FF, fill_mode="solid")
             self._stream.log(entity, boxes, static=True)
 
@@ -252,8 +278,10 @@ class RecordingWriter:
 def _open(path: Path, title: str, start_ns: int) -> tuple[Any, Any]:
     """Return the module of Rerun, and a stream into the file; what goes wrong is told by `close`, in our words."""
     rr = load_quietly()
+    title = shown(title)
     stream = rr.RecordingStream(APPLICATION, recording_id=f"{title} {start_ns}")
-    stream.save(path)
+    with in_utf8(path) as written:  # it is open from here on
+        stream.save(written)
     stream.send_recording_name(title)
     stream.log("map", rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
     return rr, stream
@@ -264,23 +292,3 @@ def _palette() -> npt.NDArray[np.uint32]:
     steps = np.linspace(0, len(_VIRIDIS) - 1, 256)
     r, g, b = (np.interp(steps, range(len(_VIRIDIS)), _VIRIDIS[:, i]).astype(np.uint32) for i in range(3))
     return r << 24 | g << 16 | b << 8 | np.uint32(255)
-
-
-def record_run(writer: RecordingWriter, data: ReportData, machine: Machine) -> None:
-    """Record all that a finished run knows; the scans and texts of the run itself are in `writer` already."""
-    writer.add_motion(data.trajectory, machine)
-    writer.add_path("final", data.trajectory, 0x2F86C9FF)
-    if data.odometry is not None:
-        writer.add_path("odometry", data.odometry, 0xE69F00FF)
-    if data.articulation is not None and len(data.articulation.stamps_ns):
-        writer.add_articulation(*data.articulation, machine)
-    if data.cloud is not None:
-        writer.add_cloud(data.cloud)
-    if data.odometry_speed is not None:
-        writer.add_curve("motion/speed/odometry", *data.odometry_speed, 0x2F86C9FF, "odometry, m/s")
-    if data.tachometer_speed is not None:
-        writer.add_curve("motion/speed/tachometer", *data.tachometer_speed, 0xD55E00FF, "tachometer, m/s")
-    if data.diagnostics is not None and len(data.diagnostics.stamp_ns):
-        writer.add_diagnostics(data.diagnostics)
-    for text in data.warnings:
-        writer.add_text(text)

@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from typing import Any
 
 import numpy as np
 
-from lhdmap.messages import FloatArray
+from lhdmap.messages import Float32Array, FloatArray
 
-FIELD_OF_VIEW_RAD, PLAN_ASPECT = 0.9, 2.5
+FIELD_OF_VIEW_RAD = 0.9  # of the viewer, upright
+ASPECT, PLAN_ASPECT = 1.6, 2.5  # of the two views in a window of usual shape
+_MARGIN = 1.06
+_STRAY = 0.5  # of the map's extent: points that are farther away than this do not count for the view
 Curves = tuple[tuple[str, tuple[str, ...]], ...]
 RUN_CURVES: Curves = (
     ("Speed, m/s", ("motion/speed/**",)),
@@ -20,7 +24,7 @@ RUN_CURVES: Curves = (
 LOG_CURVES: Curves = (("Speed, m/s", ("motion/speed/**",)), ("Angles, deg", ("angles/**",)))
 
 
-def blueprint(bounds_m: FloatArray | None, duration_ns: int, curves: Curves) -> Any:
+def blueprint(bounds_m: FloatArray | None, duration_ns: int, curves: Curves, *, legend: bool = False) -> Any:
     """Return the layout for a map within `bounds_m` (lower and upper corner, (2, 3); None: not known) and its drive.
 
     It opens at the end of the drive, where the whole cloud is seen; the views of `curves` (name and entities of each)
@@ -37,7 +41,11 @@ def blueprint(bounds_m: FloatArray | None, duration_ns: int, curves: Curves) -> 
         row_shares=[3, 2],
     )
     plots = [rrb.TimeSeriesView(name=name, contents=list(entities), axis_x=whole) for name, entities in curves]
-    column = rrb.Vertical(*plots, rrb.TextLogView(name="Texts", origin="log"))
+    groups = [rrb.Vertical(*group, name=name) for name, group in (("Drive", plots[:4]), ("Pile", plots[4:])) if group]
+    middle = [rrb.Tabs(*groups) if len(groups) > 1 else group for group in groups[:1]]
+    words = [rrb.TextDocumentView(name="What is drawn", origin="legend")] if legend else []
+    shares = [2.0] * len(words) + [float(min(len(plots), 4))] * len(middle) + [1.0]
+    column = rrb.Vertical(*words, *middle, rrb.TextLogView(name="Texts", origin="log"), row_shares=shares)
     return rrb.Blueprint(
         rrb.Horizontal(views, column, column_shares=[2, 1]),
         rrb.TimePanel(state="collapsed", timeline="time", play_state="following"),
@@ -47,14 +55,33 @@ def blueprint(bounds_m: FloatArray | None, duration_ns: int, curves: Curves) -> 
 
 
 def _eye(bounds_m: FloatArray | None, *, oblique: bool) -> Any:
-    """Return an eye far enough away to see the bounds, from the south and above or from straight above."""
+    """Return an eye that sees the bounds whole, from the south and above or from straight above."""
     import rerun.blueprint as rrb
 
     if bounds_m is None:
         return None
-    target, span = bounds_m.mean(axis=0), np.maximum(bounds_m[1] - bounds_m[0], 5.0)
-    half_height = 0.48 * float(np.linalg.norm(span)) if oblique else 0.57 * max(span[1], span[0] / PLAN_ASPECT)
-    away = half_height / math.tan(FIELD_OF_VIEW_RAD / 2)
-    direction = np.array([-0.35, -0.75, 0.55]) if oblique else np.array([0.0, -1e-3, 1.0])
-    position = target + away * direction / np.linalg.norm(direction)
+    position, target = eye_of(bounds_m, oblique=oblique)
     return rrb.EyeControls3D(position=position, look_target=target, eye_up=(0, 0, 1) if oblique else (0, 1, 0))
+
+
+def eye_of(bounds_m: FloatArray, *, oblique: bool) -> tuple[FloatArray, FloatArray]:
+    """Return where the eye is (3,) and what it looks at (3,), so near that all corners of the bounds (2, 3) are just seen."""
+    target, span = bounds_m.mean(axis=0), np.maximum(bounds_m[1] - bounds_m[0], 5.0)
+    back = np.array([-0.35, -0.75, 0.55]) if oblique else np.array([0.0, -1e-3, 1.0])
+    back /= np.linalg.norm(back)
+    right = np.cross([0.0, 0.0, 1.0] if oblique else [0.0, 1.0, 0.0], back)
+    right /= np.linalg.norm(right)
+    corners = 0.5 * span * np.array(list(itertools.product((-1.0, 1.0), repeat=3)))
+    upright = math.tan(FIELD_OF_VIEW_RAD / 2)
+    across = np.abs(corners @ right) / (upright * (ASPECT if oblique else PLAN_ASPECT))
+    high = np.abs(corners @ np.cross(back, right)) / upright
+    away = float((np.maximum(across, high) + corners @ back).max())
+    return target + _MARGIN * away * back, target
+
+
+def whole_of(points_m: Float32Array) -> FloatArray:
+    """Return lower and upper corner (2, 3) of points (N, 3): of all of them, unless a few stray ones are far from the rest."""
+    low, high = points_m.min(axis=0).astype(float), points_m.max(axis=0).astype(float)
+    core = np.percentile(points_m[:: max(1, len(points_m) // 20_000)], [0.5, 99.5], axis=0)
+    reach = _STRAY * np.maximum(core[1] - core[0], 5.0)
+    return np.array([np.maximum(low, core[0] - reach), np.minimum(high, core[1] + reach)])

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from lhdmap.report import charts, markup, rockbreaker_charts
+from lhdmap.rockbreaker.table import UNITS
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -18,7 +19,10 @@ if TYPE_CHECKING:
     from lhdmap.rockbreaker.plan import Trajectory
     from lhdmap.rockbreaker.rocks import Scene
 
-WAY = "Way of the tip from above, start as a dot, end as a square; the rectangle is the grizzly."
+WAY = (
+    "Way of the tip from above, start as a dot, end as a square; the rectangle is the grizzly. Grey rocks fall through its "
+    "openings, orange ones do not; the outlined one is the target."
+)
 TIP = "Tip over time, as Fig. 7 of the paper."
 CYLINDERS = "Lengths of the cylinders, as Fig. 8 (a) and (b)."
 FLOWS = "Flow through valves and pump over their limits, as Fig. 8 (c) and (d). Where a curve touches 1, that valve sets the pace."
@@ -27,7 +31,10 @@ SPEED = (
     "is not used."
 )
 PHI = "Orientation of the breaker along the path, and the region that the cylinders allow, as Fig. 4."
-SIDE = "The arm from the side, in the plane of its booms, from the start (pale) to the end."
+SIDE = (
+    "The arm from the side, in the plane of its booms, each step from its start (pale) to its end. Bars and rocks are drawn at "
+    "their distance from the swing axis; the bars along the middle of the grizzly."
+)
 
 
 def write_plan_report(
@@ -44,6 +51,7 @@ def write_plan_report(
     if rows is not None:
         with charts.styled():
             parts += list(_pictures(trajectories, rows, scene))
+        parts.append(markup.section("Columns of trajectory.csv", _columns()))
     path.write_text(markup.document("Rockbreaker plan", "".join(parts)), encoding="utf-8")
 
 
@@ -78,7 +86,9 @@ def _figures(values: Mapping[str, Any]) -> Iterator[tuple[str, str, str]]:
     if not values["feasible"]:
         return
     duration_s, bound_s = values["duration_s"], values["bound_s"]
-    yield "duration", f"{duration_s:.2f} s", "from rest to rest"
+    parts = [f"{step['duration_s']:.2f} s" for step in values.get("steps") or ()]
+    steps = f": step 1 {parts[0]}, step 2 {parts[1]}" if len(parts) > 1 else ""
+    yield "duration", f"{duration_s:.2f} s", f"from rest to rest{steps}"
     times = f"{duration_s / max(bound_s, 1e-9):.2f} times that"
     yield "any-path bound", f"{bound_s:.2f} s", f"no path and no timing is faster; this plan takes {times}"
     highest = f"highest flow over its limit {values['max_flow_ratio']:.4f}"
@@ -89,12 +99,24 @@ def _figures(values: Mapping[str, Any]) -> Iterator[tuple[str, str, str]]:
 
 
 def _pictures(trajectories: Sequence[Trajectory], rows: FloatArray, scene: Scene | None) -> Iterator[str]:
-    draw, machine, last = rockbreaker_charts, trajectories[0].path.machine, trajectories[-1]
-    way = ((draw.plan_chart(trajectories, machine, scene), WAY), (draw.side_chart(trajectories, machine), SIDE))
-    times = ((draw.tip_chart(rows), TIP), (draw.cylinder_chart(rows), CYLINDERS), (draw.flow_chart(rows), FLOWS))
-    along = ((draw.speed_chart(last), SPEED), (draw.orientation_chart(last), PHI))
-    for title, pictures in (("Way", way), ("Over time", times), ("Along the path", along)):
-        yield markup.section(title, "".join(_picture(figure, caption) for figure, caption in pictures))
+    draw, machine = rockbreaker_charts, trajectories[0].path.machine
+    way = ((draw.plan_chart(trajectories, machine, scene), WAY), (draw.side_chart(trajectories, machine, scene), SIDE))
+    charts_over_time = ((draw.tip_chart, TIP), (draw.cylinder_chart, CYLINDERS), (draw.flow_chart, FLOWS))
+    times = tuple((chart(rows, trajectories), caption) for chart, caption in charts_over_time)
+    yield _section("Way", way)
+    yield _section("Over time", times)
+    for number, one in enumerate(trajectories):
+        step = f", {draw.step_name(number)}" if len(trajectories) > 1 else ""
+        yield _section(f"Along the path{step}", ((draw.speed_chart(one), SPEED), (draw.orientation_chart(one), PHI)))
+
+
+def _section(title: str, pictures: Sequence[tuple[Figure, str]]) -> str:
+    return markup.section(title, "".join(_picture(figure, caption) for figure, caption in pictures))
+
+
+def _columns() -> str:
+    """Return what the columns of the table are."""
+    return markup.table(("column", "unit and meaning"), list(UNITS.items()))
 
 
 def _picture(figure: Figure, caption: str) -> str:

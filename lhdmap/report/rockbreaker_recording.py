@@ -17,7 +17,7 @@ from lhdmap.report.recording import RecordingWriter
 from lhdmap.rockbreaker.collision import Obstacles
 from lhdmap.rockbreaker.machine import JOINTS, Rockbreaker
 from lhdmap.rockbreaker.plan import Trajectory
-from lhdmap.rockbreaker.rocks import Scene
+from lhdmap.rockbreaker.rocks import Rock, Scene
 from lhdmap.rockbreaker.table import COLUMNS
 
 CURVES = (
@@ -27,6 +27,8 @@ CURVES = (
 )
 _COLOURS = (0x2F86C9FF, 0xE69F00FF, 0x009E73FF, 0xD55E00FF, 0xCC79A7FF)
 _LINKS = (0x8A949EFF, 0xF0C419FF, 0xF0C419FF, 0xD55E00FF)
+_WAYS = (("blue", 0x2F86C9FF), ("green", 0x009E73FF))
+_AT_TARGET_M = 0.05
 _BAR_M = 0.5
 _MOST_POINTS = 60_000
 
@@ -39,9 +41,9 @@ def write_plan_recording(
     with RecordingWriter(path, "Rockbreaker", 0) as writer:
         writer.curves = CURVES
         _add_arm(writer, machine, rows)
-        _add_surroundings(writer, machine, scene, obstacles)
+        _add_surroundings(writer, machine, scene, obstacles, trajectories[-1].way_m()[-1])
         for number, one in enumerate(trajectories):
-            _add_way(writer, f"map/tip/{number}", one.way_m())
+            _add_way(writer, number, one.way_m())
         stamps = np.round(1e9 * rows[:, 0]).astype(np.int64)
         for group, names in (
             ("flow", ("q1", "q2", "q3", "q4", "qp")),
@@ -82,8 +84,14 @@ def _link(machine: Rockbreaker, joint: int, length_m: float) -> Any:
     )
 
 
-def _add_surroundings(writer: RecordingWriter, machine: Rockbreaker, scene: Scene | None, obstacles: Obstacles) -> None:
-    """Add grizzly, rocks, cloud and boxes."""
+def _is_at(rock: Rock, end_m: FloatArray) -> bool:
+    return bool(np.hypot(*(rock.top_m - end_m)[:2]) < _AT_TARGET_M)
+
+
+def _add_surroundings(
+    writer: RecordingWriter, machine: Rockbreaker, scene: Scene | None, obstacles: Obstacles, end_m: FloatArray
+) -> None:
+    """Add grizzly, rocks, cloud and boxes; the rock under the tip's end (3,) is the target."""
     import rerun as rr
 
     writer.widen(np.array([[0.0, 0.0, machine.base.height_m]]))
@@ -93,7 +101,11 @@ def _add_surroundings(writer: RecordingWriter, machine: Rockbreaker, scene: Scen
         half = [[0.5 * rock.length_m, 0.5 * rock.length_m, 0.5 * rock.height_m] for rock in scene.rocks]
         middles = [rock.top_m - [0.0, 0.0, 0.5 * rock.height_m] for rock in scene.rocks]
         colours = [0xD55E00FF if one else 0x8A949EFF for one in large]
-        writer.add_shape("map/rocks", rr.Ellipsoids3D(centers=middles, half_sizes=half, colors=colours))
+        names = ["target" if _is_at(rock, end_m) else "" for rock in scene.rocks]
+        rocks = rr.Ellipsoids3D(centers=middles, half_sizes=half, colors=colours, labels=names, show_labels=True)
+        writer.add_shape("map/rocks", rocks)
+        writer.explain("orange rock", "does not fall through the grizzly; the target has its name")
+        writer.explain("grey rock", "falls through")
     if obstacles.points_m is not None and len(obstacles.points_m):
         seen = _near_grizzly(obstacles.points_m, scene)
         seen = seen[:: max(1, len(seen) // _MOST_POINTS)]
@@ -126,8 +138,12 @@ def _bars(machine: Rockbreaker, scene: Scene | None) -> list[FloatArray]:
     return [np.column_stack([line, z]) for line, z in zip(lines, level, strict=True)]
 
 
-def _add_way(writer: RecordingWriter, entity: str, way: FloatArray) -> None:
+def _add_way(writer: RecordingWriter, number: int, way: FloatArray) -> None:
+    """Add the way of the tip in one step, with its name."""
     import rerun as rr
 
-    writer.add_shape(entity, rr.LineStrips3D([way], colors=0x2F86C9FF, radii=rr.Radius.ui_points(2.0)))
+    name, (colour, rgba) = f"step {number + 1}", _WAYS[number % len(_WAYS)]
+    line = rr.LineStrips3D([way], colors=rgba, radii=rr.Radius.ui_points(2.5), labels=[name], show_labels=True)
+    writer.add_shape(f"map/tip/{number}", line)
+    writer.explain(f"{colour} line", f"way of the tip, {name}")
     writer.widen(way)

@@ -64,7 +64,7 @@ def cloud_in_base(path: Path, machine: Rockbreaker) -> FloatArray:
     Raises:
         InputError: the file cannot be read, or holds no point.
     """
-    points = np.asarray(read_cloud(path).points_m, dtype=np.float64)
+    points = read_cloud(path).exact_m()
     points = points[np.isfinite(points).all(axis=1)]
     if not len(points):
         raise InputError(f"{path}: the cloud holds no point")

@@ -72,6 +72,20 @@ def test_without_an_inclinometer_it_says_that_none_was_looked_for(
     values, told = found(["pile", str(log), "-o", str(tmp_path / "out")], capsys)
     assert not values["identified"]
     assert "no inclinometer" in told
+    assert values["status"] is None
+    assert values["probabilities"] is None
+    assert "no inclinometer" in values["reason"]
+    assert json.loads((tmp_path / "out" / "pile.json").read_text(encoding="utf-8"))["status"] is None
+    page = (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
+    assert "No pile was looked for" in page
+    assert "100 %" not in page
+    assert main(["pile", str(log), "-o", str(tmp_path / "again")]) == 0
+    text = capsys.readouterr().out
+    assert "unknown: no pile was looked for" in text
+    assert "100 %" not in text
+    assert "none" not in text
+    assert main(["info", str(tmp_path / "again")]) == 0
+    assert "pile         unknown: no pile was looked for" in capsys.readouterr().out
 
 
 def test_a_pile_that_is_not_to_be_looked_for(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -79,3 +93,34 @@ def test_a_pile_that_is_not_to_be_looked_for(tmp_path: Path, capsys: pytest.Capt
     assert main(["pile", str(log), "-o", str(tmp_path / "out"), "--set", 'pile.method="off"']) == 2
     assert "pile.method" in capsys.readouterr().err
     assert not (tmp_path / "out").exists()
+
+
+def test_a_drift_that_goes_on_is_none_and_nothing_else(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    log = tmp_path / "drift.mcap"
+    assert main(["simulate", "drift", "--length", "40", "--roughness", "moderate", "-o", str(log), "--quiet"]) == 0
+    capsys.readouterr()
+    assert main(["pile", str(log), "-o", str(tmp_path / "out"), "--quiet"]) == 0
+    text = capsys.readouterr().out
+    assert "none: nothing closes the drift (" in text
+    assert "decided" not in text
+    assert "width" not in text
+
+
+def test_the_cloud_of_a_grizzly_gets_no_status(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    cloud = str(tmp_path / "g.ply")
+    assert main(["simulate", "grizzly", "--seed", "3", "-o", cloud, "--quiet"]) == 0
+    capsys.readouterr()
+    values, _ = found(["pile", cloud, "-o", str(tmp_path / "out")], capsys)
+    assert values["status"] is None
+    assert values["probabilities"] is None
+    assert "no drift is seen around it" in values["reason"]
+    assert all(values[name] is None for name in ("width_m", "inclination_deg", "volume_m3", "center_m"))
+    written = json.loads((tmp_path / "out" / "pile.json").read_text(encoding="utf-8"))
+    assert written["status"] is None
+    assert main(["pile", cloud, "--quiet"]) == 0
+    told = capsys.readouterr()
+    assert "unknown: the largest face stands at 8" in told.out
+    assert "%" not in told.out
+    assert "nan" not in told.out
+    assert "volume" not in told.out
+    assert told.err == ""

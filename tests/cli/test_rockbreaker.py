@@ -7,8 +7,12 @@ import json
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 from lhdmap.cli.main import main
+
+from tests.report.test_page import svgs
+from tests.report.test_page import words as words_of
 
 T1 = ["--from", "2.20,2.15,-1", "--to", "6.27,-2.15,-1"]
 KEYS = (
@@ -18,6 +22,7 @@ KEYS = (
 COLUMNS = [
     *("t_s", "sigma", "sigma_dot", "theta1_deg", "theta2_deg", "theta3_deg", "theta4_deg"),
     *("rho0_m", "rho1_m", "rho2_m", "rho3_m", "rho4_m", "x_m", "y_m", "z_m", "phi_deg", "q1", "q2", "q3", "q4", "qp"),
+    *("q1_l_per_min", "q2_l_per_min", "q3_l_per_min", "q4_l_per_min", "qp_l_per_min"),
 ]
 
 
@@ -49,10 +54,17 @@ def test_a_plan_says_all_that_is_promised_and_writes_its_table(
     assert float(rows[0]["theta1_deg"]) == pytest.approx(44.3415, abs=1e-4)
     assert float(rows[-1]["phi_deg"]) == pytest.approx(293.6, abs=1e-6)
     assert max(float(row["q3"]) for row in rows) == pytest.approx(1.0, abs=2e-3)
+    litres = np.trapezoid([float(row["qp_l_per_min"]) / 60.0 for row in rows], [float(row["t_s"]) for row in rows])
+    assert litres == pytest.approx(values["pump_volume_l"], rel=1e-3)
     names = {path.name for path in (tmp_path / "plan").iterdir()}
     assert {"plan.json", "trajectory.csv", "report.html", "recording.rrd"} <= names
     page = (tmp_path / "plan" / "report.html").read_text(encoding="utf-8")
     assert page.count("<img") == 7
+    assert "L/min, flow of the pump" in page
+    plan = json.loads((tmp_path / "plan" / "plan.json").read_text(encoding="utf-8"))
+    assert plan["csv"] == "trajectory.csv"
+    assert list(plan["csv_columns"]) == COLUMNS
+    assert str(tmp_path) not in json.dumps(plan)
 
 
 def test_what_cannot_be_planned_says_why_and_ends_with_1(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -95,17 +107,24 @@ def test_from_a_cloud_to_the_rock_in_it(tmp_path: Path, capsys: pytest.CaptureFi
     cloud = tmp_path / "grizzly.ply"
     scene = told(["simulate", "grizzly", "--seed", "2", "-o", str(cloud)], capsys)
     largest = max(scene["rocks"], key=lambda rock: float(rock["size_m"]))
-    words = ["rockbreaker", "plan", "--cloud", str(cloud), "--timing", "smooth", "-o", str(tmp_path / "plan")]
-    values = told(words, capsys)
+    asked = ["rockbreaker", "plan", "--cloud", str(cloud), "--timing", "smooth", "-o", str(tmp_path / "plan")]
+    values = told(asked, capsys)
     assert values["rock"]["top_m"][:2] == pytest.approx(largest["top_m"][:2], abs=0.15)
     assert "oversize" in values["rock"]["why"]
     assert len(values["steps"]) == 2
+    way, side, over_time = (
+        words_of(picture) for picture in svgs((tmp_path / "plan" / "report.html").read_text("utf-8"))[:3]
+    )
+    for text in ("step 1, straight", "step 2", f"target, {values['rock']['size_m']:.2f} m", "falls through"):
+        assert text in way
+    for text in ("bars of the grizzly", "target", "step 1", "step 2", "distance from the swing axis, m"):
+        assert text in side
+    assert "step 1" in over_time
+    assert "step 2" in over_time
     assert values["duration_s"] == pytest.approx(sum(step["duration_s"] for step in values["steps"]))
     assert values["clearance_m"] > 0.0
-    assert (
-        told([*words, "--path", "cslm", "--timing", "limit", "--no-pictures", "--force"], capsys)["limit_reached_at_s"]
-        > 0.0
-    )
+    bound = told([*asked, "--path", "cslm", "--timing", "limit", "--no-pictures", "--force"], capsys)
+    assert bound["limit_reached_at_s"] > 0.0
     assert main(["rockbreaker", "plan", "--cloud", str(cloud), "--no-pictures", "-o", str(tmp_path / "other")]) == 0
     assert "oversize" in capsys.readouterr().out
 

@@ -63,8 +63,12 @@ def test_stamps_that_run_backwards_keep_the_order_of_the_file() -> None:
 
 def test_no_common_stamp_says_how_far_apart_they_are_and_what_to_do() -> None:
     truth = straight(5.0)
-    with pytest.raises(InputError, match=r"nearest are 100\d* s apart .*--tolerance"):
+    with pytest.raises(InputError, match=r"nearest are 100\d* s apart .*share no time"):
         associate(truth._replace(stamps_ns=truth.stamps_ns + 102_000_000_000), truth)
+    with pytest.raises(InputError, match=r"nearest are 0\.005 s apart .*--tolerance"):
+        associate(truth._replace(stamps_ns=truth.stamps_ns + 5_000_000), truth, tolerance_ns=1_000_000)
+    with pytest.raises(InputError, match=r"estimate of one pose"):
+        associate(part(truth, slice(0, 1)), truth)
 
 
 def test_tolerance_bounds_the_distance_of_stamps() -> None:

@@ -88,7 +88,10 @@ def test_table_prints_the_figures_of_the_paper(capsys: pytest.CaptureFixture[str
         ("", "it is empty"),
         ("# only a comment\n", "it is empty"),
         (HEADER + "\n", "only the line with the column names"),
-        ("attempt;log;gt_width_m;gt_inclination_deg\n1;a.mcap;3;-50\n", "no column"),
+        ("attempt|log|gt_width_m|gt_inclination_deg\n1|a.mcap|3|-50\n", "no column attempt, gt_width_m"),
+        ("attempt,gt_width_m,gt_inclination_deg\n1,3,-50\n", "no column log (or pred_width_m"),
+        (HEADER + ",log\n1,a.mcap,3,-50,b\n", "the column log stands twice"),
+        ("attempt;log;gt_width_m;gt_inclination_deg\n1;a;1.234,5;-50\n", "gt_width_m is '1.234,5'"),
         (HEADER + "\n1,a.mcap,three,-50\n", "line 2: gt_width_m is 'three'"),
         (HEADER + "\n1,a.mcap,3,inf\n", "gt_inclination_deg is inf"),
         (HEADER + "\n1,a.mcap,-3,-50\n", "gt_width_m is -3"),
@@ -127,6 +130,62 @@ def test_signs_comments_and_blank_lines_of_other_tools_are_read(truth_file: Call
     path = truth_file("# a comment", "", " 1 , a.mcap , 3.0 ,\N{MINUS SIGN}50.0", header="\ufeff" + HEADER)
     (attempt,) = read_pile_truth(path).attempts
     assert attempt == Attempt("1", "a.mcap", Measured(3.0, -50.0), Measured())
+
+
+PREDICTIONS = ["1,3.0,-50.0,3.2,-51.5", "2,4.0,-40.0,,", "3,3.5,-45.0,3.5,-45.0"]
+NAMES = "attempt,gt_width_m,gt_inclination_deg,pred_width_m,pred_inclination_deg"
+VARIANTS = {
+    "no log": ("\n".join([NAMES, *PREDICTIONS]), "utf-8"),
+    "mark": ("\n".join([NAMES, *PREDICTIONS]), "utf-8-sig"),
+    "utf-16": ("\n".join([NAMES, *PREDICTIONS]), "utf-16"),
+    "line ends of DOS": ("\r\n".join([NAMES, *PREDICTIONS]), "utf-8"),
+    "semicolons": ("\n".join([NAMES, *PREDICTIONS]).replace(",", ";"), "utf-8"),
+    "decimal commas": ("\n".join([NAMES, *PREDICTIONS]).replace(",", ";").replace(".", ","), "utf-8"),
+    "tabs": ("# a comment, with a comma; and more\n" + "\n".join([NAMES, *PREDICTIONS]).replace(",", "\t"), "utf-8"),
+    "quotes": ("\n".join([NAMES, '1,"3,0","-50,0","3,2","-51,5"', *PREDICTIONS[1:]]), "utf-8"),
+    "more columns": ("\n".join([f"note,{NAMES.upper()},,", *(f"x,{line},," for line in PREDICTIONS)]), "utf-8"),
+    "empty cells": ("\n".join([NAMES, PREDICTIONS[0] + ",,", "2,4.0,-40.0", "", ",,,,", PREDICTIONS[2]]), "utf-8"),
+    "words for nothing": ("\n".join([NAMES, PREDICTIONS[0], "2,4.0,-40.0,n/a,null", PREDICTIONS[2]]), "utf-8"),
+}
+
+
+@pytest.mark.parametrize("name", VARIANTS)
+def test_a_table_as_others_write_it_gives_the_same_figures(
+    name: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    content, encoding = VARIANTS[name]
+    (tmp_path / "truth.csv").write_bytes(content.encode(encoding))
+    assert main(["eval", "pile", "--truth", str(tmp_path / "truth.csv"), "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert (found["n"], found["identified"], found["was_run"]) == (3, 2, False)
+    assert found["width_mae_m"] == pytest.approx(0.1)
+    assert found["inclination_mae_deg"] == pytest.approx(0.75)
+
+
+def test_statuses_are_read_as_they_are_spoken(truth_file: Callable[..., Path]) -> None:
+    names = "attempt,gt_width_m,gt_inclination_deg,gt_status,pred_status"
+    path = truth_file("1,3,-20,Too shallow,too-shallow", "2,3,-88,Hang-up,HANG_UP", header=names)
+    found = PileEvaluation(tuple(evaluate_pile(read_pile_truth(path))), was_run=False)
+    assert found.status.accuracy == 1.0
+
+
+def test_only_what_has_no_prediction_is_run(
+    truth_file: Callable[..., Path], monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    asked: list[str] = []
+
+    def run(log: Path) -> PileReport:
+        asked.append(log.name)
+        return _report(3.15, -51.5)
+
+    names = HEADER + ",pred_width_m,pred_inclination_deg"
+    path = truth_file("1,a.mcap,3.0,-50.0,3.0,-50.0", "2,b.mcap,3.0,-50.0,,", "3,,3.0,-50.0,,", header=names)
+    monkeypatch.setattr(eval_pile, "_runner", lambda _: run)
+    assert main(["eval", "pile", "--truth", str(path), "--json", "--at", "decision"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert asked == ["b.mcap"]
+    assert [row["pred_width_m"] for row in found["rows"]] == [3.0, 3.15, None]
+    assert found["was_run"]
 
 
 def test_logs_are_run_beside_the_file_and_one_that_fails_does_not_end_it(truth_file: Callable[..., Path]) -> None:
@@ -231,3 +290,15 @@ def test_figures_agree_with_plain_arithmetic(values: list[tuple[float, float, fl
         assert summary.p90 is not None
         assert summary.max is not None
         assert summary.median <= summary.p90 <= summary.max
+
+
+def test_a_pile_that_was_not_looked_for_is_null_and_counts_for_nothing(truth_file: Callable[..., Path]) -> None:
+    path = truth_file("1,a,3.0,-50.0,loadable", "2,b,,,none", header=HEADER + ",gt_status")
+    reports = {"a": _report(3.0, -50.0), "b": PileReport(None, None, reason="no pile was looked for: no inclinometer")}
+    rows = evaluate_pile(read_pile_truth(path), lambda log: reports[log.name])
+    found = PileEvaluation(tuple(rows), was_run=True).to_json()
+    assert [row["pred_status"] for row in found["rows"]] == ["loadable", None]
+    assert "inclinometer" in found["rows"][1]["reason"]
+    assert found["rows"][1]["problem"] is None
+    assert found["status_n"] == 1
+    assert found["status_accuracy"] == 1.0

@@ -13,6 +13,7 @@ from lhdmap.errors import InputError
 from lhdmap.logs import LogSource, open_log
 from lhdmap.logs.carmen_lines import flaser, robotlaser, stamp_of
 from lhdmap.logs.carmen_survey import no_return_limit
+from lhdmap.logs.health import examine
 from lhdmap.messages import GroundTruth, LaserScan, Mount, WheelPose
 
 
@@ -21,13 +22,47 @@ def _flaser(count: int, laser: str = "0 0 0", robot: str = "0 0 0") -> bytes:
 
 
 @pytest.mark.parametrize(
-    ("count", "step_deg", "last_deg"), [(180, 1.0, 89.0), (181, 1.0, 90.0), (360, 0.5, 89.5), (361, 0.5, 90.0)]
+    ("count", "first_deg", "step_deg", "last_deg"),
+    [
+        (180, -90.0, 1.0, 89.0),
+        (181, -90.0, 1.0, 90.0),
+        (360, -90.0, 0.5, 89.5),
+        (361, -90.0, 0.5, 90.0),
+        (400, -50.0, 0.25, 49.75),  # an LMS in its finest setting
+        (401, -50.0, 0.25, 50.0),
+    ],
 )
-def test_angles_of_flaser(count: int, step_deg: float, last_deg: float) -> None:
+def test_angles_of_flaser(count: int, first_deg: float, step_deg: float, last_deg: float) -> None:
     line = flaser(_flaser(count).split())
-    assert math.degrees(line.angle_min_rad) == pytest.approx(-90.0)
+    assert math.degrees(line.angle_min_rad) == pytest.approx(first_deg)
     assert math.degrees(line.angle_increment_rad) == pytest.approx(step_deg)
     assert math.degrees(line.angle_min_rad + (count - 1) * line.angle_increment_rad) == pytest.approx(last_deg)
+
+
+@pytest.mark.parametrize("keyword", [b"FLASER", b"RLASER"])
+@pytest.mark.parametrize(
+    ("count", "said"),
+    [
+        (181, ""),
+        (180, "180 beams for 180 deg: the last beam is taken at +89 deg"),
+        (400, "400 beams for 100 deg: the last beam is taken at +49.75 deg"),
+        (401, ""),
+        (
+            541,
+            "its field of view is a guess: 541 beams are no scanner that CARMEN knows, 180 deg in steps of 0.333 are assumed",
+        ),
+        (682, "its field of view is a guess"),
+        (91, "its field of view is a guess"),
+    ],
+)
+def test_what_is_said_of_the_field_of_view(tmp_path: Path, keyword: bytes, count: int, said: str) -> None:
+    path = tmp_path / "log.clf"
+    path.write_bytes(b"\n".join(_flaser(count).replace(b"FLASER", keyword) for _ in range(3)))
+    with open_log(path) as reader:
+        assert len(list(reader.records())) > 3
+        told = [line for line in reader.remarks if "beams" in line]
+    assert [said in line and line.startswith(keyword.decode()) for line in told] == [True] * bool(said)
+    assert any(said in finding.text for finding in examine(path).findings)
 
 
 def test_robotlaser_with_remissions() -> None:

@@ -14,6 +14,7 @@ from lhdmap.odometry.matching import Hits, Match, MatchModel, Prior, match
 from lhdmap.odometry.motion import FORWARD, TURNING, Motion
 from lhdmap.odometry.settings import OdometrySettings, SearchSettings
 from lhdmap.odometry.surface_map import SurfaceMap, empty_map, insert_all
+from lhdmap.odometry.wheel_model import WheelModel
 
 MODEL = MatchModel(0.012, 3.0, 2.0, 0.05, 6)
 TRUE = np.array([0.4, -0.2, 0.1])
@@ -47,7 +48,7 @@ def found_from(walls: SurfaceMap, predicted: FloatArray, motion: Motion) -> tupl
     hits, prior = Hits(room(TRUE), len(room(TRUE)), layered=False), Prior(predicted, SURE)
     near = match(walls, hits, prior, predicted, MODEL)
     place = Place(walls, room(np.zeros(3)), MODEL)
-    return near, jump(place, hits, near, prior, motion, SearchSettings())
+    return near, jump(place, hits, near, prior, motion, WheelModel(OdometrySettings(), motion), SearchSettings())
 
 
 def test_a_kidnapped_machine_is_found(walls: SurfaceMap) -> None:
@@ -64,14 +65,20 @@ def test_a_pose_that_fits_is_left_alone(walls: SurfaceMap) -> None:
     assert found is None
 
 
-def wheeled(gap_s: float = 0.02) -> Motion:
-    """Return a motion whose last step wheels have measured."""
-    motion = Motion(OdometrySettings(), np.zeros(3))
+def wheeled(gap_s: float = 0.02) -> tuple[Motion, WheelModel]:
+    """Return a motion whose last step wheels have measured, and the wheels."""
+    motion, wheels = unwheeled()
     motion.predict(gap_s)
-    motion.fuse_speed(FORWARD, 0.0, 0.01, scaled=False)
-    motion.fuse_speed(TURNING, 0.0, 0.01, scaled=False)
+    wheels.gate.fuse(FORWARD, 0.0, 0.01, scaled=False)
+    wheels.gate.fuse(TURNING, 0.0, 0.01, scaled=False)
     assert motion.measured
-    return motion
+    return motion, wheels
+
+
+def unwheeled() -> tuple[Motion, WheelModel]:
+    """Return a motion of a machine without wheels."""
+    motion = Motion(OdometrySettings(), np.zeros(3))
+    return motion, WheelModel(OdometrySettings(), motion)
 
 
 def test_wheels_that_disagree_want_more_support(walls: SurfaceMap) -> None:
@@ -80,12 +87,12 @@ def test_wheels_that_disagree_want_more_support(walls: SurfaceMap) -> None:
     hits, prior = Hits(room(TRUE), len(room(TRUE)), layered=False), Prior(predicted, SURE)
     away = match(walls, hits, prior, predicted, MODEL)
     seen, wide = room(np.zeros(3)), SearchSettings()
-    assert jump(Place(walls, seen, MODEL), hits, away, prior, wheeled(), wide) is not None
+    assert jump(Place(walls, seen, MODEL), hits, away, prior, *wheeled(), wide) is not None
     close = away._replace(support=0.75)  # as if a crowd hid what is wrong there
-    free = jump(Place(walls, seen, MODEL), hits, close, prior, Motion(OdometrySettings()), wide)
+    free = jump(Place(walls, seen, MODEL), hits, close, prior, *unwheeled(), wide)
     assert free is not None
     assert free.support > close.support
-    assert jump(Place(walls, seen, MODEL), hits, close, prior, wheeled(), wide) is None
+    assert jump(Place(walls, seen, MODEL), hits, close, prior, *wheeled(), wide) is None
 
 
 def test_a_jump_back_to_where_the_wheels_lead_is_cheap(walls: SurfaceMap) -> None:
@@ -94,8 +101,8 @@ def test_a_jump_back_to_where_the_wheels_lead_is_cheap(walls: SurfaceMap) -> Non
     hits, prior = Hits(room(TRUE), len(room(TRUE)), layered=False), Prior(predicted, SURE)
     close = match(walls, hits, prior, predicted, MODEL)._replace(pose=predicted, support=0.82)
     seen, wide, back = room(np.zeros(3)), SearchSettings(), TRUE - predicted
-    assert jump(Place(walls, seen, MODEL), hits, close, prior, wheeled(), wide) is None
-    found = jump(Place(walls, seen, MODEL), hits, close, prior, wheeled(), wide, owed=-back)
+    assert jump(Place(walls, seen, MODEL), hits, close, prior, *wheeled(), wide) is None
+    found = jump(Place(walls, seen, MODEL), hits, close, prior, *wheeled(), wide, owed=-back)
     assert found is not None
     assert np.hypot(*(found.pose - TRUE)[:2]) < 0.01
 
@@ -113,7 +120,7 @@ def test_after_a_gap_all_that_the_settings_allow_is_searched(walls: SurfaceMap, 
 
 def test_a_velocity_that_is_distrusted_is_hardly_known() -> None:
     """Else the speed that a jump gives would carry the next pose away, and the scans could not take it back."""
-    motion = wheeled()
+    motion, _ = wheeled()
     motion.distrust_velocity(np.array([1.5, 0.0, 0.2]))
     assert motion.velocity.tolist() == [1.5, 0.0, 0.2]
     motion.predict(0.1)

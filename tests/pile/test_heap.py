@@ -15,6 +15,9 @@ from lhdmap.integration.cloud_io import write_cloud
 from lhdmap.messages import FloatArray
 from lhdmap.pile.heap import CloudPile, measure_cloud, run_cloud
 from lhdmap.pile.heap_axes import AXES, isolated, rotation_to_up
+from lhdmap.pile.result import estimate_json
+from lhdmap.rockbreaker.machine import Rockbreaker
+from lhdmap.simulation.grizzly import simulate_grizzly
 
 from tests.pile.piled_drift import TOE_M, PiledDrift
 
@@ -212,7 +215,55 @@ def test_faults_are_told(tmp_path: Path) -> None:
     ],
 )
 def test_degenerate_clouds_give_an_answer(points: FloatArray) -> None:
-    assert measure_cloud(points, "z").estimate.status in {"none", "too_shallow", "loadable", "wall", "hang_up"}
+    assert measure_cloud(points, "z").estimate.status in {"none", "too_shallow", "loadable", None}
+
+
+@pytest.mark.parametrize("seed", [3, 4, 11, 13])
+def test_a_grizzly_is_no_drift_and_nothing_is_said_of_what_closes_one(seed: int) -> None:
+    """The hopper's walls were a wall, 100 %, or a hang-up; its 8 x 8 m were a drift that nothing closes (11)."""
+    found = measure_cloud(simulate_grizzly(Rockbreaker(), seed).points_m, "z")
+    estimate = found.estimate
+    assert estimate.status is None
+    assert estimate.probabilities == {}
+    assert "no drift is seen around it" in estimate.reason
+    assert not estimate.found
+    values = estimate_json(estimate)
+    assert values["status"] is None
+    assert values["probabilities"] is None
+    assert values["width_m"] is None
+    assert values["inclination_deg"] is None
+
+
+@pytest.mark.parametrize("slope_deg", [20.0, 38.0, 80.0])
+def test_a_face_cut_out_of_its_drift_is_what_its_slope_says_or_not_said(slope_deg: float) -> None:
+    drift = PiledDrift(slope_deg=slope_deg, rubble_m=0.04)
+    found = measure_cloud(drift.face() @ drift.R_map_drift.T, "z").estimate
+    assert found.status == {20.0: "too_shallow", 38.0: "loadable", 80.0: None}[slope_deg]
+    assert found.found == (found.status is not None)
+    if found.found:
+        assert found.inclination_deg == pytest.approx(-slope_deg, abs=1.0)
+
+
+@pytest.mark.parametrize("suffix", [".ply", ".las", ".laz", ".pcd"])
+def test_a_national_grid_changes_only_the_places(suffix: str, tmp_path: Path) -> None:
+    import open3d as o3d
+
+    points, _ = _wedge(35.0, 0.4, n=15_000)
+    shift = np.array([412_345.0, 6_743_210.0, 312.0])
+    path = tmp_path / f"wedge{suffix}"
+    if suffix in (".las", ".laz"):
+        write_cloud(path, Cloud(points.astype(np.float32), origin_m=(412_345.0, 6_743_210.0, 312.0)))
+    elif suffix == ".ply":
+        o3d.io.write_point_cloud(path, o3d.geometry.PointCloud(o3d.utility.Vector3dVector(points + shift)))
+    else:
+        head = "VERSION .7\nFIELDS X Y Z\nSIZE 8 8 8\nTYPE F F F\nWIDTH 15000\nHEIGHT 1\nPOINTS 15000\nDATA binary\n"
+        path.write_bytes(head.encode() + (points + shift).tobytes())
+    found, plain = run_cloud(path, "z"), measure_cloud(points, "z")
+    assert found.estimate.inclination_deg == pytest.approx(plain.estimate.inclination_deg, abs=0.05)
+    assert found.estimate.volume_m3 == pytest.approx(plain.estimate.volume_m3, rel=0.01)
+    np.testing.assert_allclose(found.estimate.center_m, plain.estimate.center_m + shift, atol=0.05)
+    np.testing.assert_allclose(found.estimate.left_limit_m, plain.estimate.left_limit_m + shift, atol=0.2)
+    assert found.extra["floor_m"] == pytest.approx(312.0, abs=0.02)
 
 
 def test_isolated_points_are_those_far_from_all() -> None:
@@ -220,7 +271,7 @@ def test_isolated_points_are_those_far_from_all() -> None:
     np.testing.assert_array_equal(np.flatnonzero(isolated(points)), [5000, 5001])
 
 
-@pytest.mark.parametrize("suffix", [".ply", ".pcd"])
+@pytest.mark.parametrize("suffix", [".ply", ".pcd", ".las", ".laz"])
 def test_files_give_what_arrays_give(suffix: str, tmp_path: Path) -> None:
     points, _ = _cone(33.0, n=10_000)
     write_cloud(tmp_path / f"cone{suffix}", Cloud(points.astype(np.float32)))

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from lhdmap.messages import FloatArray
 from lhdmap.pile.approach import Approaches
 from lhdmap.pile.face import Registration
-from lhdmap.pile.result import PileEstimate, PileReport, Snapshot, estimate_json
+from lhdmap.pile.result import Approach, PileEstimate, PileReport, Snapshot, estimate_json
 from lhdmap.pile.settings import PileSettings
 from lhdmap.pile.stage import PileStage
 
@@ -197,6 +197,24 @@ def test_json_holds_the_contract() -> None:
     assert table["distance_at_decision_m"] > 10.0
     assert isinstance(table["decided_at_ns"], int)
     assert sum(table["probabilities"].values()) == pytest.approx(1.0)
+
+
+def test_json_of_what_was_not_looked_for_has_the_reason_alone() -> None:
+    table = PileReport(None, None, reason="it was off").to_json()
+    assert set(table) >= KEYS
+    assert (table["status"], table["probabilities"], table["reason"]) == (None, None, "it was off")
+    assert not table["identified"]
+
+
+def test_a_warning_is_said_once_in_json() -> None:
+    """The last estimate, the decision and each of the piles hold it."""
+    estimate = PileEstimate(
+        status="loadable", probabilities={"loadable": 1.0}, width_m=4.0, inclination_deg=-40.0, warnings=("w",)
+    )
+    last = Snapshot(0, 12.0, estimate)
+    report = PileReport(last, last, (last,), warnings=("w", "log"), piles=(Approach(last, last),))
+    assert json.dumps(report.to_json()).count('"w"') == 1
+    assert report.to_json()["warnings"] == ["w", "log"]
 
 
 def test_json_of_nothing_is_null() -> None:

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import html
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
+from lhdmap.config import Settings
 from lhdmap.errors import InputError
 from lhdmap.evaluation.trajectory import evaluate_trajectory
 from lhdmap.integration.cloud_io import read_cloud
@@ -118,8 +121,10 @@ def test_a_log_whose_scans_are_all_blind_is_refused_as_by_doctor(
             if isinstance(message, LaserScan):
                 message = message._replace(ranges_m=np.full_like(message.ranges_m, np.inf))
             writer.write(source.roles[role], [message] if isinstance(message, Mount) else message)
-    with pytest.raises(InputError, match=r"blind\.mcap: its scans hold no hit"):
+    with pytest.raises(InputError, match=r"blind\.mcap: /lidar/front/scan: dead: only 0\.0 % of the beams"):
         build_map(BuildRequest([tmp_path / "blind.mcap"], tmp_path / "map"))
+    with pytest.raises(InputError, match=r"blind\.mcap: no scan fitted"):
+        build_map(BuildRequest([tmp_path / "blind.mcap"], tmp_path / "forced", force=True))
 
 
 def test_a_front_scanner_that_dies_ends_the_map_there(untold: Path, tmp_path: Path) -> None:
@@ -156,10 +161,34 @@ def test_a_log_without_scans_is_refused(untold: Path, tmp_path: Path) -> None:
 
 def test_a_pause_in_the_log_is_told(untold: Path, tmp_path: Path) -> None:
     with LogSource([untold]) as source, LogWriter(tmp_path / "pause.mcap") as writer:
-        middle = (source.start_ns or 0) + 3 * 10**9
+        start = source.start_ns or 0
         for role, message in source.messages(["front", "tf_static"]):
-            if isinstance(message, LaserScan) and message.stamp_ns > middle:
+            if isinstance(message, LaserScan) and message.stamp_ns > start + 3 * 10**9:
                 message = message._replace(stamp_ns=message.stamp_ns + 60 * 10**9)
-            writer.write(source.roles[role], [message] if isinstance(message, Mount) else message)
+            if not start + 2 * 10**9 < message.stamp_ns <= start + 3 * 10**9:  # driven on meanwhile
+                writer.write(source.roles[role], [message] if isinstance(message, Mount) else message)
     found = build_map(BuildRequest([tmp_path / "pause.mcap"], tmp_path / "map"))
-    assert any("no scan for 60 s" in text for text in found.warnings)
+    assert any("no scan for 61 s" in text for text in found.warnings)
+
+
+@pytest.mark.parametrize("why", ["inclinometer", "off"])
+def test_a_pile_that_was_not_looked_for_is_null_with_the_reason(untold: Path, tmp_path: Path, why: str) -> None:
+    log, settings = untold, Settings()
+    if why == "off":
+        settings = replace(settings, pile=replace(settings.pile, method="off"))
+    else:
+        log = rewritten(untold, tmp_path / "scans.mcap", "as it is")
+    found = build_map(BuildRequest([log], tmp_path / "map", settings))
+    assert found.summary["pile"] is None
+    assert why in found.summary["pile_reason"]
+    assert not (found.folder / "pile.json").exists()
+    page = (found.folder / "report.html").read_text(encoding="utf-8")
+    assert "<p>No pile was looked for: " in page
+    assert "probability" not in page
+
+
+def test_no_warning_is_said_twice(built: BuildResult) -> None:
+    assert len(set(built.warnings)) == len(built.warnings)
+    page = (built.folder / "report.html").read_text(encoding="utf-8")
+    for text in built.warnings:
+        assert page.count(html.escape(text)) == 1

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from pathlib import Path
 
 import numpy as np
@@ -12,7 +13,7 @@ from lhdmap.geometry import se3
 from lhdmap.integration.cloud_io import read_cloud
 from lhdmap.logs.source import LogSource
 from lhdmap.logs.writer import LogWriter
-from lhdmap.messages import LaserScan, Mount
+from lhdmap.messages import LaserScan, Mount, Tachometer
 from lhdmap.pipeline.build import BuildRequest, build_map
 from lhdmap.pipeline.given import GROUND_TRUTH, given_rows
 from lhdmap.provenance import sha256_of
@@ -88,3 +89,39 @@ def test_a_sweep_that_cannot_be_is_left_out_with_given_poses_too(drive: Simulate
         found = build_map(BuildRequest([tmp_path / f"{name}.mcap"], tmp_path / name, poses=GROUND_TRUTH))
         points.append(read_cloud(found.folder / "cloud.ply").points_m)
     assert points[0] == pytest.approx(points[1])
+
+
+def _with_fast_wheels(drive: SimulatedDrive, path: Path, leave_out: tuple[str, ...] = ()) -> Path:
+    """Write the drive's log with a tachometer in km/h."""
+    with LogSource([drive.log]) as source, LogWriter(path) as writer:
+        for role, message in source.messages([role for role in source.roles if role not in leave_out]):
+            if isinstance(message, Tachometer):
+                message = message._replace(speed_mps=3.6 * message.speed_mps)
+            writer.write(source.roles[role], [message] if isinstance(message, Mount) else message)
+    return path
+
+
+def test_with_given_poses_nothing_is_said_of_what_took_no_part(drive: SimulatedDrive, tmp_path: Path) -> None:
+    """Wheels that contradict the scans are a warning of the odometry, not of a map whose poses were given."""
+    log = _with_fast_wheels(drive, tmp_path / "fast.mcap")
+    own = build_map(BuildRequest([log], tmp_path / "own"))
+    assert any("wheels:" in text for text in own.warnings)
+    given = build_map(BuildRequest([log], tmp_path / "given", poses=GROUND_TRUTH))
+    assert not any("wheels" in text or "odometry" in text for text in given.warnings)
+    assert given.summary["poses"] == GROUND_TRUTH
+    assert given.summary["degenerate_share"] is None
+    assert (given.summary["closures"], given.summary["lost_stretches"]) == (0, 0)
+    page = re.sub(r"<pre>.*?</pre>", "", (given.folder / "report.html").read_text(encoding="utf-8"), flags=re.DOTALL)
+    assert "path and map are made from ground-truth" in page
+    for words in ("weak scans", "lost stretches", "loop closures", "Speed and slip", "used as tachometer"):
+        assert words not in page
+    assert "used as ground_truth" in page
+    assert own.summary["poses"] is None
+
+
+def test_given_poses_tell_roll_and_pitch_where_there_is_no_inclinometer(drive: SimulatedDrive, tmp_path: Path) -> None:
+    log = _with_fast_wheels(drive, tmp_path / "flat.mcap", leave_out=("inclinometer",))
+    given = build_map(BuildRequest([log], tmp_path / "given", poses=GROUND_TRUTH))
+    assert given.summary["pile"] is not None
+    assert (given.folder / "pile.json").exists()
+    assert not any("inclinometer" in text for text in given.warnings)

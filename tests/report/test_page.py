@@ -83,7 +83,7 @@ def test_pictures_have_axes_with_units(page: str) -> None:
         ("x, m", "y, m", "height, m"),
         ("distance along the path, m", "height, m"),
         ("speed, m/s", "slip, %", "time since the first scan, s", "tachometer", "odometry"),
-        ("along, 1/m²", "across, 1/m²", "heading, 1/rad²", "a direction was not observed"),
+        ("along, mm", "across, mm", "heading, °", "a direction was not observed"),
     ]
     for text, labels in zip(texts, wanted, strict=True):
         assert all(label in text for label in labels), (labels, text)

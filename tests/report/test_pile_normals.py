@@ -59,5 +59,18 @@ def test_picture_shows_every_hit_before_the_eye_and_the_limits() -> None:
     marks = np.asarray(axes.collections[0].get_offsets())
     assert len(marks) > 1000
     assert np.isfinite(marks).all()
-    left, right = (note.xy[0] for note in axes.texts)  # type: ignore[attr-defined]
+    notes = {note.get_text(): note for note in axes.texts}
+    left, right = (notes[name].xy[0] for name in ("E_L", "E_R"))  # type: ignore[attr-defined]
     assert left < 0.0 < right
+
+
+def test_the_axes_that_n_y_is_said_in_are_drawn() -> None:
+    """Seen from behind the machine, y points to the left and z up."""
+    with charts.styled():
+        figure = normals_chart(_report(), pile())
+    (axes,) = (one for one in figure.axes if one.get_legend() is not None)
+    places = {note.get_text(): note.get_position() for note in axes.texts if note.get_text() in ("x", "y", "z")}
+    assert set(places) == {"x", "y", "z"}
+    assert places["y"][0] < min(places["x"][0], places["z"][0]) - 0.01
+    assert places["z"][1] > places["y"][1] + 0.01
+    assert any("n_y: left wall -1" in one.get_ylabel() for one in axes.child_axes)

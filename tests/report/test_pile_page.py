@@ -97,11 +97,44 @@ def test_nothing_found_is_said_and_not_drawn() -> None:
     assert not _pictures(page)
 
 
+def test_what_was_not_looked_for_has_no_status_and_no_probability() -> None:
+    page = pile_sections(
+        PileReport(None, None, reason="no pile was looked for: it was off", warnings=("the <log> is short",))
+    )
+    assert "No pile was looked for: it was off." in page
+    assert "the &lt;log&gt; is short" in page
+    assert "%" not in page
+    assert "none" not in page
+
+
+def test_none_is_said_without_measures_and_without_a_contradiction() -> None:
+    """The last estimate was of a wall of the bend: its width and slope are not those of a pile."""
+    wall = pile(status="none", probabilities={"none": 1.0}, width_m=9.82, inclination_deg=-90.5)
+    page = pile_sections(PileReport(None, Snapshot(0, 12.0, wall), (Snapshot(0, 12.0, wall),)))
+    assert "nothing closes the drift; probability 100 %" in page
+    for wrong in ("9.82", "-90.5", "sure enough", "identified"):
+        assert wrong not in page
+
+
+def test_a_none_that_is_not_the_likeliest_has_no_probability() -> None:
+    """Where the inclination is hardly known the status is none, whatever the probabilities say."""
+    unsure = pile(status="none", probabilities={"loadable": 0.6, "none": 0.1, "hang_up": 0.3})
+    page = pile_sections(PileReport(None, Snapshot(0, 12.0, unsure)))
+    assert "not known well enough" in page
+    assert "10 %" not in page
+
+
+def test_the_distance_of_the_decision_is_said_in_words(report: PileReport) -> None:
+    page = pile_sections(report)
+    assert "decided 22.0 m before the toe, the foot of the pile" in page
+    assert "sure enough that this is loadable" in page
+
+
 def test_face_without_surroundings_or_course_is_drawn() -> None:
     only = PileReport(None, Snapshot(0, 12.0, pile(attack=None, boulders=())))
     page = pile_sections(only)
     assert len(_pictures(page)) == 4
-    assert "not identified" in page
+    assert "it was never sure enough that it is loadable" in page
 
 
 @pytest.mark.parametrize("inclination_deg", [-15.0, -90.0, -120.0])

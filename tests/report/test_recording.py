@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +13,9 @@ from lhdmap.integration.cloud import Cloud
 from lhdmap.machine import Machine
 from lhdmap.messages import Joints, LaserScan, Mount, Tachometer
 from lhdmap.report.log_recording import LogRecorder
-from lhdmap.report.recording import RecordingSettings, RecordingWriter, record_run
+from lhdmap.report.recording import RecordingSettings, RecordingWriter
+from lhdmap.report.recording_layout import ASPECT, FIELD_OF_VIEW_RAD, PLAN_ASPECT, eye_of, whole_of
+from lhdmap.report.run_recording import record_run
 
 from tests.report.synthetic import START_NS, drive, report_data
 
@@ -156,3 +159,74 @@ def test_a_log_without_scans_is_an_error(tmp_path: Path) -> None:
     recorder.update("tachometer", Tachometer(START_NS, 1.0))
     with pytest.raises(InputError, match=r"empty.mcap: no scan"):
         recorder.finish()
+
+
+def test_paths_have_a_name_and_a_colour_of_their_own_and_a_legend(tmp_path: Path) -> None:
+    data = report_data(scans=1000, points=1000)
+    with RecordingWriter(tmp_path / "r.rrd", "drive", START_NS) as writer:
+        writer.add_scan(START_NS, np.ones((3, 3)))
+        record_run(writer, data, Machine())
+    found = read(tmp_path / "r.rrd")
+    names = {name: column(found[f"map/path/{name}/name"], ":labels")[0] for name in ("final", "odometry")}
+    assert names == {"final": ["final path"], "odometry": ["odometry alone"]}
+    entities = ("map/path/final", "map/path/odometry", "map/scan/front", "map/base_link/front_body")
+    colours = [column(found[entity], ":colors")[0][0] for entity in entities]
+    assert len(set(colours)) == len(entities)
+    (legend,) = column(found["legend"], ":text")[0]
+    for words in ("| blue line | final path |", "| orange line | odometry alone |", "| yellow boxes | the machine |"):
+        assert words in legend
+
+
+def test_a_path_that_is_the_final_one_is_drawn_once(tmp_path: Path) -> None:
+    data = report_data(scans=300, points=1000)
+    with RecordingWriter(tmp_path / "r.rrd", "drive", START_NS) as writer:
+        record_run(writer, replace(data, odometry=data.trajectory), Machine())
+    assert not any(name.startswith("map/path/odometry") for name in read(tmp_path / "r.rrd"))
+
+
+def test_a_recorded_slip_has_gaps_where_the_machine_stands(tmp_path: Path) -> None:
+    data = report_data(scans=400, points=1000)
+    assert data.odometry_speed is not None
+    speed = data.odometry_speed.speed_mps.copy()
+    speed[:200] = 0.0
+    still = data.odometry_speed._replace(speed_mps=speed)
+    with RecordingWriter(tmp_path / "r.rrd", "drive", START_NS) as writer:
+        record_run(writer, replace(data, odometry_speed=still, tachometer_speed=still), Machine())
+    values = np.array([value[0] for value in column(read(tmp_path / "r.rrd")["motion/slip"], ":scalars")])
+    assert np.isnan(values[:49]).all()
+    assert np.isfinite(values[51:]).all()
+
+
+@pytest.mark.parametrize("oblique", [True, False])
+@pytest.mark.parametrize("span_m", [(400.0, 20.0, 4.0), (10.0, 300.0, 30.0), (5.0, 5.0, 3.0), (80.0, 60.0, 0.0)])
+def test_the_first_view_holds_the_whole_map(oblique: bool, span_m: tuple[float, float, float]) -> None:
+    """All corners lie in the picture of a camera at the eye, and some of them near its edge."""
+    bounds = np.array([[100.0, -40.0, 7.0], np.array([100.0, -40.0, 7.0]) + span_m])
+    eye, target = eye_of(bounds, oblique=oblique)
+    forward = (target - eye) / np.linalg.norm(target - eye)
+    right = np.cross(forward, [0.0, 0.0, 1.0] if oblique else [0.0, 1.0, 0.0])
+    right /= np.linalg.norm(right)
+    corners = (
+        np.array([[bounds[i, 0], bounds[j, 1], bounds[k, 2]] for i in (0, 1) for j in (0, 1) for k in (0, 1)]) - eye
+    )
+    depth = corners @ forward
+    assert (depth > 0.0).all()
+    half = np.tan(FIELD_OF_VIEW_RAD / 2)
+    aspect = ASPECT if oblique else PLAN_ASPECT
+    across, high = (
+        np.abs(corners @ right) / depth / half / aspect,
+        np.abs(corners @ np.cross(right, forward)) / depth / half,
+    )
+    assert max(across.max(), high.max()) < 1.0
+    if min(span_m) >= 5.0 or max(span_m) > 50.0:
+        assert max(across.max(), high.max()) > 0.7
+
+
+def test_bounds_hold_all_points_but_strays() -> None:
+    rng = np.random.default_rng(0)
+    points = rng.uniform([0, 0, 0], [100, 50, 3], (5000, 3)).astype(np.float32)
+    low, high = whole_of(points)
+    assert (points >= low).all()
+    assert (points <= high).all()
+    points[0] = 5000.0
+    assert (whole_of(points)[1] < 200.0).all()

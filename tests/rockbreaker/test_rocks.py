@@ -9,8 +9,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 from lhdmap.errors import ConfigError, InputError, LhdmapError
+from lhdmap.integration.cloud import Cloud
+from lhdmap.integration.cloud_io import write_cloud
 from lhdmap.rockbreaker.collision import Obstacles, axis_points, without_arm
-from lhdmap.rockbreaker.environment import read_boxes
+from lhdmap.rockbreaker.environment import cloud_in_base, read_boxes
 from lhdmap.rockbreaker.kinematics import rho_of_theta
 from lhdmap.rockbreaker.machine import Rockbreaker
 from lhdmap.rockbreaker.plan import Planner, Request, Trajectory, start_joints
@@ -44,6 +46,18 @@ def test_rocks_are_found_with_place_and_size(seed: int) -> None:
     places = np.array([rock.top_m[:2] for rock in _oversize(scene, -CLEAR_M)]).reshape(-1, 2)
     for one in oversize:
         assert np.hypot(*(places - one.top_m[:2]).T).min() < 0.3
+
+
+def test_a_cloud_in_a_national_grid_is_placed_to_the_millimetre(tmp_path: Path) -> None:
+    """The machine's place in the grid is known: float32 would leave half a metre of the northing."""
+    place = (412_345.0, 6_743_210.0, 312.0)
+    machine = replace(MACHINE, base=replace(MACHINE.base, position_m=place))
+    points = simulate_grizzly(MACHINE, 3).points_m
+    write_cloud(tmp_path / "utm.laz", Cloud(points.astype(np.float32), origin_m=place))
+    write_cloud(tmp_path / "local.laz", Cloud(points.astype(np.float32)))
+    found, local = cloud_in_base(tmp_path / "utm.laz", machine), cloud_in_base(tmp_path / "local.laz", MACHINE)
+    assert len(found) == len(local)
+    assert np.abs(found - local).max() < 0.0005
 
 
 def test_the_largest_rock_is_chosen_and_the_tip_ends_above_it() -> None:

@@ -65,7 +65,7 @@ def measure(seed: int, distance_m: float) -> dict[str, FloatArray]:
         times = np.array(pipeline.records.times_ns, dtype=np.int64)
         own = trajectory_of(resample(pipeline.path.final.rows(), times), times)
         cloud = pipeline.sweeps.cloud()
-        inputs = Inputs([drive.log], Settings(), {}, "", posed=True)
+        inputs = Inputs([drive.log], Settings(), {}, "", poses="ground-truth")
         exact = integrate_again(inputs, pipeline, rows_of(drive.truth)).cloud()
         moved = in_truth_frame(own.positions_m, own, drive.truth)
         return {

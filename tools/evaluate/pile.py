@@ -101,7 +101,7 @@ def _row(
     return Row(
         *kind,
         truth.status,
-        best.status,
+        best.status or "none",
         width,
         slope,
         width / best.width_std_m,
