@@ -250,7 +250,7 @@ class OutputFiles:
 
     def __init__(self, *paths: Path | None, force: bool = False, inputs: Sequence[Path] = ()) -> None:
         self._paths = [path for path in paths if path is not None]
-        free_files(self._paths, force=force, inputs=inputs)
+        free_files(self._paths[::-1], force=force, inputs=inputs)
         self._end = contextlib.ExitStack()
 
     def at(self, path: Path) -> Path:
