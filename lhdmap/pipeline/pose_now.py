@@ -67,7 +67,9 @@ def _moved(
     if motion.source == "tachometer":  # the joint is not known: the machine turns on as it did
         delta[2] = by_motion[2]
         delta[1] = 0.5 * by_motion[2] * delta[0]
-    return delta, motion.covariance, "wheels"
+    heard_ns = front_end.wheels.heard_until_ns or last_ns
+    unheard_s = max(now_ns - max(heard_ns, last_ns), 0) * 1e-9  # the last samples stand for a moment after them
+    return delta, motion.covariance + _wandered(settings, unheard_s), "wheels"
 
 
 def _by_motion(velocity: FloatArray, age_s: float) -> FloatArray:
