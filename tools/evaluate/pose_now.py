@@ -31,12 +31,13 @@ SEEDS = (21, 22)
 HEADING = """\
 # A pose at any time
 
-Written by `python -m tools.evaluate.pose_now`; not edited by hand. The pipeline's poses come late: the inclinometer's filter waits for samples behind
-a scan. `MappingPipeline.pose_at(now)` carries the newest one on, by wheels and joint where the log has them, else by the last motion, with the
-attitude of now. Below: how far it is from the pose that the pipeline gives for the same moment later (rms), {seeds} simulated drives a row of 60 m
-through rough walls with bends and grades. At 0.1 and 0.2 s the wheels of that moment are there already, at 0.4 and 0.5 s mostly not.
+Written by `python -m tools.evaluate.pose_now`; not edited by hand. The pipeline's poses come late: the inclinometer's filter
+waits for samples behind a scan. `MappingPipeline.pose_at(now)` carries the newest one on, by wheels and joint where the log has
+them, else by the last motion, with the attitude of now. Below: how far it is from the pose that the pipeline gives for the same
+moment later (rms), {seeds} simulated drives a row of 60 m through rough walls with bends and grades. At 0.1 and 0.2 s the wheels
+of that moment are there already, at 0.4 and 0.5 s mostly not.
 
-| speed, km/h | sensors | age, s | along, mm | across, mm | height, mm | heading, mrad | within 2 σ, % |
+| km/h | sensors | age, s | along, mm | across, mm | height, mm | heading, mrad | in 2 σ, % |
 | --- | --- | --- | --- | --- | --- | --- | --- |
 """
 
