@@ -10,13 +10,14 @@ from lhdmap.geometry import se2
 from lhdmap.messages import FloatArray
 from lhdmap.odometry.flow_reference import FlowReference, compare, scanner_pyramid
 from lhdmap.odometry.jump import NOTHING_OWED, Place, jump, left_by, weakened
-from lhdmap.odometry.matching import Hits, Match, MatchModel, Prior, match
 from lhdmap.odometry.motion import Motion
 from lhdmap.odometry.rear_view import NO_POINTS, NOTHING_BEHIND, Behind, JointOffset
 from lhdmap.odometry.settings import AnchorSettings, OdometrySettings, RangeFlowSettings, SearchSettings
-from lhdmap.odometry.slant import NO_RISE, slants
-from lhdmap.odometry.steps import BY_DEFINITION, Matched, marginal_information
-from lhdmap.odometry.surface_map import empty_map, insert_all
+from lhdmap.odometry.steps import BY_DEFINITION, Matched
+from lhdmap.scan_matching.information import marginal_information
+from lhdmap.scan_matching.matching import Hits, Match, MatchModel, Prior, match
+from lhdmap.scan_matching.slant import NO_RISE, slants
+from lhdmap.scan_matching.surface_map import empty_map, insert_all
 
 _RECENT_SCANS = 12
 _YOUNG_SCANS = 4

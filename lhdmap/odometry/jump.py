@@ -9,11 +9,11 @@ import numpy as np
 
 from lhdmap.geometry import se2
 from lhdmap.messages import FloatArray
-from lhdmap.odometry.matching import Hits, Match, MatchModel, Prior, match
 from lhdmap.odometry.motion import Motion
-from lhdmap.odometry.search import search
 from lhdmap.odometry.settings import SearchSettings
-from lhdmap.odometry.surface_map import SurfaceMap
+from lhdmap.scan_matching.matching import Hits, Match, MatchModel, Prior, match
+from lhdmap.scan_matching.search import search
+from lhdmap.scan_matching.surface_map import SurfaceMap
 
 _JUMP_PRIOR = 0.01
 # A jump must bring that much more support, and more where wheels speak against it: the logarithm of the odds (Student's t, for

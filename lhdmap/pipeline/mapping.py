@@ -31,8 +31,6 @@ from lhdmap.odometry.cloud_motion import CloudPrior
 from lhdmap.odometry.cloud_odometry import CloudOdometry, CloudStep
 from lhdmap.odometry.planar import PlanarOdometry, View
 from lhdmap.odometry.rear_view import RearView
-from lhdmap.odometry.scan_points import NO_BOXES, half_sweep_ns
-from lhdmap.odometry.slant import rise_of
 from lhdmap.odometry.start import ScanInput, starting_velocity
 from lhdmap.odometry.steps import OdometryStep, WheelStep
 from lhdmap.pipeline.mounts import Mounts, level_sensor
@@ -46,6 +44,8 @@ from lhdmap.pipeline.track import Track
 from lhdmap.proprioception.attitude import AttitudeFilter
 from lhdmap.proprioception.slip import SlipEstimator
 from lhdmap.proprioception.wheels import WheelOdometry
+from lhdmap.scan_matching.scan_points import NO_BOXES, half_sweep_ns
+from lhdmap.scan_matching.slant import rise_of
 from lhdmap.smoothing.realign import AlignedScan
 from lhdmap.smoothing.smoother import Smoother
 

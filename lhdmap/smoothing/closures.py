@@ -14,10 +14,10 @@ import numpy as np
 
 from lhdmap.geometry import se2
 from lhdmap.messages import FloatArray
-from lhdmap.odometry.matching import Hits, Match, MatchModel, Prior, match
-from lhdmap.odometry.search import search
-from lhdmap.odometry.steps import marginal_information
-from lhdmap.odometry.surface_map import SurfaceMap, empty_map, insert_all
+from lhdmap.scan_matching.information import marginal_information
+from lhdmap.scan_matching.matching import Hits, Match, MatchModel, Prior, match
+from lhdmap.scan_matching.search import search
+from lhdmap.scan_matching.surface_map import SurfaceMap, empty_map, insert_all
 from lhdmap.smoothing.keys import KeyScan
 from lhdmap.smoothing.settings import SmoothingSettings
 

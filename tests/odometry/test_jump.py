@@ -10,10 +10,10 @@ import pytest
 from lhdmap.geometry import se2
 from lhdmap.messages import FloatArray
 from lhdmap.odometry.jump import Place, jump
-from lhdmap.odometry.matching import Hits, Match, MatchModel, Prior, match
 from lhdmap.odometry.motion import FORWARD, TURNING, Motion
 from lhdmap.odometry.settings import OdometrySettings, SearchSettings
-from lhdmap.odometry.surface_map import SurfaceMap, empty_map, insert_all
+from lhdmap.scan_matching.matching import Hits, Match, MatchModel, Prior, match
+from lhdmap.scan_matching.surface_map import SurfaceMap, empty_map, insert_all
 
 MODEL = MatchModel(0.012, 3.0, 2.0, 0.05, 6)
 TRUE = np.array([0.4, -0.2, 0.1])

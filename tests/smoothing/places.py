@@ -8,7 +8,7 @@ import math
 import numpy as np
 from lhdmap.geometry import se2
 from lhdmap.messages import FloatArray
-from lhdmap.odometry.scan_points import planar_points
+from lhdmap.scan_matching.scan_points import planar_points
 from lhdmap.simulation.planar import PlanarScanner, PlanarWorld, drift_world, simulate_scans, world_from_polylines
 from lhdmap.smoothing.keys import KeyScan
 

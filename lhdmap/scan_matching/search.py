@@ -1,7 +1,7 @@
 """Wide search for a scan's pose: a likelihood field of recent hits, all headings and shifts in reach, coarse to fine.
 
 Used where the prediction cannot be trusted: at the start, after a blackout, at jumps. It is cheap enough for single scans and
-far too slow for each; what it finds is a start for `lhdmap.odometry.matching`, never a result.
+far too slow for each; what it finds is a start for `lhdmap.scan_matching.matching`, never a result.
 """
 
 from __future__ import annotations

@@ -10,10 +10,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from lhdmap.geometry import se2
 from lhdmap.messages import FloatArray
-from lhdmap.odometry.matching import NO_SLANTS, Hits, MatchModel, Prior, match, normal_equations, solve3
-from lhdmap.odometry.scan_points import planar_points
-from lhdmap.odometry.search import search
-from lhdmap.odometry.surface_map import LINE, SurfaceMap, empty_map, insert_all
+from lhdmap.scan_matching.matching import NO_SLANTS, Hits, MatchModel, Prior, match, normal_equations, solve3
+from lhdmap.scan_matching.scan_points import planar_points
+from lhdmap.scan_matching.search import search
+from lhdmap.scan_matching.surface_map import LINE, SurfaceMap, empty_map, insert_all
 
 from tests.odometry.planar_drives import LEVEL, drive
 
