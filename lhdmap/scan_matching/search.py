@@ -7,6 +7,7 @@ far too slow for each; what it finds is a start for `lhdmap.scan_matching.matchi
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numba as nb
 import numpy as np
@@ -15,6 +16,20 @@ from lhdmap.messages import Float32Array, FloatArray
 
 FIELD_HALF_M = 25.0
 _SPREAD_CELLS = 2
+_APART_STEPS = 3.0  # of the heading: nearer ones are one neighbourhood
+
+
+class SearchGrid(NamedTuple):
+    """How finely a search looks: cells of the likelihood field, step of the heading, hits of the scan that are used.
+
+    It finds `starts` poses at most. Of two poses with one heading and less than `apart_m` between them, the better one counts.
+    """
+
+    cell_m: float = 0.1
+    step_rad: float = math.radians(2.0)
+    beams: int = 120
+    starts: int = 5
+    apart_m: float = 2.0
 
 
 @nb.njit(cache=True, nogil=True)
@@ -49,31 +64,68 @@ def score(field, centre_m, cell_m, points, pose):  # type: ignore[no-untyped-def
 
 
 @nb.njit(cache=True, nogil=True)
-def search(hits_m, points, predicted, prior_information, reach, cell_m, step_rad):  # type: ignore[no-untyped-def]
-    """Return the best poses, shape (K, 3), best first, around `predicted` (3,).
+def search(hits_m, points, predicted, information, reach, grid):  # type: ignore[no-untyped-def]
+    """Return poses to start matches from, shape (K, 3), best first, around `predicted` (3,); none where no hit meets a wall.
 
-    `reach`: largest shift (m) and turn (rad); the prior `prior_information` (3, 3) only breaks near ties, so that a drift that
-    looks the same everywhere does not draw the pose away.
+    Args:
+        hits_m: what is known of the place, shape (M, 2) or more columns.
+        points: hits of the scan in its own frame, shape (N, 2) or more columns, N > 0.
+        predicted: pose in the frame of `hits_m`.
+        information: of the prediction (3, 3); it only breaks near ties, so that a drift that looks the same everywhere does
+            not draw the pose away.
+        reach: largest shift (m) and turn (rad).
+        grid: `SearchGrid`.
     """
-    field = likelihood_field(hits_m, predicted[:2], cell_m)
-    shifts = int(math.ceil(reach[0] / (2.0 * cell_m)))
-    turns = int(math.ceil(reach[1] / step_rad))
-    best = np.full((5, 4), -1e30)
+    field = likelihood_field(hits_m, predicted[:2], grid.cell_m)
+    shifts = int(math.ceil(reach[0] / (2.0 * grid.cell_m)))
+    turns = int(math.ceil(reach[1] / grid.step_rad))
+    best, kept = np.zeros((grid.starts, 4)), 0
     for k in range(-turns, turns + 1):
-        top = np.full(4, -1e30)
-        pose = predicted.copy()
-        pose[2] += k * step_rad
-        for i in range(-shifts, shifts + 1):
-            for j in range(-shifts, shifts + 1):
-                pose[0], pose[1] = predicted[0] + 2.0 * cell_m * i, predicted[1] + 2.0 * cell_m * j
-                value = score(field, predicted[:2], cell_m, points, pose) + _tie(pose - predicted, prior_information)
-                if value > top[0]:
-                    top[0], top[1], top[2], top[3] = value, pose[0], pose[1], pose[2]
-        _keep(best, top, 3.0 * step_rad)
-    for k in range(best.shape[0]):
-        if best[k, 0] > -1e29:
-            _climb(field, predicted, cell_m, points, prior_information, step_rad, best[k])
-    return best[np.argsort(-best[:, 0]), 1:]
+        values = _values(field, points, predicted, information, k * grid.step_rad, shifts, grid.cell_m)
+        kept = _peaks(values, predicted, k * grid.step_rad, grid, best, kept)
+    usable = 0
+    for k in range(kept):
+        _climb(field, predicted, grid.cell_m, points, information, grid.step_rad, best[k])
+        if score(field, predicted[:2], grid.cell_m, points, best[k, 1:]) > 0.0:
+            best[usable] = best[k]
+            usable += 1
+    return best[np.argsort(-best[:usable, 0]), 1:]
+
+
+@nb.njit(cache=True, nogil=True)
+def _values(field, points, predicted, information, turn_rad, shifts, cell_m):  # type: ignore[no-untyped-def]
+    """Return the likelihood at all shifts with one heading, each two cells from the next, ties broken."""
+    values, pose = np.empty((2 * shifts + 1, 2 * shifts + 1)), predicted.copy()
+    pose[2] += turn_rad
+    for i in range(-shifts, shifts + 1):
+        for j in range(-shifts, shifts + 1):
+            pose[0], pose[1] = predicted[0] + 2.0 * cell_m * i, predicted[1] + 2.0 * cell_m * j
+            value = score(field, predicted[:2], cell_m, points, pose)
+            values[i + shifts, j + shifts] = value + _tie(pose - predicted, information)
+    return values
+
+
+@nb.njit(cache=True, nogil=True)
+def _peaks(values, predicted, turn_rad, grid, best, kept):  # type: ignore[no-untyped-def]
+    """Put the best shifts of one heading, apart from each other, among the best of all; return how many these are."""
+    size = values.shape[0]
+    apart = grid.apart_m / (2.0 * grid.cell_m)
+    entry = np.empty(4)
+    for _ in range(grid.starts):
+        at = np.argmax(values)
+        top_i, top_j = at // size, at % size
+        if values[top_i, top_j] == -np.inf:
+            break
+        entry[0] = values[top_i, top_j]
+        entry[1] = predicted[0] + 2.0 * grid.cell_m * (top_i - size // 2)
+        entry[2] = predicted[1] + 2.0 * grid.cell_m * (top_j - size // 2)
+        entry[3] = predicted[2] + turn_rad
+        kept = _keep(best, kept, entry, grid)
+        for i in range(size):
+            for j in range(size):
+                if (i - top_i) ** 2 + (j - top_j) ** 2 < apart * apart:
+                    values[i, j] = -np.inf
+    return kept
 
 
 @nb.njit(cache=True, nogil=True)
@@ -87,16 +139,21 @@ def _tie(error, information):  # type: ignore[no-untyped-def]
 
 
 @nb.njit(cache=True, nogil=True)
-def _keep(best, top, apart_rad):  # type: ignore[no-untyped-def]
-    """Put `top` among the best, one for each neighbourhood in heading."""
-    for k in range(best.shape[0]):
-        if best[k, 0] > -1e29 and abs(best[k, 3] - top[3]) < apart_rad:
-            if top[0] > best[k, 0]:
-                best[k] = top
-            return
+def _keep(best, kept, entry, grid):  # type: ignore[no-untyped-def]
+    """Put an entry among the best, one for each neighbourhood; return how many these are."""
+    for k in range(kept):
+        near = (best[k, 1] - entry[1]) ** 2 + (best[k, 2] - entry[2]) ** 2 < grid.apart_m**2
+        if near and abs(best[k, 3] - entry[3]) < _APART_STEPS * grid.step_rad:
+            if entry[0] > best[k, 0]:
+                best[k] = entry
+            return kept
+    if kept < best.shape[0]:
+        best[kept] = entry
+        return kept + 1
     worst = np.argmin(best[:, 0])
-    if top[0] > best[worst, 0]:
-        best[worst] = top
+    if entry[0] > best[worst, 0]:
+        best[worst] = entry
+    return kept
 
 
 @nb.njit(cache=True, nogil=True)
