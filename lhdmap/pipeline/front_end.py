@@ -25,8 +25,6 @@ from lhdmap.messages import (
 from lhdmap.odometry.cloud_motion import CloudPrior
 from lhdmap.odometry.planar import View
 from lhdmap.odometry.rear_view import RearView
-from lhdmap.odometry.scan_points import NO_BOXES
-from lhdmap.odometry.slant import rise_of
 from lhdmap.odometry.start import ScanInput
 from lhdmap.odometry.steps import WheelStep
 from lhdmap.pipeline.mounts import Mounts, level_sensor
@@ -34,6 +32,8 @@ from lhdmap.pipeline.rear import RearScans
 from lhdmap.pipeline.sweep_times import SweepTimes
 from lhdmap.proprioception.attitude import AttitudeFilter
 from lhdmap.proprioception.wheels import WheelOdometry
+from lhdmap.scan_matching.scan_points import NO_BOXES
+from lhdmap.scan_matching.slant import rise_of
 
 DEFAULT_MACHINE = Machine()
 _TILTED = 0.01  # rise of the scan plane ahead (m/m)

@@ -15,7 +15,6 @@ from lhdmap.geometry import se3
 from lhdmap.logs.source import LogSource
 from lhdmap.machine import Machine
 from lhdmap.messages import FloatArray, LaserScan, Message, Mount
-from lhdmap.odometry.scan_points import half_sweep_ns
 from lhdmap.pile.face import Registration
 from lhdmap.pile.heap import measure_cloud
 from lhdmap.pile.result import Approach, PileReport, Snapshot
@@ -27,6 +26,7 @@ from lhdmap.pipeline.pile import NO_INCLINOMETER, PileWatch, PlacedScan
 from lhdmap.pipeline.said import said_once
 from lhdmap.pipeline.sweep_times import SweepTimes
 from lhdmap.pipeline.track import FinalTrack, Rows
+from lhdmap.scan_matching.scan_points import half_sweep_ns
 
 _ROLES = ("tf_static", "front", "rear", "points", "inclinometer", "joints", "tachometer", "wheel_odometry")
 _LEVEL = (

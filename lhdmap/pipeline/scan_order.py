@@ -6,7 +6,7 @@ from collections import deque
 from typing import NamedTuple
 
 from lhdmap.messages import LaserScan, PointCloud
-from lhdmap.odometry.scan_points import half_sweep_ns
+from lhdmap.scan_matching.scan_points import half_sweep_ns
 
 LONG_AGO_NS = -(2**62)
 _WARM_SCANS, _FEWEST_WARM_SCANS, _WARM_NS = 50, 6, 1_500_000_000
