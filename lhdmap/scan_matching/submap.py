@@ -93,7 +93,7 @@ class Submap:
             hits: the scan; the search uses the front scanner's hits.
             predicted: where it is thought to be (`unsure`, where nothing tells how well). It breaks ties between the poses that
                 matches start from, and holds a match where walls do not; it does not hold it back elsewhere.
-            reach: how far from there it may be, metres and radians, shape (2,).
+            reach: how far from there matches start, metres and radians, shape (2,); one may end a little beyond.
         """
         points = hits.points[: hits.front]
         if not len(points) or not self._seen:

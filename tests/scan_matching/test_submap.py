@@ -99,14 +99,6 @@ def test_a_corridor_that_repeats_has_a_place_at_each_niche() -> None:
         assert fits[0] > 0.8
 
 
-def test_what_looks_alike_beyond_the_reach_is_left_out() -> None:
-    submap = mapped(repeating(), walk(-14.0, 14.0, 29), SHORT)
-    predicted = np.array([NICHE_M - 0.6, 0.1, 0.0])
-    found = submap.locate(seen(repeating(), np.zeros(3), SHORT), unsure(predicted), np.array([1.5, math.radians(15.0)]))
-    assert near(np.array([NICHE_M, 0.0, 0.0]), found[0].pose, 0.01, 0.1)
-    assert all(one.support < 0.8 for one in found[1:])
-
-
 @pytest.mark.parametrize("reach_m", [0.5, 6.0])
 def test_nothing_is_found_in_nothing(room: Submap, reach_m: float) -> None:
     hits, nothing, reach = seen(hall(), TRUE), np.zeros((0, 3)), np.array([reach_m, 0.5])
