@@ -18,6 +18,7 @@ _PLAIN_GRID = SearchGrid()
 _WINDOW_CELLS, _HIT_LIMIT = 2048, 50.0
 _HARDLY_HELD = np.diag([1e-2, 1e-2, 1e-1])  # 10 m and 3 rad
 _WEAKER = 0.01
+_CLEARLY = 0.02  # more support: a match that ended better, not one that ended a hair away
 
 
 class Submap:
@@ -85,14 +86,14 @@ class Submap:
     def locate(self, hits: Hits, predicted: Prior, reach: FloatArray) -> list[Match]:
         """Return where a scan may be, best first, by the share of its hits that agree; none where nothing is like it.
 
-        Each match is at a place of its own: one that the search cannot tell from a better one is left out. Whether the first
-        is good enough, and better enough than the second, is the caller's to say.
+        Each match is at a place of its own. Whether the first is good enough, and better enough than the second, is the caller's
+        to say.
 
         Args:
             hits: the scan; the search uses the front scanner's hits.
-            predicted: where it is thought to be (`unsure`, where nothing tells how well). It breaks ties between places that look
-                alike, and holds the match where walls do not; it does not hold it back elsewhere.
-            reach: how far from there it may be, metres and radians, shape (2,).
+            predicted: where it is thought to be (`unsure`, where nothing tells how well). It breaks ties between the poses that
+                matches start from, and holds a match where walls do not; it does not hold it back elsewhere.
+            reach: how far from there matches start, metres and radians, shape (2,); one may end a little beyond.
         """
         points = hits.points[: hits.front]
         if not len(points) or not self._seen:
@@ -100,15 +101,16 @@ class Submap:
         thin = points[:: max(len(points) // self._grid.beams, 1)]
         starts = search(np.concatenate(self._seen), thin, predicted.pose, predicted.information, reach, self._grid)
         held = weakened(predicted)
-        found = [self.align(hits, held, start) for start in starts]
-        return self._distinct(sorted(found, key=lambda one: one.support, reverse=True))
+        found = self._distinct([self.align(hits, held, start) for start in starts])
+        return sorted(found, key=lambda one: one.support, reverse=True)
 
     def _distinct(self, matches: list[Match]) -> list[Match]:
-        """Leave out matches without support and those that ended at the place of a better one."""
+        """Return one match for each place: that from the likeliest start, or a clearly better one; none without support."""
         kept: list[Match] = []
         for one in matches:
-            if one.support > 0.0 and not any(self._same(one, other) for other in kept):
-                kept.append(one)
+            place = next((k for k, other in enumerate(kept) if self._same(one, other)), len(kept))
+            if one.support > (kept[place].support + _CLEARLY if place < len(kept) else 0.0):
+                kept[place : place + 1] = [one]
         return kept
 
     def _same(self, a: Match, b: Match) -> bool:

@@ -128,3 +128,17 @@ def test_keys_are_a_metre_apart_and_remember_weakness() -> None:
     assert np.diff(places) == pytest.approx(1.0, abs=0.11)
     assert [key.weak for key in keys.keys].count(True) == 1
     assert keys.keys[-1].travelled_m == pytest.approx(places[-1])
+
+
+def test_a_key_says_how_sure_its_step_is() -> None:
+    """A random walk: variances of steps add up to that of the way; a weak step is ten times as wide; the first has none."""
+    keys = KeyScans(SETTINGS)
+    for k in range(1001):
+        keys.update(k, np.array([0.1 * k, 0.0, 0.0]), np.ones((5, 3)), weak=k == 505)
+    steps = np.array([key.step_covariance for key in keys.keys])
+    weak = np.array([key.weak for key in keys.keys])
+    way_m = keys.keys[-1].travelled_m - 1.0
+    assert (steps[0] == 0.0).all()
+    assert steps[~weak, 0, 0].sum() == pytest.approx(SETTINGS.along_sigma**2 * way_m, rel=0.02)
+    assert steps[~weak, 2, 2].sum() == pytest.approx(math.radians(SETTINGS.heading_sigma_deg) ** 2 * way_m, rel=0.02)
+    assert steps[weak, 0, 0] == pytest.approx(SETTINGS.weak_sigma**2, rel=0.11)
