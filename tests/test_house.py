@@ -27,9 +27,9 @@ PACKAGE = ROOT / "lhdmap"
 
 FLOORS = [
     {"errors"},
-    {"messages", "settings", "resources", "names", "interrupts"},
-    {"geometry", "tables", "provenance", "outputs"},
-    {"trajectory"},
+    {"messages", "settings", "resources", "names", "interrupts", "descriptions"},
+    {"geometry", "tables", "provenance", "outputs", "json_files"},
+    {"trajectory", "runfolder"},
     {"machine", "mapfolder"},
     {"kinematics"},
     {"logs", "proprioception", "odometry", "integration"},

@@ -5,14 +5,14 @@ from __future__ import annotations
 import multiprocessing
 import signal
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 from typing import NamedTuple
 
 from lhdmap.errors import ConfigError
-from lhdmap.outputs import OutputFolder
+from lhdmap.runfolder import RunFolderWriter, RunInfo
 from lhdmap.settings import load_section, nearest, read_toml, setting
 from lhdmap.simulation.pile_files import row_of, write_table
 from lhdmap.simulation.pile_scenes import scene
@@ -77,27 +77,32 @@ def load_suite(path: Path) -> list[SuiteScene]:
 
 
 def write_suite(
-    scenes: list[SuiteScene], folder: Path, *, jobs: int = 1, told: Told | None = None, force: bool = False
+    scenes: list[SuiteScene],
+    folder: Path,
+    *,
+    jobs: int = 1,
+    told: Told | None = None,
+    force: bool = False,
+    sources: Sequence[Path] = (),
 ) -> Path:
     """Write the logs of all scenes into `folder`, with their truth and the table `truth.csv`; return the table.
 
     What is in the partial folder already (from a run that was interrupted) stays. `told(name, done, of)` hears of each
-    finished scene.
+    finished scene; `sources` are the files that say which scenes.
 
     Raises:
         UsageError: the folder is there already, without `force`.
         OSError: a file cannot be written.
     """
-    with OutputFolder(folder, force=force, resumed=True) as growing:
+    with RunFolderWriter("suite", folder, force=force, inputs=sources, resumed=True) as growing:
         wanted = [one for one in scenes if not _finished(one, growing.path)]
         for done, name in enumerate(_written(wanted, growing.path, jobs), start=1):
-            growing.finished.append(name)
+            growing.finished(growing.path / f"{name}.mcap")
             if told is not None:
                 told(name, done, len(wanted))
         rows = (row_of(growing.path / f"{one.name}.pile.json", growing.path) for one in scenes)
         write_table(growing.path / TABLE, rows)
-        growing.describe("suite", {"scenes": [one.name for one in scenes]})
-        return growing.complete() / TABLE
+        return growing.complete(RunInfo(sources, more={"scenes": [one.name for one in scenes]})) / TABLE
 
 
 def _finished(one: SuiteScene, folder: Path) -> bool:
