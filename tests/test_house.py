@@ -28,7 +28,7 @@ PACKAGE = ROOT / "lhdmap"
 FLOORS = [
     {"errors"},
     {"messages", "settings", "resources", "names", "interrupts", "descriptions"},
-    {"geometry", "tables", "provenance", "outputs", "json_files"},
+    {"geometry", "tables", "provenance", "outputs", "json_files", "roles"},
     {"trajectory", "runfolder"},
     {"machine", "mapfolder"},
     {"kinematics"},

@@ -26,8 +26,8 @@ from lhdmap.pipeline.pile import NO_INCLINOMETER, PileWatch, PlacedScan
 from lhdmap.pipeline.said import said_once
 from lhdmap.pipeline.sweep_times import SweepTimes
 from lhdmap.pipeline.track import FinalTrack, Rows
+from lhdmap.roles import PILE, read_by
 
-_ROLES = ("tf_static", "front", "rear", "points", "inclinometer", "joints", "tachometer", "wheel_odometry")
 _LEVEL = (
     "no inclinometer in the log: no pile was looked for, its slope shows only where roll and pitch are known; "
     "--poses gives them"
@@ -74,7 +74,7 @@ def identify(
 
 
 def _feed(pipeline: MappingPipeline, source: LogSource) -> None:
-    for role, message in source.messages([role for role in _ROLES if role in source.roles]):
+    for role, message in source.messages([role for role in read_by(PILE) if role in source.roles]):
         pipeline.update(role, message)
     pipeline.finish()
 
