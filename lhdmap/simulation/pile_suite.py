@@ -13,7 +13,8 @@ from typing import NamedTuple
 
 from lhdmap.errors import ConfigError
 from lhdmap.runfolder import RunFolderWriter, RunInfo
-from lhdmap.settings import load_section, nearest, read_toml, setting
+from lhdmap.settings import setting
+from lhdmap.settings_tree import load_tree, part
 from lhdmap.simulation.pile_files import row_of, write_table
 from lhdmap.simulation.pile_scenes import scene
 from lhdmap.simulation.pile_sections import VARIANTS
@@ -31,6 +32,13 @@ class SuitePart:
     first_seed: int = setting(0, minimum=0, doc="First of the seeds.")
     count: int = setting(1, minimum=1, maximum=100_000, doc="How many seeds, one after the other.")
     flat_floor: bool = setting(False, doc="Whether the floor has no waves.")
+
+
+@dataclass(frozen=True, slots=True)
+class Suite:
+    """A suite file."""
+
+    scenes: tuple[SuitePart, ...] = part(tuple)
 
 
 class SuiteScene(NamedTuple):
@@ -57,20 +65,10 @@ def load_suite(path: Path) -> list[SuiteScene]:
         InputError: the file cannot be read or is not TOML.
         ConfigError: a key or a value in it is wrong, or a scene is in it twice.
     """
-    table = read_toml(path, "suite file")
-    for key in table:
-        if key != "scenes":
-            raise ConfigError(f"{path}: unknown key '{key}'{nearest(key, ['scenes'])}")
-    parts = table.get("scenes", [])
-    if not isinstance(parts, list) or not parts:
+    parts = load_tree(Suite, path, "suite file").scenes
+    if not parts:
         raise ConfigError(f"{path}: at least one [[scenes]] was wanted")
-    try:
-        sections = [load_section(SuitePart, "scenes", part) for part in parts]
-    except ConfigError as error:
-        raise ConfigError(f"{path}: {error}") from error
-    found = [
-        SuiteScene(part.variant, part.first_seed + k, part.flat_floor) for part in sections for k in range(part.count)
-    ]
+    found = [SuiteScene(one.variant, one.first_seed + k, one.flat_floor) for one in parts for k in range(one.count)]
     if len(set(found)) < len(found):
         raise ConfigError(f"{path}: a scene is in it twice; give each [[scenes]] its own first_seed")
     return found
