@@ -32,6 +32,7 @@ FLOORS = [
     {"trajectory", "runfolder"},
     {"machine", "mapfolder"},
     {"kinematics"},
+    {"scan_matching"},
     {"logs", "proprioception", "odometry", "integration"},
     {"pile", "rockbreaker"},
     {"smoothing", "simulation", "evaluation"},

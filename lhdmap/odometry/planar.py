@@ -14,11 +14,12 @@ from lhdmap.odometry.clock import ScanClock
 from lhdmap.odometry.flow_matcher import FlowMatcher
 from lhdmap.odometry.motion import Motion
 from lhdmap.odometry.rear_view import NO_POINTS, NOTHING_BEHIND, Behind, RearView, behind
-from lhdmap.odometry.scan_points import NO_BOXES, half_sweep_ns, planar_points
 from lhdmap.odometry.settings import AnchorSettings, OdometrySettings, RangeFlowSettings, SearchSettings
-from lhdmap.odometry.slant import NO_RISE
-from lhdmap.odometry.steps import Matched, OdometryStep, WheelStep, body_information, inflated, marginal_information
+from lhdmap.odometry.steps import Matched, OdometryStep, WheelStep
 from lhdmap.odometry.wheel_model import WheelModel
+from lhdmap.scan_matching.information import body_information, inflated, marginal_information
+from lhdmap.scan_matching.scan_points import NO_BOXES, half_sweep_ns, planar_points
+from lhdmap.scan_matching.slant import NO_RISE
 
 _FIRST_SCANS = 10
 _SLOWEST_REAR_MPS = 0.1

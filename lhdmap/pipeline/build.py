@@ -105,7 +105,8 @@ def build_map(request: BuildRequest) -> BuildResult:
                 primary,
                 pile=PileBeside(inspector),
             )
-            _run(pipeline, source, request.progress, interruption)
+            with pipeline:
+                _run(pipeline, source, request.progress, interruption)
             as_recorded = partial(source.recorded_ns, primary)
             # An interruption of what follows must not lose it.
             folder.write_odometry(_stamped(odometry_of(pipeline), as_recorded))

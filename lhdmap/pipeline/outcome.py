@@ -236,7 +236,7 @@ def _of_the_pile(pile: PileReport | None) -> Sequence[str]:
 
 def _witness(pipeline: MappingPipeline) -> str:
     """Return which sensors told of the motion beside the scans; empty where none did."""
-    told, steps = pipeline.wheel_sources, sum(pipeline.wheel_sources.values())
+    told, steps = pipeline.front_end.wheel_sources, sum(pipeline.front_end.wheel_sources.values())
     if pipeline.odometry is not None:
         wheels = pipeline.odometry.wheels
         steps = 0 if wheels.trust.warning() else steps - wheels.stale.steps

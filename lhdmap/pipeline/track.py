@@ -51,8 +51,19 @@ class Track:
         """Height of the newest pose, 0 at the start."""
         return self._poses[-1][2] if self._poses else 0.0
 
+    @property
+    def newest(self) -> tuple[float, ...]:
+        """The newest pose: x, y, z (m), roll, pitch, heading (rad)."""
+        return self._poses[-1]
+
     def append(self, time_ns: int, T_odom_base: FloatArray, roll_rad: float, pitch_rad: float) -> None:
         """Add a planar pose (3,) with its attitude; `time_ns` must rise."""
+        pose = self.ahead(T_odom_base, roll_rad, pitch_rad)
+        self._times.append(time_ns)
+        self._poses.append(pose)
+
+    def ahead(self, T_odom_base: FloatArray, roll_rad: float, pitch_rad: float) -> tuple[float, ...]:
+        """Return the pose (x, y, z, roll, pitch, heading) that a planar pose (3,) with its attitude would add."""
         x, y, heading = (float(value) for value in T_odom_base)
         z = 0.0
         if self._poses:
@@ -65,8 +76,7 @@ class Track:
             z += -forward * math.tan(pitch) + left * math.tan(roll) / math.cos(pitch)
             # The slope is that of the floor between the axles: base_link, at the front, is already further up or down it.
             z -= self._lever_m * (math.tan(pitch_rad) - math.tan(pitch0))
-        self._times.append(time_ns)
-        self._poses.append((x, y, z, roll_rad, pitch_rad, heading))
+        return x, y, z, roll_rad, pitch_rad, heading
 
     def extend(self, rows: Rows) -> None:
         """Add rows that are complete, height included; their times must rise."""

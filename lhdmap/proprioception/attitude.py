@@ -145,6 +145,17 @@ class AttitudeFilter:
             self._silent_s = max(self._silent_s, (stamp_ns - self._held_ns) * 1e-9)
         return self._held
 
+    def causal_at(self, now_ns: int) -> Attitude | None:
+        """Return the latest attitude that the samples so far tell of, at `now_ns` or before it; None where there is none.
+
+        Not what `attitude_at` will say later: the samples lie on one side only, and the lag is not waited for.
+        """
+        newest_ns = self._samples.latest_ns
+        if newest_ns is None:
+            return None
+        delay_s = self.settings.lag_s if self.settings.lag_kind == "delay" else 0.0
+        return self._attitude(min(now_ns, newest_ns - round(delay_s * 1e9)))
+
     def texts(self) -> list[str]:
         """Return what was odd, in words."""
         silent = f"inclinometer: silent for {self._silent_s:.1f} s and more; the attitude before was kept there"

@@ -113,6 +113,12 @@ class WheelOdometry:
         newest = ((samples.latest_ns, limit_ns) for samples, limit_ns in limits)
         return min((ns for ns, limit_ns in newest if ns is not None and judged_ns - ns <= limit_ns), default=now_ns)
 
+    @property
+    def heard_until_ns(self) -> int | None:
+        """Time of the newest sample, of the slower of the sensors that tell the motion; None where there are none."""
+        driven = [samples.latest_ns for samples in (self._speeds, self._angles) if samples.latest_ns is not None]
+        return min(driven) if driven else self._poses.samples.latest_ns
+
     def speed_at(self, stamp_ns: int) -> float | None:
         """Return the tachometer's speed as it was measured (m/s, not calibrated), or None where there is none."""
         return self._value(self._speeds, stamp_ns)

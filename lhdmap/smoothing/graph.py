@@ -2,20 +2,17 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 
 from lhdmap.geometry import se2
 from lhdmap.messages import FloatArray
+from lhdmap.scan_matching.key_scan import KeyScan
 from lhdmap.smoothing.closures import Closure
-from lhdmap.smoothing.keys import KeyScan
-from lhdmap.smoothing.settings import SmoothingSettings
 
 _CAUCHY = 1.0
 
 
-def smoothed(keys: list[KeyScan], closures: list[Closure], settings: SmoothingSettings) -> FloatArray:
+def smoothed(keys: list[KeyScan], closures: list[Closure]) -> FloatArray:
     """Return the poses of the keys, shape (N, 3), in the frame of the first: maximum a posteriori.
 
     Without closures these are the odometry's own.
@@ -32,7 +29,7 @@ def smoothed(keys: list[KeyScan], closures: list[Closure], settings: SmoothingSe
         values.insert(index, gtsam.Pose2(*pose))
     for index in range(len(keys) - 1):
         step = se2.between(poses[index], poses[index + 1])
-        noise = gtsam.noiseModel.Diagonal.Sigmas(_step_sigmas(keys[index], keys[index + 1], settings))
+        noise = gtsam.noiseModel.Gaussian.Covariance(keys[index + 1].step_covariance)
         graph.add(gtsam.BetweenFactorPose2(index, index + 1, gtsam.Pose2(*step), noise))
     for closure in closures:
         gaussian = gtsam.noiseModel.Gaussian.Covariance(closure.covariance)
@@ -42,12 +39,3 @@ def smoothed(keys: list[KeyScan], closures: list[Closure], settings: SmoothingSe
     solved = gtsam.LevenbergMarquardtOptimizer(graph, values).optimize()
     found = [solved.atPose2(index) for index in range(len(keys))]
     return np.array([[pose.x(), pose.y(), pose.theta()] for pose in found])
-
-
-def _step_sigmas(before: KeyScan, after: KeyScan, settings: SmoothingSettings) -> FloatArray:
-    """Return the standard deviations (3,) of a step between keys: a random walk with the travel, wider where weak."""
-    travel_m = max(after.travelled_m - before.travelled_m, 0.1)
-    position = (settings.weak_sigma if after.weak else settings.along_sigma) * math.sqrt(travel_m)
-    turn = abs(float(se2.wrap(after.pose[2] - before.pose[2])))
-    heading = math.radians(settings.heading_sigma_deg) * math.sqrt(travel_m) + 0.002 * turn
-    return np.array([position, position, heading])

@@ -3,26 +3,15 @@
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
 
 import numpy as np
 
 from lhdmap.geometry import se2
-from lhdmap.messages import Float32Array, FloatArray
+from lhdmap.messages import FloatArray
+from lhdmap.scan_matching.key_scan import NO_STEP, KeyScan
 from lhdmap.smoothing.settings import SmoothingSettings
 
-
-class KeyScan(NamedTuple):
-    """A scan kept: time, pose (3,) by odometry, distance travelled, hits (N, 3), and whether the odometry was weak before it.
-
-    The hits are in the level base frame; `weak` tells of the way since the key before.
-    """
-
-    time_ns: int
-    pose: FloatArray
-    travelled_m: float
-    points: Float32Array
-    weak: bool
+_SHORTEST_M, _PER_TURN = 0.1, 0.002
 
 
 class KeyScans:
@@ -42,7 +31,10 @@ class KeyScans:
         self._last = pose.copy()
         self._weak |= weak
         if self._due(pose) and len(points) > 0:
-            self.keys.append(KeyScan(time_ns, pose.copy(), self._travelled_m, points.astype(np.float32), self._weak))
+            key = KeyScan(time_ns, pose.copy(), self._travelled_m, points.astype(np.float32), self._weak, NO_STEP)
+            if self.keys:
+                key = key._replace(step_covariance=walked(self.keys[-1], key, self._settings))
+            self.keys.append(key)
             self._weak = False
 
     def _due(self, pose: FloatArray) -> bool:
@@ -51,3 +43,12 @@ class KeyScans:
         step = se2.between(self.keys[-1].pose, pose)
         far = float(np.hypot(step[0], step[1])) >= self._settings.key_m
         return far or abs(step[2]) >= math.radians(self._settings.key_deg)
+
+
+def walked(before: KeyScan, after: KeyScan, settings: SmoothingSettings) -> FloatArray:
+    """Return the covariance (3, 3) of a step between keys: a random walk with the travel, wider where weak."""
+    travel_m = max(after.travelled_m - before.travelled_m, _SHORTEST_M)
+    position = (settings.weak_sigma if after.weak else settings.along_sigma) * math.sqrt(travel_m)
+    turn = abs(float(se2.wrap(after.pose[2] - before.pose[2])))
+    heading = math.radians(settings.heading_sigma_deg) * math.sqrt(travel_m) + _PER_TURN * turn
+    return np.diag([position**2, position**2, heading**2])

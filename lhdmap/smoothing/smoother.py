@@ -9,9 +9,10 @@ import numpy.typing as npt
 
 from lhdmap.geometry import se2
 from lhdmap.messages import FloatArray
+from lhdmap.scan_matching.key_scan import KeyScan
 from lhdmap.smoothing.closures import find_closures
 from lhdmap.smoothing.graph import smoothed
-from lhdmap.smoothing.keys import KeyScan, KeyScans
+from lhdmap.smoothing.keys import KeyScans
 from lhdmap.smoothing.settings import SmoothingSettings
 
 
@@ -39,7 +40,7 @@ class Smoother:
         closures = find_closures(keys, self._settings) if self._settings.closures else []
         if not closures:
             return None
-        poses = smoothed(keys, closures, self._settings)
+        poses = smoothed(keys, closures)
         moved = np.array([se2.compose(pose, se2.inverse(key.pose)) for pose, key in zip(poses, keys, strict=True)])
         moved[:, 2] = np.unwrap(moved[:, 2])
         return Correction(np.array([key.time_ns for key in keys], dtype=np.int64), moved, len(closures))

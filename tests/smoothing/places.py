@@ -4,13 +4,16 @@ from __future__ import annotations
 
 import functools
 import math
+from itertools import pairwise
 
 import numpy as np
 from lhdmap.geometry import se2
 from lhdmap.messages import FloatArray
-from lhdmap.odometry.scan_points import planar_points
+from lhdmap.scan_matching.key_scan import NO_STEP, KeyScan
+from lhdmap.scan_matching.scan_points import planar_points
 from lhdmap.simulation.planar import PlanarScanner, PlanarWorld, drift_world, simulate_scans, world_from_polylines
-from lhdmap.smoothing.keys import KeyScan
+from lhdmap.smoothing.keys import walked
+from lhdmap.smoothing.settings import SmoothingSettings
 
 SIDE_M = 16.0
 
@@ -63,8 +66,14 @@ def keys_of(world: PlanarWorld, true: FloatArray, odometry: FloatArray, reach_m:
     keys = []
     for scan, pose, way in zip(scans, odometry, travelled, strict=True):
         points = planar_points(scan, np.eye(4), np.zeros(3)).astype(np.float32)
-        keys.append(KeyScan(scan.stamp_ns, pose.copy(), float(way), points, False))
-    return keys
+        keys.append(KeyScan(scan.stamp_ns, pose.copy(), float(way), points, False, NO_STEP))
+    return with_steps(keys)
+
+
+def with_steps(keys: list[KeyScan]) -> list[KeyScan]:
+    """Return keys with the covariances of their steps, as `KeyScans` fills them in."""
+    steps = [walked(*pair, SmoothingSettings()) for pair in pairwise(keys)]
+    return [*keys[:1], *(key._replace(step_covariance=step) for key, step in zip(keys[1:], steps, strict=True))]
 
 
 def straight(count: int, rms_m: float) -> tuple[PlanarWorld, FloatArray]:

@@ -8,13 +8,14 @@ import numpy as np
 import pytest
 from lhdmap.geometry import se2
 from lhdmap.messages import FloatArray
+from lhdmap.scan_matching.key_scan import NO_STEP, KeyScan
 from lhdmap.smoothing.closures import Closure, _confirmed, find_closures
 from lhdmap.smoothing.graph import smoothed
-from lhdmap.smoothing.keys import KeyScan, KeyScans
+from lhdmap.smoothing.keys import KeyScans
 from lhdmap.smoothing.settings import SmoothingSettings
 from lhdmap.smoothing.smoother import Smoother
 
-from tests.smoothing.places import drifted, keys_of, lap, square, straight
+from tests.smoothing.places import drifted, keys_of, lap, square, straight, with_steps
 
 SETTINGS = SmoothingSettings()
 NO_POINTS = np.zeros((1, 3), dtype=np.float32)
@@ -40,7 +41,7 @@ def test_a_second_lap_closes_the_loop(twice_round: tuple[FloatArray, list[KeySca
 def test_the_graph_shrinks_the_error(twice_round: tuple[FloatArray, list[KeyScan]]) -> None:
     true, keys = twice_round
     before = np.array([key.pose for key in keys])
-    after = smoothed(keys, find_closures(keys, SETTINGS), SETTINGS)
+    after = smoothed(keys, find_closures(keys, SETTINGS))
     assert after[0] == pytest.approx(true[0], abs=1e-4)
     assert (
         np.hypot(*(after[64:, :2] - true[64:, :2]).T).mean()
@@ -75,7 +76,8 @@ def test_there_and_back_in_a_smooth_drift_fixes_nothing_along() -> None:
 
 
 def plain_keys(count: int) -> list[KeyScan]:
-    return [KeyScan(k, np.array([float(k), 0.0, 0.0]), float(k), NO_POINTS, False) for k in range(count)]
+    poses = [np.array([float(k), 0.0, 0.0]) for k in range(count)]
+    return with_steps([KeyScan(k, pose, float(k), NO_POINTS, False, NO_STEP) for k, pose in enumerate(poses)])
 
 
 def closure(earlier: int, current: int, shift_m: float = 0.0) -> Closure:
@@ -99,7 +101,7 @@ def test_the_graph_of_a_tiny_loop_has_the_least_squares_solution() -> None:
     keys, sigma = plain_keys(4), SETTINGS.along_sigma
     variance = 1e4 * np.diag([sigma**2, sigma**2, 1.0])  # so weak that the robust kernel stays quadratic
     shift = 0.001
-    found = smoothed(keys, [Closure(0, 3, np.array([3.0 + shift, 0.0, 0.0]), variance)], SETTINGS)
+    found = smoothed(keys, [Closure(0, 3, np.array([3.0 + shift, 0.0, 0.0]), variance)])
     weight = (1 / (1e4 * sigma**2)) / (1 / (1e4 * sigma**2) + 1 / (3 * sigma**2))
     assert found[3, 0] - 3.0 == pytest.approx(shift * weight, rel=0.01)
     assert np.diff(found[:, 0]) == pytest.approx(np.full(3, 1.0 + shift * weight / 3), abs=1e-9)
@@ -107,7 +109,7 @@ def test_the_graph_of_a_tiny_loop_has_the_least_squares_solution() -> None:
 
 def test_one_gross_closure_does_not_bend_the_graph() -> None:
     right = [closure(k, k + 30) for k in range(20)]
-    found = smoothed(plain_keys(50), [*right, closure(10, 41, shift_m=15.0)], SETTINGS)
+    found = smoothed(plain_keys(50), [*right, closure(10, 41, shift_m=15.0)])
     assert np.abs(found[:, 0] - np.arange(50.0)).max() < 0.1
 
 

@@ -22,8 +22,8 @@ from lhdmap.messages import FloatArray, LaserScan, Mount
 from lhdmap.odometry.flow_scan import Pyramid
 from lhdmap.odometry.planar import PlanarOdometry
 from lhdmap.odometry.range_flow import Flow, flow
-from lhdmap.odometry.scan_points import planar_points
 from lhdmap.odometry.settings import OdometrySettings, RangeFlowSettings
+from lhdmap.scan_matching.scan_points import planar_points
 from lhdmap.simulation.planar import PlanarScanner, drift_world, drive_along, simulate_scans
 
 from tools.evaluate.figures import Figure
