@@ -8,46 +8,21 @@ from __future__ import annotations
 
 import contextlib
 import errno
-import json
 import os
 import shutil
 import warnings
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from types import TracebackType
-from typing import Any, Self
+from typing import Self
 
-from lhdmap import __version__
+from lhdmap.descriptions import described
 from lhdmap.errors import InputError, LhdmapWarning, UsageError, mark_kept
 from lhdmap.interrupts import before_interrupt, undisturbed
 
 PARTIAL_SUFFIX = ".partial"
-SOFTWARE = {"name": "lhdmap", "version": __version__}
-DESCRIPTIONS = ("map.json", "run.json")
-_KINDS = {"map": "trajectory.tum", "pile": "pile.json", "plan": "plan.json", "workspace": "workspace.json"}
 _FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 _MARK = ".lhdmap"  # in a folder that grows: whose it is; locked as long as its run goes on
-
-
-def described(folder: Path) -> Mapping[str, Any] | None:
-    """Return the description of a folder that lhdmap has made (`map.json` or `run.json`), None for any other folder."""
-    for name in DESCRIPTIONS:
-        with contextlib.suppress(OSError, ValueError):
-            found = json.loads((folder / name).read_text(encoding="utf-8"))
-            if isinstance(found, dict) and dict(found.get("software") or {}).get("name") == SOFTWARE["name"]:
-                return found
-    return None
-
-
-def kind_of(folder: Path) -> str | None:
-    """Return what a folder of lhdmap is: `map`, `pile`, `plan`, `workspace`, `demo`, `suite` …; None for any other."""
-    found = described(folder)
-    if found is None:
-        return None
-    for kind, file in _KINDS.items():
-        if "kind" not in found and (folder / file).is_file():
-            return kind
-    return str(found.get("kind", "run"))
 
 
 def free_folder(target: Path, *, force: bool = False, inputs: Sequence[Path] = ()) -> None:
@@ -143,11 +118,6 @@ class OutputFolder:
         if kept is not None and error is not None:
             mark_kept(error, kept)
         _name_place(error, self.path)
-
-    def describe(self, kind: str, values: Mapping[str, Any] | None = None) -> None:
-        """Write `run.json`: what kind of run this is, for folders that are no map."""
-        text = json.dumps({"software": SOFTWARE, "kind": kind, **(values or {})}, indent=2, ensure_ascii=False)
-        (self.path / "run.json").write_text(text + "\n", encoding="utf-8")
 
     def complete(self) -> Path:
         """Give the folder its name and return it; what it replaces is removed then, and not before.

@@ -17,10 +17,11 @@ from pathlib import Path
 from lhdmap.cli.console import Console
 from lhdmap.cli.options import add_output, add_topics, topic_overrides
 from lhdmap.cli.viewer import check_recording, started, viewer
+from lhdmap.descriptions import described, kind_of
 from lhdmap.errors import InputError, UsageError
 from lhdmap.interrupts import before_interrupt
 from lhdmap.names import in_utf8, name_of
-from lhdmap.outputs import OutputFiles, described, free_files, kind_of
+from lhdmap.outputs import OutputFiles, free_files
 
 WINDOW = "1600x1000"
 SCREENSHOT_LIMIT_S = 180.0

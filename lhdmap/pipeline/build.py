@@ -17,7 +17,7 @@ from lhdmap.errors import InputError, LhdmapWarning
 from lhdmap.integration.cloud_io import write_cloud
 from lhdmap.logs.source import LogSource
 from lhdmap.machine import Machine
-from lhdmap.mapfolder import FRAMES, Diagnostics, MapFolderWriter, MapInfo
+from lhdmap.mapfolder import Diagnostics, MapFolderWriter
 from lhdmap.messages import Message
 from lhdmap.outputs import free_folder
 from lhdmap.pipeline.beside import Beside, HelperDied, Here
@@ -32,6 +32,7 @@ from lhdmap.pipeline.refusal import require_a_map
 from lhdmap.provenance import file_entry, source_entry
 from lhdmap.report.page import fill_in_cost
 from lhdmap.report.recording import Thinning
+from lhdmap.runfolder import RunInfo
 from lhdmap.trajectory import Trajectory
 
 _ASKED = "interrupted: what was read so far is being written; Ctrl-C once more ends at once"
@@ -121,7 +122,7 @@ def build_map(request: BuildRequest) -> BuildResult:
         own = Spent(peak_memory_mib(), compiling.seconds)
         figures = outcome.summary | cost(started, outcome.duration_s, own, beside)  # one for page, map.json and screen
         fill_in_cost(folder.path / "report.html", figures)
-        info = MapInfo(request.logs, _options(request), figures, outcome.warnings, _frames(request))
+        info = RunInfo(request.logs, _options(request), figures, outcome.warnings, _frames(request))
         path = folder.complete(info, known)
     return BuildResult(path, figures | {"map": str(path)}, outcome.warnings, final)
 
@@ -220,4 +221,4 @@ def _options(request: BuildRequest) -> dict[str, Any]:
 
 
 def _frames(request: BuildRequest) -> dict[str, str]:
-    return FRAMES | ({"map": "that of the given poses"} if request.poses else {})
+    return {"map": "that of the given poses"} if request.poses else {}

@@ -26,9 +26,9 @@ from lhdmap.pipeline.pile import NO_INCLINOMETER, PileWatch, PlacedScan
 from lhdmap.pipeline.said import said_once
 from lhdmap.pipeline.sweep_times import SweepTimes
 from lhdmap.pipeline.track import FinalTrack, Rows
+from lhdmap.roles import PILE, read_by
 from lhdmap.scan_matching.scan_points import half_sweep_ns
 
-_ROLES = ("tf_static", "front", "rear", "points", "inclinometer", "joints", "tachometer", "wheel_odometry")
 _LEVEL = (
     "no inclinometer in the log: no pile was looked for, its slope shows only where roll and pitch are known; "
     "--poses gives them"
@@ -75,7 +75,7 @@ def identify(
 
 
 def _read(source: LogSource) -> Iterator[tuple[str, Message]]:
-    return source.messages([role for role in _ROLES if role in source.roles])
+    return source.messages([role for role in read_by(PILE) if role in source.roles])
 
 
 def _in_cloud(source: LogSource, settings: Settings, machine: Machine | None) -> PileReport:

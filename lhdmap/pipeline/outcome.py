@@ -31,11 +31,12 @@ from lhdmap.pipeline.sweeps import SweepIntegration
 from lhdmap.pipeline.track import FinalTrack, Rows, resample, trajectory_of
 from lhdmap.proprioception.wheels import WheelOdometry
 from lhdmap.report.data import ReportData, Summary, TopicRow
+from lhdmap.roles import BUILD_MAP, GIVEN_POSES, read_by
 from lhdmap.smoothing.smoother import corrected
 from lhdmap.trajectory import Trajectory
 
-ROLES_READ = ("front", "rear", "points", "inclinometer", "joints", "tachometer", "wheel_odometry", "tf_static")
-_ROLES_PLACED = ("front", "rear", "points", "joints", "tf_static")  # what is read of a log whose poses are given
+ROLES_READ = read_by(BUILD_MAP)
+_ROLES_PLACED = read_by(GIVEN_POSES)
 _OF_ODOMETRY = ("odometry:", "wheels:", "wheel odometry:", "tachometer:", "inclinometer:")
 _WITNESSES = {"articulated": "tachometer", "tachometer": "tachometer", "wheel_pose": "wheel odometry"}
 _FEWEST_TOLD = 0.1  # of the scans

@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 from lhdmap.cli.main import main
-from lhdmap.outputs import OutputFolder
+from lhdmap.runfolder import RunFolderWriter, RunInfo
 
 from tests.cli.logs import write_room_log
 
@@ -77,12 +77,11 @@ def test_files_that_changed_are_named(built: Path, tmp_path: Path, capsys: pytes
 
 
 def test_a_run_with_a_map_in_it_tells_of_both(built: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    with OutputFolder(tmp_path / "demo") as folder:
+    with RunFolderWriter("demo", tmp_path / "demo") as folder:
         (folder.path / "drive_map").mkdir()
         for path in built.iterdir():
             (folder.path / "drive_map" / path.name).write_bytes(path.read_bytes())
-        folder.describe("demo", {"map": "drive_map"})
-        demo = folder.complete()
+        demo = folder.complete(RunInfo(more={"map": "drive_map"}))
     found = values_of(demo, capsys)
     assert (found["kind"], found["map"]["kind"]) == ("demo", "map")
     assert main(["info", str(demo)]) == 0

@@ -14,8 +14,9 @@ import pytest
 from lhdmap.cli.main import main
 from lhdmap.errors import InputError, LhdmapWarning, UsageError, kept_with
 from lhdmap.interrupts import put_in_order
-from lhdmap.mapfolder import MapFolderWriter, MapInfo
-from lhdmap.outputs import OutputFiles, OutputFolder, described, kind_of
+from lhdmap.mapfolder import MapFolderWriter
+from lhdmap.outputs import OutputFiles, OutputFolder
+from lhdmap.runfolder import RunFolderWriter, RunInfo
 
 from tests.cli.logs import write_room_log
 
@@ -27,10 +28,9 @@ def log(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def old_run(target: Path) -> Path:
     """Make a complete folder with one file in it."""
-    with OutputFolder(target) as folder:
+    with RunFolderWriter("demo", target) as folder:
         (folder.path / "old.txt").write_text("old", encoding="utf-8")
-        folder.describe("demo")
-        return folder.complete()
+        return folder.complete(RunInfo())
 
 
 def names(folder: Path) -> list[str]:
@@ -39,11 +39,10 @@ def names(folder: Path) -> list[str]:
 
 def test_force_replaces_at_the_end_and_not_before(tmp_path: Path) -> None:
     old_run(tmp_path / "run")
-    with OutputFolder(tmp_path / "run", force=True) as folder:
+    with RunFolderWriter("demo", tmp_path / "run", force=True) as folder:
         (folder.path / "new.txt").touch()
         assert names(tmp_path / "run") == ["old.txt", "run.json"]
-        folder.describe("demo")
-        assert folder.complete() == tmp_path / "run"
+        assert folder.complete(RunInfo()) == tmp_path / "run"
     assert names(tmp_path / "run") == ["new.txt", "run.json"]
     assert names(tmp_path) == ["run"]
 
@@ -163,18 +162,6 @@ def test_files_get_their_names_together(tmp_path: Path) -> None:
         failed()
     assert [path.read_text(encoding="utf-8") for path in paths] == ["new", "new"]
     assert names(tmp_path / "new") == ["a.mcap", "a.txt"]
-
-
-def test_folders_are_known_by_their_description(tmp_path: Path) -> None:
-    with MapFolderWriter(tmp_path / "pile") as folder:
-        folder.write_json("pile.json", {})
-        folder.complete(MapInfo([]))
-    assert (kind_of(tmp_path / "pile"), kind_of(old_run(tmp_path / "demo")), kind_of(tmp_path)) == (
-        "pile",
-        "demo",
-        None,
-    )
-    assert described(tmp_path) is None
 
 
 @pytest.mark.parametrize(

@@ -18,8 +18,8 @@ from lhdmap.cli.view import recording_of
 from lhdmap.cli.viewer import check_recording
 from lhdmap.logs.writer import LogWriter
 from lhdmap.messages import LaserScan
-from lhdmap.outputs import OutputFolder
 from lhdmap.report.recording import RecordingWriter
+from lhdmap.runfolder import RunFolderWriter, RunInfo
 
 from tests.report.synthetic import START_NS
 
@@ -132,15 +132,13 @@ def test_a_whole_recording_is_not_refused(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("name", ["recording.rrd", "pile.rrd", "other.rrd"])
 def test_the_recording_of_any_run_is_found(name: str, tmp_path: Path) -> None:
-    with OutputFolder(tmp_path / "run") as folder:
+    with RunFolderWriter("replay", tmp_path / "run") as folder:
         written(folder.path / name)
-        folder.describe("replay")
-        run = folder.complete()
+        run = folder.complete(RunInfo())
     assert recording_of(run) == run / name
-    with OutputFolder(tmp_path / "demo") as folder:
+    with RunFolderWriter("demo", tmp_path / "demo") as folder:
         run.rename(folder.path / "inner")
-        folder.describe("demo", {"map": "inner"})
-        demo = folder.complete()
+        demo = folder.complete(RunInfo(more={"map": "inner"}))
     assert recording_of(demo) == demo / "inner" / name
 
 
