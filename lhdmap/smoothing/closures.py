@@ -19,9 +19,11 @@ from lhdmap.odometry.search import search
 from lhdmap.odometry.steps import marginal_information
 from lhdmap.odometry.surface_map import SurfaceMap, empty_map, insert_all
 from lhdmap.smoothing.keys import KeyScan
+from lhdmap.smoothing.places import Nearby
 from lhdmap.smoothing.settings import SmoothingSettings
 
 _SUBMAP_KEYS = 5  # keys on either side of the earlier one that make up its surroundings
+_SUBMAP_M = 20.0  # ... of travel: keys may be far apart where a place has been seen often
 _SEARCH_BEAMS = 120
 _LEVEL_M, _CLIMB_DRIFT = 1.0, 0.02  # a degree of bias in pitch: levels of a mine are farther apart than that
 _CELL_M = 0.04
@@ -40,32 +42,41 @@ class Closure(NamedTuple):
 
 
 def find_closures(keys: list[KeyScan], settings: SmoothingSettings) -> list[Closure]:
-    """Return the closures that neighbours confirm. The cost grows with the revisits, not with the square of the drive."""
+    """Return the closures that neighbours confirm. The cost grows with the keys, not with their square."""
     places = np.array([(*key.pose, float(key.points[:, 2].mean())) for key in keys]).reshape(-1, 4)
     travelled = np.array([key.travelled_m for key in keys])
     found: list[Closure] = []
+    nearby = Nearby(places[:, :2], settings.reach_limit_m)
     for current in range(len(keys)):
-        closure = _close(keys, places, travelled, current, settings)
+        closure = _close(keys, places, travelled, nearby, current, settings)
         if closure is not None:
             found.append(closure)
     return _confirmed(found, keys, settings)
 
 
 def _close(
-    keys: list[KeyScan], places: FloatArray, travelled: FloatArray, current: int, settings: SmoothingSettings
+    keys: list[KeyScan],
+    places: FloatArray,
+    travelled: FloatArray,
+    nearby: Nearby,
+    current: int,
+    settings: SmoothingSettings,
 ) -> Closure | None:
     """Try the earlier key nearest to this one on its level; `places` (N, 4): poses and heights of the keys' hits."""
     early = int(np.searchsorted(travelled, travelled[current] - settings.apart_m))
-    if early == 0:
+    nearby.add_until(early)
+    near = nearby.around(current)
+    if not len(near):
         return None
-    distances = np.hypot(*(places[:early, :2] - places[current, :2]).T)
-    above_m = np.abs(places[:early, 3] - places[current, 3])
-    distances[above_m > _LEVEL_M + _CLIMB_DRIFT * (travelled[current] - travelled[:early])] = np.inf
-    candidate = int(distances.argmin())
+    distances = np.hypot(*(places[near, :2] - places[current, :2]).T)
+    above_m = np.abs(places[near, 3] - places[current, 3])
+    distances[above_m > _LEVEL_M + _CLIMB_DRIFT * (travelled[current] - travelled[near])] = np.inf
+    nearest = int(distances.argmin())
+    candidate = int(near[nearest])
     reach_m = min(
         settings.reach_m + settings.drift * (travelled[current] - travelled[candidate]), settings.reach_limit_m
     )
-    if distances[candidate] > reach_m:
+    if distances[nearest] > reach_m:
         return None
     surroundings = _surroundings(keys, candidate, early)
     predicted = se2.between(places[candidate, :3], places[current, :3])
@@ -86,6 +97,7 @@ def _surroundings(keys: list[KeyScan], centre: int, before: int) -> FloatArray:
     parts = [
         se2.transform(se2.between(keys[centre].pose, key.pose), key.points.astype(np.float64))
         for key in keys[first:last]
+        if abs(key.travelled_m - keys[centre].travelled_m) <= _SUBMAP_M
     ]
     return np.concatenate(parts)
 

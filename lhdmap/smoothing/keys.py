@@ -1,4 +1,4 @@
-"""Key scans: what the smoother keeps of the drive, one each metre."""
+"""Key scans: what the smoother keeps of the drive, one each metre, and fewer where it has seen the place often (`places`)."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ import numpy as np
 
 from lhdmap.geometry import se2
 from lhdmap.messages import Float32Array, FloatArray
+from lhdmap.smoothing.places import Places
 from lhdmap.smoothing.settings import SmoothingSettings
 
 
@@ -34,6 +35,7 @@ class KeyScans:
         self._travelled_m = 0.0
         self._last: FloatArray | None = None
         self._weak = False
+        self._places = Places(settings.key_m)
 
     def update(self, time_ns: int, pose: FloatArray, points: FloatArray, *, weak: bool) -> None:
         """Take a processed scan: pose (3,) in `odom`, hits (N, 3) in the level base frame."""
@@ -41,7 +43,7 @@ class KeyScans:
             self._travelled_m += math.hypot(pose[0] - self._last[0], pose[1] - self._last[1])
         self._last = pose.copy()
         self._weak |= weak
-        if self._due(pose) and len(points) > 0:
+        if self._due(pose) and len(points) > 0 and self._places.wants(pose, points[:, 2].mean(), self._travelled_m):
             self.keys.append(KeyScan(time_ns, pose.copy(), self._travelled_m, points.astype(np.float32), self._weak))
             self._weak = False
 
