@@ -137,6 +137,10 @@ class SweepIntegration:
         """Return the cloud with normals and curvature; after `finish`."""
         return self.integrator.cloud()
 
+    def forget(self) -> None:
+        """Give the memory of the map back, once it is no longer asked for."""
+        self.integrator.forget()
+
     def _add(self, sweep: _Sweep, track: Track | FinalTrack, wheels: WheelOdometry) -> None:
         frame = sweep.message.frame_id
         if not self.integrator.knows(frame):

@@ -62,7 +62,7 @@ def measure(seed: int, distance_m: float) -> dict[str, FloatArray]:
         )
         assert drive.mesh_file is not None
         pipeline = mapped(drive.log)
-        times = np.array(pipeline.records.times_ns, dtype=np.int64)
+        times = pipeline.records.times_ns
         own = trajectory_of(resample(pipeline.path.final.rows(), times), times)
         cloud = pipeline.sweeps.cloud()
         inputs = Inputs([drive.log], Settings(), {}, "", poses="ground-truth")

@@ -71,8 +71,8 @@ def scans_alone(log: Path) -> Trajectory:
         wanted = [role for role in ("front", "inclinometer", "tf_static") if role in source.roles]
         feed(pipeline, source.messages(wanted))
     records = pipeline.records
-    rows = resample(pipeline.track.rows(), np.array(records.times_ns, dtype=np.int64))
-    return trajectory_of(rows, np.array(records.stamps_ns, dtype=np.int64))
+    rows = resample(pipeline.track.rows(), records.times_ns)
+    return trajectory_of(rows, records.stamps_ns)
 
 
 def wheels_alone(log: Path) -> Trajectory | None:
