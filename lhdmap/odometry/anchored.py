@@ -9,15 +9,18 @@ import numpy as np
 from lhdmap.geometry import se2
 from lhdmap.messages import FloatArray
 from lhdmap.odometry.flow_reference import FlowReference, compare, scanner_pyramid
-from lhdmap.odometry.jump import NOTHING_OWED, Place, jump, left_by, weakened
-from lhdmap.odometry.matching import Hits, Match, MatchModel, Prior, match
+from lhdmap.odometry.jump import NOTHING_OWED, jump, left_by
 from lhdmap.odometry.motion import Motion
 from lhdmap.odometry.rear_view import NO_POINTS, NOTHING_BEHIND, Behind, JointOffset
 from lhdmap.odometry.settings import AnchorSettings, OdometrySettings, RangeFlowSettings, SearchSettings
-from lhdmap.odometry.slant import NO_RISE, slants
 from lhdmap.odometry.step_covariance import direction_noise
-from lhdmap.odometry.steps import BY_DEFINITION, Matched, marginal_information
-from lhdmap.odometry.surface_map import empty_map, insert_all
+from lhdmap.odometry.steps import BY_DEFINITION, Matched
+from lhdmap.odometry.wheel_model import WheelModel
+from lhdmap.scan_matching.information import marginal_information
+from lhdmap.scan_matching.matching import Hits, Match, MatchModel, Prior
+from lhdmap.scan_matching.search import SearchGrid
+from lhdmap.scan_matching.slant import NO_RISE, slants
+from lhdmap.scan_matching.submap import Submap, weakened
 
 _RECENT_SCANS = 12
 _YOUNG_SCANS = 4
@@ -45,6 +48,7 @@ class AnchoredMatcher:
     def __init__(
         self,
         motion: Motion,
+        wheels: WheelModel,
         settings: OdometrySettings,
         anchor: AnchorSettings,
         wide: SearchSettings,
@@ -52,18 +56,9 @@ class AnchoredMatcher:
     ) -> None:
         self._flow = range_flow
         self._first: FlowReference | None = None
-        self._motion, self._noise_m, self._anchor, self._wide = motion, settings.range_noise_m, anchor, wide
-        self._model = MatchModel(
-            settings.range_noise_m,
-            anchor.cutoff_sigmas,
-            anchor.min_cells,
-            0.0,
-            anchor.rounds,
-            anchor.lean,
-            anchor.lean_patch_m,
-        )
-        self._map = empty_map(anchor.cell_m)
-        self._recent: list[FloatArray] = []
+        self._motion, self._wheels = motion, wheels
+        self._noise_m, self._anchor, self._wide = settings.range_noise_m, anchor, wide
+        self._map = self._empty_map(_model(settings, anchor))
         self._inserted: FloatArray | None = None
         self._origin = np.zeros(3)
         self._lost_in_a_row = 0
@@ -75,6 +70,17 @@ class AnchoredMatcher:
         self._joint = JointOffset()
         self._turn = 0
         self.behind = NO_POINTS  # the rear hits of the last scan, shape (N, 3), level base frame
+
+    def _empty_map(self, model: MatchModel) -> Submap:
+        wide = self._wide
+        grid = SearchGrid(wide.cell_m, math.radians(wide.step_deg), wide.beams, apart_m=math.inf)
+        return Submap(
+            self._anchor.cell_m,
+            model=model,
+            grid=grid,
+            hit_limit=self._anchor.hit_limit,
+            remembers=_RECENT_SCANS,
+        )
 
     def step(
         self,
@@ -89,7 +95,7 @@ class AnchoredMatcher:
         """
         if not self._layered and len(points) and np.ptp(points[:, 2]) > _FLAT_M:
             self._layered = True  # coarse cells of a tilted scanner mix heights
-            self._model = self._model._replace(coarse_noise=self._anchor.coarse_noise)
+            self._map.model = self._map.model._replace(coarse_noise=self._anchor.coarse_noise)
         if len(points) < _FEWEST_HITS:
             return Matched(np.zeros((3, 3)), math.nan, 0.0, lost=True)
         if self._inserted is None:
@@ -101,10 +107,10 @@ class AnchoredMatcher:
         result = self._match(hits, heading)
         if result.support < self._anchor.min_support and not self._at_the_edge(result, hits):
             return self._lose(points, T_base_scanner, result.support)
-        self._lost_in_a_row, model = 0, self._model
+        self._lost_in_a_row, model = 0, self._map.model
         self._learn_noise(result.residual_sigmas)
         if len(hits.points) > hits.front:
-            self._joint.update(result, hits, self._model, self._anchor.cell_m, seen.joint_x_m)
+            self._joint.update(result, hits, self._map.model, self._anchor.cell_m, seen.joint_x_m)
         self._motion.correct(result.pose, result.information + heading[1] * _HEADING_AXIS)
         if self._jumped:
             spins = abs(self._motion.velocity[2]) > _SPINNING_RPS
@@ -117,7 +123,7 @@ class AnchoredMatcher:
         self._doubt = max(self._doubt - 1, 0)
         self._owed = _OWED_KEPT * self._owed if self._doubt else NOTHING_OWED
         residual_m = result.residual_sigmas * self._noise_m
-        noise = direction_noise(result.pose, hits, result.lines, self._map.fine.cell_m, model)
+        noise = direction_noise(result.pose, hits, result.lines, self._anchor.cell_m, model)
         seen = (self._layered, len(hits.points) == hits.front)
         return Matched(result.information, residual_m, result.support, False, doubtful, self._jumped, noise, *seen)
 
@@ -142,11 +148,10 @@ class AnchoredMatcher:
             error = np.array([0.0, 0.0, heading[1] * se2.wrap(heading[0] - predicted[2])])
             predicted += np.linalg.solve(information, error)
         prior = Prior(predicted, information)
-        result = match(self._map, hits, prior, predicted, self._model)
+        result = self._map.align(hits, prior)
         if self._trusted(result):
             return self._freed(hits, result, prior)
-        place = Place(self._map, np.concatenate(self._recent), self._model)
-        found = jump(place, hits, result, prior, self._motion, self._wide, self._owed)
+        found = jump(self._map, hits, result, prior, self._motion, self._wheels, self._wide, self._owed)
         if found is None:
             return result
         self._doubt, self._jumped = _DOUBT_SCANS, True
@@ -158,7 +163,7 @@ class AnchoredMatcher:
         error = result.pose - prior.pose
         if error @ prior.information @ error < _SURPRISE**2:
             return result
-        again = match(self._map, hits, weakened(prior), result.pose, self._model)
+        again = self._map.align(hits, weakened(prior), result.pose)
         return again if again.support >= result.support else result
 
     def _trusted(self, result: Match) -> bool:
@@ -206,8 +211,7 @@ class AnchoredMatcher:
         if self._foretold():
             self._insert(points)  # the next scan shall not be lost, too
         if self._lost_in_a_row >= _LOST_BEFORE_RESTART:
-            self._map = empty_map(self._anchor.cell_m)
-            self._recent.clear()
+            self._map = self._empty_map(self._map.model)
             self._lost_in_a_row = 0
             self._begin(points, T_base_scanner)
         return Matched(np.zeros((3, 3)), math.nan, support, lost=True)
@@ -216,7 +220,7 @@ class AnchoredMatcher:
         """Follow the scanner's real noise (rounding to centimetres, dust) from the size of the residuals."""
         self._noise_scale *= min(max(residual_sigmas / _USUAL_RESIDUAL, 0.5), 2.0) ** _NOISE_GAIN
         self._noise_scale = min(max(self._noise_scale, _NOISE_SCALES[0]), _NOISE_SCALES[1])
-        self._model = self._model._replace(noise_m=self._noise_m * self._noise_scale)
+        self._map.model = self._map.model._replace(noise_m=self._noise_m * self._noise_scale)
 
     def _grow(self, points: FloatArray, *, smooth: bool) -> None:
         """Insert the scan where the machine has moved on since the last one that was; the first scans always.
@@ -227,11 +231,22 @@ class AnchoredMatcher:
         still = np.hypot(*step[:2]) < self._anchor.insert_m and abs(se2.wrap(step[2])) < math.radians(
             self._anchor.insert_deg
         )
-        if not still or (len(self._recent) < _YOUNG_SCANS and not smooth):
+        if not still or (self._map.scans < _YOUNG_SCANS and not smooth):
             self._insert(points)
 
     def _insert(self, points: FloatArray) -> None:
-        hits = se2.transform(self._motion.pose, points)
-        insert_all(self._map, hits, self._anchor.hit_limit)
-        self._recent = [*self._recent[1 - _RECENT_SCANS :], hits]
+        self._map.insert(points, self._motion.pose)
         self._inserted = self._motion.pose
+
+
+def _model(settings: OdometrySettings, anchor: AnchorSettings) -> MatchModel:
+    """Return how far a level scanner's hits may be from the walls that it saw a moment ago."""
+    return MatchModel(
+        settings.range_noise_m,
+        anchor.cutoff_sigmas,
+        anchor.min_cells,
+        0.0,
+        anchor.rounds,
+        anchor.lean,
+        anchor.lean_patch_m,
+    )

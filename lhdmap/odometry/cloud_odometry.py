@@ -14,7 +14,7 @@ from lhdmap.odometry.cloud_motion import CloudMotion, CloudPrior, exp
 from lhdmap.odometry.cloud_planes import PlaneFit
 from lhdmap.odometry.cloud_settings import CloudOdometrySettings
 from lhdmap.odometry.cloud_sweep import Sweep, middle_s, sweep_of
-from lhdmap.odometry.scan_points import NO_BOXES
+from lhdmap.scan_matching.scan_points import NO_BOXES
 
 _FIRST_CLOUDS = 10
 _LOST_BEFORE_RESTART = 10
@@ -48,6 +48,7 @@ class CloudStep(NamedTuple):
     substitute: str
     processed: bool
     lost: bool
+    wheels: str = "none"
 
 
 class _First(NamedTuple):

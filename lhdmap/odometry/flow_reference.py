@@ -13,7 +13,7 @@ from lhdmap.odometry.flow_scan import Pyramid
 from lhdmap.odometry.motion import Motion
 from lhdmap.odometry.range_flow import flow
 from lhdmap.odometry.settings import RangeFlowSettings
-from lhdmap.odometry.steps import body_information
+from lhdmap.scan_matching.information import body_information
 
 _SURE_SIGMA_M, _SURE_SIGMA_RAD = 0.05, math.radians(2.0)
 _NO_PRIOR = 1e-3 * np.eye(3)

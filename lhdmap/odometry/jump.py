@@ -1,68 +1,53 @@
-"""Where a scan fits elsewhere than foretold: a search all around the prediction, and the odds for a jump against the wheels."""
+"""Where a scan fits elsewhere than foretold: what is found all around the prediction, and the odds for it against the wheels."""
 
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
 
 import numpy as np
 
 from lhdmap.geometry import se2
 from lhdmap.messages import FloatArray
-from lhdmap.odometry.matching import Hits, Match, MatchModel, Prior, match
 from lhdmap.odometry.motion import Motion
-from lhdmap.odometry.search import search
 from lhdmap.odometry.settings import SearchSettings
-from lhdmap.odometry.surface_map import SurfaceMap
+from lhdmap.odometry.wheel_model import WheelModel
+from lhdmap.scan_matching.matching import Hits, Match, Prior
+from lhdmap.scan_matching.submap import Submap
 
-_JUMP_PRIOR = 0.01
-# A jump must bring that much more support, and more where wheels speak against it: the logarithm of the odds (Student's t, for
-# wheels that slip or lag) over the nats that support is worth. Measured: crowds win by chance with more, slip stays with less.
+# A jump must bring that much more support, and more where wheels speak against it: the logarithm of the odds over the nats that
+# support is worth. Measured: crowds win by chance with more, slip stays with less.
 NOTHING_OWED = np.zeros(3)
-_GAIN, _NATS_PER_SUPPORT, _WHEELS_FREEDOM = 0.02, 22.0, 4.0
-
-
-class Place(NamedTuple):
-    """What a scan is compared with: the map, the hits (N, 3) of the last scans in it, and the model of the match."""
-
-    walls: SurfaceMap
-    seen: FloatArray
-    model: MatchModel
+_GAIN, _NATS_PER_SUPPORT = 0.02, 22.0
 
 
 def jump(
-    place: Place,
+    submap: Submap,
     hits: Hits,
     near: Match,
     prior: Prior,
     motion: Motion,
+    wheels: WheelModel,
     s: SearchSettings,
     owed: FloatArray = NOTHING_OWED,
 ) -> Match | None:
     """Return the best match from all around the prediction, None where none is better enough than the one near it.
 
     Args:
-        place: the map that is matched against, and what the search compares with.
+        submap: the map that is matched against.
         hits: the scan.
         near: the match that was found from the prediction.
         prior: the prediction.
-        motion: tells how far to search, and whether wheels have measured.
-        s: limits and steps of the search.
+        motion: tells how far to search.
+        wheels: tell how much they speak against a pose.
+        s: limits of the search.
         owed: by how much jumps a moment ago left the motion (3,): wheels speak against staying there, and for the way back.
     """
-    points = hits.points[: hits.front]
-    thin = points[:: max(len(points) // s.beams, 1)]
-    starts = search(
-        place.seen, thin, prior.pose, prior.information, _reach(motion, s), s.cell_m, math.radians(s.step_deg)
-    )
-    best = near
-    # A jump contradicts the prior by definition: it must not hold the match back, so it is weakened here.
-    for start in starts[(np.abs(starts) < 1e29).all(axis=1)]:
-        found = match(place.walls, hits, weakened(prior), start, place.model)
-        dissent = _dissent(found, prior, motion, owed) - _dissent(best, prior, motion, owed)
-        if found.support > best.support + _GAIN + dissent / _NATS_PER_SUPPORT:
-            best = found
-    return None if best is near else best
+    found = submap.locate(hits, prior, _reach(motion, s))
+    if not found:
+        return None
+    odds = [one.support - _dissent(one, prior, wheels, owed) / _NATS_PER_SUPPORT for one in (near, *found)]
+    best = int(np.argmax(odds[1:]))
+    return found[best] if odds[best + 1] > odds[0] + _GAIN else None
 
 
 def left_by(result: Match, prior: Prior) -> FloatArray:
@@ -72,17 +57,9 @@ def left_by(result: Match, prior: Prior) -> FloatArray:
     return error
 
 
-def weakened(prior: Prior) -> Prior:
-    """Return a prior that holds a match back only where the scan says nothing."""
-    return Prior(prior.pose, _JUMP_PRIOR * prior.information)
-
-
-def _dissent(result: Match, prior: Prior, motion: Motion, owed: FloatArray) -> float:
-    """Return how much (nats) the wheels speak against a pose: with slip and lag, large errors are likelier than normal."""
-    if not motion.measured:
-        return 0.0
-    error = left_by(result, prior) + owed
-    return 0.5 * _WHEELS_FREEDOM * math.log1p(float(error @ prior.information @ error) / _WHEELS_FREEDOM)
+def _dissent(result: Match, prior: Prior, wheels: WheelModel, owed: FloatArray) -> float:
+    """Return how much (nats) the wheels speak against a pose."""
+    return wheels.dissent_nats(left_by(result, prior) + owed, prior.information)
 
 
 def _reach(motion: Motion, s: SearchSettings) -> FloatArray:

@@ -14,14 +14,15 @@ from lhdmap.odometry.clock import ScanClock
 from lhdmap.odometry.flow_matcher import FlowMatcher
 from lhdmap.odometry.motion import Motion
 from lhdmap.odometry.rear_view import NO_POINTS, NOTHING_BEHIND, Behind, RearView, behind
-from lhdmap.odometry.scan_points import NO_BOXES, half_sweep_ns, planar_points
 from lhdmap.odometry.settings import AnchorSettings, OdometrySettings, RangeFlowSettings, SearchSettings
-from lhdmap.odometry.slant import NO_RISE
 from lhdmap.odometry.step_covariance import StepErrors
-from lhdmap.odometry.step_error import NO_ERROR
-from lhdmap.odometry.steps import Matched, OdometryStep, WheelStep, body_information, inflated, marginal_information
+from lhdmap.odometry.steps import Matched, OdometryStep, WheelStep
 from lhdmap.odometry.trust_settings import TrustSettings
-from lhdmap.odometry.wheel_fusion import WheelFusion
+from lhdmap.odometry.wheel_model import WheelModel
+from lhdmap.scan_matching.information import body_information, inflated, marginal_information
+from lhdmap.scan_matching.scan_points import NO_BOXES, half_sweep_ns, planar_points
+from lhdmap.scan_matching.slant import NO_RISE
+from lhdmap.scan_matching.step_error import NO_ERROR
 
 _FIRST_SCANS = 10
 _SLOWEST_REAR_MPS = 0.1
@@ -65,12 +66,14 @@ class PlanarOdometry:
     ) -> None:
         self._settings = settings or OdometrySettings()
         self._motion = Motion(self._settings, velocity)
+        self.wheels = WheelModel(self._settings, self._motion)
         self._matcher: AnchoredMatcher | FlowMatcher
         if self._settings.method == "range_flow":
             self._matcher = FlowMatcher(self._motion, self._settings, range_flow or RangeFlowSettings())
         else:
             self._matcher = AnchoredMatcher(
                 self._motion,
+                self.wheels,
                 self._settings,
                 anchor or AnchorSettings(),
                 wide or SearchSettings(),
@@ -79,8 +82,6 @@ class PlanarOdometry:
         self._clock = ScanClock()
         self._turn = 0
         self._rate = AdaptiveRate(self._settings)
-        self._wheels_used = False
-        self.wheels = WheelFusion(self._settings, self._motion)
         self._errors, self._error = StepErrors(trust or TrustSettings()), NO_ERROR
         self.points = np.zeros((0, 3))  # hits of the last processed scan, level base frame, heights in odom
 
@@ -90,7 +91,7 @@ class PlanarOdometry:
         """Process one scan; `T_level_sensor` (4, 4): mount and attitude, or what tells it where the scan is processed."""
         dt_s = self._clock.step(scan.stamp_ns)
         self._motion.predict(dt_s)
-        self._wheels_used = self.wheels.fuse(wheels, dt_s)
+        self.wheels.fuse(wheels, dt_s)
         if not self._rate.due(dt_s, self._motion.velocity) and not self._clock.bunched:
             return self._step(scan, None)
         if not isinstance(T_level_sensor, np.ndarray):
@@ -106,9 +107,8 @@ class PlanarOdometry:
             matched = self._matcher.step(points, mount, self._behind(view, floor_m), view.rise)
         held = matched.support > _WALLS_ALONE and not self._weak(self._information(matched))
         self.wheels.learn(self._motion.pose, matched, held=held and not matched.lost)
-        pose = self._motion.pose
-        against_map = body_information(self._motion.P[:3, :3], pose[2])
-        self._error = self._errors.of(pose, matched, against_map, levelled=view.levelled)
+        against_map = body_information(self._motion.P[:3, :3], self._motion.state[2])
+        self._error = self._errors.of(self._motion.pose, matched, against_map, levelled=view.levelled)
         return self._step(scan, matched)
 
     def _information(self, matched: Matched) -> FloatArray:
@@ -145,11 +145,23 @@ class PlanarOdometry:
         covariance = body_information(self._motion.P[:3, :3], pose[2])
         if matched is None:
             return OdometryStep(
-                stamp_ns, time_ns, pose, covariance, velocity, np.zeros(3), math.nan, math.nan, False, "", False, False
+                stamp_ns,
+                time_ns,
+                pose,
+                covariance,
+                velocity,
+                np.zeros(3),
+                math.nan,
+                math.nan,
+                False,
+                "",
+                False,
+                False,
+                self.wheels.use,
             )
         information = self._information(matched)
         weak = self._weak(information) or matched.lost or matched.doubtful
-        substitute = ("wheels" if self._wheels_used else "motion") if weak else ""
+        substitute = ("wheels" if self.wheels.use.used else "motion") if weak else ""
         if weak:
             covariance = inflated(covariance, int(np.argmin(information[:2])), self._settings.weak_inflation)
         return OdometryStep(
@@ -165,6 +177,7 @@ class PlanarOdometry:
             substitute,
             True,
             matched.lost,
+            self.wheels.use,
             self._error,
         )
 

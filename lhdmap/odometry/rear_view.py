@@ -14,8 +14,8 @@ import numba as nb
 import numpy as np
 
 from lhdmap.messages import FloatArray, LaserScan
-from lhdmap.odometry.matching import Hits, Match, MatchModel, line_weight, slanted
-from lhdmap.odometry.scan_points import planar_points
+from lhdmap.scan_matching.matching import Hits, Match, MatchModel, line_weight, slanted
+from lhdmap.scan_matching.scan_points import planar_points
 
 NO_POINTS = np.zeros((0, 3))
 _FIRST_STD_RAD = math.radians(0.2)

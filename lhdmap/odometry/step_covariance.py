@@ -1,4 +1,4 @@
-"""Measures how far each step of the planar odometry may be off, scan by scan: the parts of `step_error`."""
+"""Measures how far each step of the planar odometry may be off, scan by scan: the parts of `lhdmap.scan_matching.step_error`."""
 
 from __future__ import annotations
 
@@ -10,10 +10,11 @@ import numpy as np
 
 from lhdmap.geometry import se2
 from lhdmap.messages import FloatArray
-from lhdmap.odometry.matching import line_weight, slanted
-from lhdmap.odometry.step_error import StepError
-from lhdmap.odometry.steps import Matched, body_information
+from lhdmap.odometry.steps import Matched
 from lhdmap.odometry.trust_settings import TrustSettings
+from lhdmap.scan_matching.information import body_information
+from lhdmap.scan_matching.matching import line_weight, slanted
+from lhdmap.scan_matching.step_error import StepError
 
 # Variance of the cells along a line, in squares of a cell: a Gaussian of two cells' deviation, cut off at three.
 _SPREAD_CELLS2 = 2.2
@@ -23,7 +24,9 @@ _LEVER_POWER = 1.5
 _OF_PAIRS = 0.5  # share of noise where scans are compared in pairs: each link of the chain adds its error
 _SECOND = 2
 _LITTLE = np.diag([1e-3, 1e-3, 1e-3])  # information of no scan
-_SWAY = np.diag([0.0, 0.0035**2, 0.0])  # of a tilted scanner: noise of the roll shifts what it sees of the walls sideways
+_SWAY = np.diag(
+    [0.0, 0.0035**2, 0.0]
+)  # of a tilted scanner: noise of the roll shifts what it sees of the walls sideways
 
 
 class StepErrors:
@@ -66,7 +69,6 @@ class StepErrors:
             pull += s.tilted_alone_pull if matched.alone else 0.0
             jitter = s.tilted_jitter * jitter + _SWAY
         return StepError(start + lasting * covariance, np.array([pull * forward_m, 0.0, 0.0]), jitter)
-
 
     def _tilted_walk(self, matched: Matched, *, levelled: bool) -> float:
         s = self._settings

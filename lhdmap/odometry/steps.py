@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import math
 from typing import NamedTuple
 
-import numba as nb
 import numpy as np
 
 from lhdmap.messages import FloatArray
-from lhdmap.odometry.step_error import NO_ERROR, StepError
+from lhdmap.scan_matching.step_error import NO_ERROR, StepError
 
 BY_DEFINITION = 1e8 * np.eye(3)  # information of the pose that defines a frame
 
@@ -51,10 +49,11 @@ class OdometryStep(NamedTuple):
 
     `T_odom_base`: planar pose (3,) at `time_ns`, the middle of the sweep: there an error of the speed that undid the sweep does
     not move the scan as a whole; `covariance`: (3, 3) of that pose against the local map, in body axes (m, rad), a weak
-    direction as wide as it is; `information`: (3,) along, across (1/m²) and heading (1/rad²) of this scan against the map, the others given;
+    direction as wide as it is; `error`: what the step from the processed scan before adds to the error of the way, none where the
+    scan was not processed; `information`: (3,) along, across (1/m²), heading (1/rad²) of this scan, the others unknown;
     `degenerate`: a direction was not observed; `substitute`: what stood in for it (`wheels`, `motion` or empty);
-    `processed`: False where the adaptive rate only predicted; `lost`: the scan did not fit the map; `error`: what the step
-    from the processed scan before adds to the error of the way, none where the scan was not processed.
+    `processed`: False where the adaptive rate only predicted; `lost`: the scan did not fit the map; `wheels`: what became of the
+    wheels' step before it, and why (`WheelUse`).
     """
 
     stamp_ns: int
@@ -69,34 +68,5 @@ class OdometryStep(NamedTuple):
     substitute: str
     processed: bool
     lost: bool
+    wheels: str = "none"
     error: StepError = NO_ERROR
-
-
-@nb.njit(cache=True)
-def body_information(H_map: FloatArray, heading_rad: float) -> FloatArray:
-    """Return H (3, 3) in the body's axes."""
-    c, s = math.cos(heading_rad), math.sin(heading_rad)
-    R = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
-    return np.ascontiguousarray(R.T) @ np.ascontiguousarray(H_map) @ R
-
-
-@nb.njit(cache=True)
-def marginal_information(H: FloatArray) -> FloatArray:
-    """Return for each axis the information left when the other two are unknown: 1 / diag(H^-1), shape (3,).
-
-    A direction that only shows together with another (along and heading in a bend) counts as unobserved here.
-    """
-    out = np.zeros(3)
-    for axis in range(3):
-        i, j = (axis + 1) % 3, (axis + 2) % 3
-        a, b, d = H[i, i] + 1e-9, H[i, j], H[j, j] + 1e-9
-        u, v = H[axis, i], H[axis, j]
-        out[axis] = max(H[axis, axis] - (u * u * d - 2.0 * u * v * b + v * v * a) / (a * d - b * b), 0.0)
-    return out
-
-
-def inflated(covariance: FloatArray, axis: int, factor: float) -> FloatArray:
-    """Return a covariance (3, 3) with the variance of one axis times a factor, correlations kept."""
-    scale = np.ones(3)
-    scale[axis] = math.sqrt(factor)
-    return covariance * np.outer(scale, scale)

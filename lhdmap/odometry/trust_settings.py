@@ -22,7 +22,7 @@ class TrustSettings:
         source=_SOURCE,
     )
     start_deg: float = setting(
-        0.018,
+        0.022,
         unit="deg",
         doc="Error of the heading that the first scan of a drive leaves, standard deviation: one scan is no map.",
         minimum=0.0,
@@ -42,7 +42,10 @@ class TrustSettings:
         source=_SOURCE,
     )
     noisy_jitter: float = setting(
-        0.6, doc="... and what is added to that share where all that a scan tells is noise.", minimum=0.0, source=_SOURCE
+        0.6,
+        doc="... and what is added to that share where all that a scan tells is noise.",
+        minimum=0.0,
+        source=_SOURCE,
     )
     tilted_walk: float = setting(
         2.0,

@@ -12,9 +12,9 @@ from lhdmap.kinematics import T_base_rear
 from lhdmap.machine import Machine
 from lhdmap.messages import LaserScan
 from lhdmap.odometry.rear_view import RearView
-from lhdmap.odometry.scan_points import half_sweep_ns
 from lhdmap.pipeline.mounts import Mounts
 from lhdmap.proprioception.wheels import WheelOdometry
+from lhdmap.scan_matching.scan_points import half_sweep_ns
 
 _KEPT = 64  # scans: more than the inclinometer's delay at 50 Hz
 _FARTHEST_NS = 30_000_000

@@ -27,7 +27,9 @@ LARGEST_TILT_RAD = math.radians(60.0)
 JUMP_RUN = 10  # so many samples in a row at a new level are no outliers but the level
 THIRD_DIFFERENCE = math.sqrt(20.0)  # its standard deviation for white noise of one
 NOISE_EVERY = 50
-_ALIKE_M = 0.1  # way over which the noise of samples adds to the height as one error: a fit's window at 12 km/h, less its averaging
+_ALIKE_M = (
+    0.1  # way over which noise of the samples adds to the height as one error: a fit's window, less its averaging
+)
 _AT_BENDS_M = 0.03  # where the grade changes the body pitches about another point; measured on simulated drives
 
 
@@ -146,6 +148,17 @@ class AttitudeFilter:
         elif self._held_ns is not None:
             self._silent_s = max(self._silent_s, (stamp_ns - self._held_ns) * 1e-9)
         return self._held
+
+    def causal_at(self, now_ns: int) -> Attitude | None:
+        """Return the latest attitude that the samples so far tell of, at `now_ns` or before it; None where there is none.
+
+        Not what `attitude_at` will say later: the samples lie on one side only, and the lag is not waited for.
+        """
+        newest_ns = self._samples.latest_ns
+        if newest_ns is None:
+            return None
+        delay_s = self.settings.lag_s if self.settings.lag_kind == "delay" else 0.0
+        return self._attitude(min(now_ns, newest_ns - round(delay_s * 1e9)))
 
     def height_std_m(self, way_m: float) -> float:
         """Return the standard deviation (m) of a height that was integrated along the slope of a way."""

@@ -14,19 +14,20 @@ import numpy as np
 
 from lhdmap.geometry import se2
 from lhdmap.messages import FloatArray
-from lhdmap.odometry.matching import Hits, Match, MatchModel, Prior, match
-from lhdmap.odometry.search import search
-from lhdmap.odometry.steps import marginal_information
-from lhdmap.odometry.surface_map import SurfaceMap, empty_map, insert_all
-from lhdmap.smoothing.keys import KeyScan
+from lhdmap.scan_matching.information import marginal_information
+from lhdmap.scan_matching.key_scan import KeyScan
+from lhdmap.scan_matching.matching import Hits, Match
+from lhdmap.scan_matching.scan_points import flattened
+from lhdmap.scan_matching.search import SearchGrid
+from lhdmap.scan_matching.submap import Submap, unsure
+from lhdmap.smoothing.places import Nearby
 from lhdmap.smoothing.settings import SmoothingSettings
 
 _SUBMAP_KEYS = 5  # keys on either side of the earlier one that make up its surroundings
-_SEARCH_BEAMS = 120
+_SUBMAP_M = 20.0  # ... of travel: keys may be far apart where a place has been seen often
 _LEVEL_M, _CLIMB_DRIFT = 1.0, 0.02  # a degree of bias in pitch: levels of a mine are farther apart than that
-_CELL_M = 0.04
-_MODEL = MatchModel(noise_m=0.02, cutoff_sigmas=3.0, min_cells=3.0, coarse_noise=0.05, rounds=8)
-_STARTS = 3
+_CELL_M, _WINDOW_CELLS = 0.04, 512
+_GRID, _TURN_RAD = SearchGrid(cell_m=0.15, step_rad=math.radians(2.5)), math.radians(25.0)
 _MOST_UNEVEN = 10.0  # of the sigmas: noise of straight walls' directions looks like a little information along them
 
 
@@ -40,37 +41,45 @@ class Closure(NamedTuple):
 
 
 def find_closures(keys: list[KeyScan], settings: SmoothingSettings) -> list[Closure]:
-    """Return the closures that neighbours confirm. The cost grows with the revisits, not with the square of the drive."""
+    """Return the closures that neighbours confirm. The cost grows with the keys, not with their square."""
     places = np.array([(*key.pose, float(key.points[:, 2].mean())) for key in keys]).reshape(-1, 4)
     travelled = np.array([key.travelled_m for key in keys])
     found: list[Closure] = []
+    nearby = Nearby(places[:, :2], settings.reach_limit_m)
     for current in range(len(keys)):
-        closure = _close(keys, places, travelled, current, settings)
+        closure = _close(keys, places, travelled, nearby, current, settings)
         if closure is not None:
             found.append(closure)
     return _confirmed(found, keys, settings)
 
 
 def _close(
-    keys: list[KeyScan], places: FloatArray, travelled: FloatArray, current: int, settings: SmoothingSettings
+    keys: list[KeyScan],
+    places: FloatArray,
+    travelled: FloatArray,
+    nearby: Nearby,
+    current: int,
+    settings: SmoothingSettings,
 ) -> Closure | None:
     """Try the earlier key nearest to this one on its level; `places` (N, 4): poses and heights of the keys' hits."""
     early = int(np.searchsorted(travelled, travelled[current] - settings.apart_m))
-    if early == 0:
+    nearby.add_until(early)
+    near = nearby.around(current)
+    if not len(near):
         return None
-    distances = np.hypot(*(places[:early, :2] - places[current, :2]).T)
-    above_m = np.abs(places[:early, 3] - places[current, 3])
-    distances[above_m > _LEVEL_M + _CLIMB_DRIFT * (travelled[current] - travelled[:early])] = np.inf
-    candidate = int(distances.argmin())
+    distances = np.hypot(*(places[near, :2] - places[current, :2]).T)
+    above_m = np.abs(places[near, 3] - places[current, 3])
+    distances[above_m > _LEVEL_M + _CLIMB_DRIFT * (travelled[current] - travelled[near])] = np.inf
+    nearest = int(distances.argmin())
+    candidate = int(near[nearest])
     reach_m = min(
         settings.reach_m + settings.drift * (travelled[current] - travelled[candidate]), settings.reach_limit_m
     )
-    if distances[candidate] > reach_m:
+    if distances[nearest] > reach_m:
         return None
-    surroundings = _surroundings(keys, candidate, early)
     predicted = se2.between(places[candidate, :3], places[current, :3])
-    result = _match(keys[current], surroundings, predicted, reach_m)
-    if result.support < settings.min_support:
+    result = _found(keys[current], _surroundings(keys, candidate, early), predicted, reach_m)
+    if result is None or result.support < settings.min_support:
         return None
     sigma = 1.0 / np.sqrt(np.maximum(marginal_information(result.information), 1e-12))
     if sigma[:2].max() > min(settings.max_sigma_m, _MOST_UNEVEN * sigma[:2].min()):
@@ -80,31 +89,21 @@ def _close(
     return Closure(candidate, current, result.pose, covariance)
 
 
-def _surroundings(keys: list[KeyScan], centre: int, before: int) -> FloatArray:
-    """Return the hits of the keys around `centre`, shape (M, 3), in its frame; none after key `before`."""
+def _surroundings(keys: list[KeyScan], centre: int, before: int) -> Submap:
+    """Return the walls that the keys around `centre` saw, in its frame, without heights; none after key `before`."""
     first, last = max(centre - _SUBMAP_KEYS, 0), min(centre + _SUBMAP_KEYS + 1, before)
-    parts = [
-        se2.transform(se2.between(keys[centre].pose, key.pose), key.points.astype(np.float64))
-        for key in keys[first:last]
-    ]
-    return np.concatenate(parts)
+    submap = Submap(_CELL_M, grid=_GRID, window_cells=_WINDOW_CELLS)
+    for key in keys[first:last]:
+        if abs(key.travelled_m - keys[centre].travelled_m) <= _SUBMAP_M:
+            submap.insert(flattened(key.points), se2.between(keys[centre].pose, key.pose))
+    return submap
 
 
-def _match(key: KeyScan, surroundings: FloatArray, predicted: FloatArray, reach_m: float) -> Match:
-    points = key.points.astype(np.float64)
-    points[:, 2] = 0.0  # heights of two visits differ by the drift of the height
-    flat = surroundings.copy()
-    flat[:, 2] = 0.0
-    place: SurfaceMap = empty_map(_CELL_M, 512)
-    insert_all(place, flat, 50.0)
-    no_prior = np.diag([1e-2, 1e-2, 1e-1])
-    thin = points[:: max(len(points) // _SEARCH_BEAMS, 1)]
-    reach = np.array([reach_m, math.radians(25.0)])
-    starts = search(flat, thin, predicted, no_prior, reach, 0.15, math.radians(2.5))
-    usable = [start for start in starts if (np.abs(start) < 1e29).all()][:_STARTS] or [predicted]
+def _found(key: KeyScan, submap: Submap, predicted: FloatArray, reach_m: float) -> Match | None:
+    """Return where the key is most like the submap, None where it is nowhere."""
+    points = flattened(key.points)
     hits = Hits(points, len(points), layered=False)
-    tried = [match(place, hits, Prior(start, no_prior), start, _MODEL) for start in usable]
-    return max(tried, key=lambda one: one.support)
+    return next(iter(submap.locate(hits, unsure(predicted), np.array([reach_m, _TURN_RAD]))), None)
 
 
 def _confirmed(found: list[Closure], keys: list[KeyScan], settings: SmoothingSettings) -> list[Closure]:

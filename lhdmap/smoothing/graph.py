@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from itertools import pairwise
 from typing import NamedTuple
 
@@ -9,12 +10,13 @@ import numpy as np
 
 from lhdmap.geometry import se2
 from lhdmap.messages import FloatArray
-from lhdmap.odometry.step_error import NO_ERROR, StepError
+from lhdmap.scan_matching.key_scan import KeyScan
+from lhdmap.scan_matching.step_error import NO_ERROR, StepError
 from lhdmap.smoothing.closures import Closure
-from lhdmap.smoothing.keys import KeyScan
+from lhdmap.smoothing.settings import SmoothingSettings
 
 _CAUCHY = 1.0
-_LEAST = np.diag([1e-8, 1e-8, 1e-12])  # of a step that was hardly one: the graph must stay solvable
+_SHORTEST_M, _PER_TURN = 0.1, 0.002
 
 
 class Smoothed(NamedTuple):
@@ -24,8 +26,8 @@ class Smoothed(NamedTuple):
     end_covariance: FloatArray
 
 
-def smoothed(keys: list[KeyScan], closures: list[Closure]) -> Smoothed:
-    """Return the poses that are the likeliest: steps weigh as they were measured.
+def smoothed(keys: list[KeyScan], closures: list[Closure], settings: SmoothingSettings) -> Smoothed:
+    """Return the likeliest poses: steps and closures weigh as they were measured.
 
     Without closures these are the odometry's own.
     """
@@ -41,7 +43,7 @@ def smoothed(keys: list[KeyScan], closures: list[Closure]) -> Smoothed:
         values.insert(index, gtsam.Pose2(*pose))
     for index in range(len(keys) - 1):
         step = se2.between(poses[index], poses[index + 1])
-        noise = gtsam.noiseModel.Gaussian.Covariance(keys[index + 1].error.covariance + _LEAST)
+        noise = gtsam.noiseModel.Gaussian.Covariance(_step_covariance(keys[index], keys[index + 1], settings))
         graph.add(gtsam.BetweenFactorPose2(index, index + 1, gtsam.Pose2(*step), noise))
     for closure in closures:
         gaussian = gtsam.noiseModel.Gaussian.Covariance(closure.covariance)
@@ -52,6 +54,15 @@ def smoothed(keys: list[KeyScan], closures: list[Closure]) -> Smoothed:
     found = [solved.atPose2(index) for index in range(len(keys))]
     end = gtsam.Marginals(graph, solved).marginalCovariance(len(keys) - 1)
     return Smoothed(np.array([[pose.x(), pose.y(), pose.theta()] for pose in found]), end)
+
+
+def _step_covariance(before: KeyScan, after: KeyScan, settings: SmoothingSettings) -> FloatArray:
+    """Return the covariance (3, 3) of a step: what was measured, and what no drive is better than."""
+    travel_m = max(after.travelled_m - before.travelled_m, _SHORTEST_M)
+    turn = abs(float(se2.wrap(after.pose[2] - before.pose[2])))
+    position = settings.along_sigma * math.sqrt(travel_m)
+    heading = math.radians(settings.heading_sigma_deg) * math.sqrt(travel_m) + _PER_TURN * turn
+    return after.error.covariance + np.diag([position**2, position**2, heading**2])
 
 
 def chained(keys: list[KeyScan]) -> StepError:

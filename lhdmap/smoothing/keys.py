@@ -1,40 +1,24 @@
-"""Key scans: what the smoother keeps of the drive, one each metre."""
+"""Key scans: what the smoother keeps of the drive, one each metre, and fewer where it has seen the place often (`places`)."""
 
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
 
 import numpy as np
 
 from lhdmap.geometry import se2
-from lhdmap.messages import Float32Array, FloatArray
-from lhdmap.odometry.step_error import NO_ERROR, StepError, measured_covariance
+from lhdmap.messages import FloatArray
+from lhdmap.scan_matching.key_scan import KeyScan
+from lhdmap.scan_matching.step_error import NO_ERROR, StepError
+from lhdmap.smoothing.places import Places
 from lhdmap.smoothing.settings import SmoothingSettings
-
-
-class KeyScan(NamedTuple):
-    """A scan kept: time, pose (3,) by odometry, distance travelled, hits (N, 3), and how far the way since the key before may be off.
-
-    The hits are in the level base frame. `error`: what the step from the key before adds to the error of the way.
-    """
-
-    time_ns: int
-    pose: FloatArray
-    travelled_m: float
-    points: Float32Array
-    error: StepError = NO_ERROR
-
-    def covariance(self, before: KeyScan) -> FloatArray:
-        """Return the covariance (3, 3) of the step from the key `before`, in this key's axes (m, rad)."""
-        return measured_covariance(before.error.jitter, se2.between(before.pose, self.pose), self.error)
 
 
 class KeyScans:
     """Collects key scans while the odometry runs.
 
-    `travelled_m`: so far; `rest`: error of the way from the last key to the last scan, whose pose (3,) is `last`; `unseen_m`: longest
-    stretch on which neither walls nor wheels told the motion in all directions.
+    `travelled_m`: so far; `rest`: error of the way from the last key to the last scan, whose pose (3,) is `last`; `unseen_m`:
+    longest stretch on which neither walls nor wheels told the motion in all directions.
     """
 
     def __init__(self, settings: SmoothingSettings) -> None:
@@ -43,6 +27,7 @@ class KeyScans:
         self.travelled_m = self.unseen_m = self._unseen_m = 0.0
         self.last: FloatArray | None = None
         self.rest = NO_ERROR
+        self._places = Places(settings.key_m)
 
     def update(
         self, time_ns: int, pose: FloatArray, points: FloatArray, error: StepError = NO_ERROR, *, unseen: bool = False
@@ -52,17 +37,18 @@ class KeyScans:
         `unseen`: neither walls nor wheels told this step in all directions.
         """
         if self.last is not None:
-            step = se2.between(self.last, pose)
-            length_m = math.hypot(step[0], step[1])
-            self.travelled_m += length_m
-            self._unseen_m = self._unseen_m + length_m if unseen else 0.0
-            self.unseen_m = max(self.unseen_m, self._unseen_m)
-            self.rest = self.rest.then(step, error)
+            self._go_on(se2.between(self.last, pose), error, unseen=unseen)
         self.last = pose.copy()
-        if self._due(pose) and len(points) > 0:
-            hits = points.astype(np.float32)
-            self.keys.append(KeyScan(time_ns, pose.copy(), self.travelled_m, hits, self.rest))
+        if self._due(pose) and len(points) > 0 and self._places.wants(pose, points[:, 2].mean(), self.travelled_m):
+            self.keys.append(KeyScan(time_ns, pose.copy(), self.travelled_m, points.astype(np.float32), self.rest))
             self.rest = NO_ERROR._replace(jitter=error.jitter)
+
+    def _go_on(self, step: FloatArray, error: StepError, *, unseen: bool) -> None:
+        length_m = math.hypot(step[0], step[1])
+        self.travelled_m += length_m
+        self._unseen_m = self._unseen_m + length_m if unseen else 0.0
+        self.unseen_m = max(self.unseen_m, self._unseen_m)
+        self.rest = self.rest.then(step, error)
 
     def _due(self, pose: FloatArray) -> bool:
         if not self.keys:

@@ -49,3 +49,14 @@ class SmoothingSettings:
     )
     agree_m: float = setting(0.3, unit="m", doc="Closures in a row must agree to this.", minimum=0.01)
     agree_deg: float = setting(3.0, unit="deg", doc="... and to this.", minimum=0.1)
+    along_sigma: float = setting(
+        0.002,
+        unit="m/sqrt(m)",
+        doc="Random walk of the position that the pose graph allows at least: people, glass and gaps, which the odometry does not "
+        "know of.",
+        minimum=1e-5,
+        source="measured: real logs",
+    )
+    heading_sigma_deg: float = setting(
+        0.01, unit="deg/sqrt(m)", doc="The same of the heading.", minimum=1e-5, source="measured: real logs"
+    )

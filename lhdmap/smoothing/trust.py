@@ -9,7 +9,7 @@ import numpy as np
 
 from lhdmap.geometry import se2
 from lhdmap.messages import FloatArray
-from lhdmap.odometry.step_error import NO_ERROR, StepError
+from lhdmap.scan_matching.step_error import NO_ERROR, StepError
 from lhdmap.smoothing.graph import chained
 from lhdmap.smoothing.keys import KeyScans
 
@@ -34,7 +34,9 @@ class ExpectedError(NamedTuple):
     unseen_m: float
 
 
-def expected_error(keys: KeyScans, height_std_m: float | None, closed: FloatArray | None = None) -> ExpectedError | None:
+def expected_error(
+    keys: KeyScans, height_std_m: float | None, closed: FloatArray | None = None
+) -> ExpectedError | None:
     """Return how far the end may be off; `closed` (3, 3): covariance of the last key where loops were closed.
 
     None where there is no key scan.

@@ -7,15 +7,17 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from lhdmap.geometry import se2
 from lhdmap.messages import FloatArray
-from lhdmap.odometry.jump import Place, jump
-from lhdmap.odometry.matching import Hits, Match, MatchModel, Prior, match
+from lhdmap.odometry.jump import jump
 from lhdmap.odometry.motion import FORWARD, TURNING, Motion
 from lhdmap.odometry.settings import OdometrySettings, SearchSettings
-from lhdmap.odometry.surface_map import SurfaceMap, empty_map, insert_all
+from lhdmap.odometry.wheel_model import WheelModel
+from lhdmap.scan_matching.matching import Hits, Match, MatchModel, Prior
+from lhdmap.scan_matching.search import SearchGrid
+from lhdmap.scan_matching.submap import Submap
 
 MODEL = MatchModel(0.012, 3.0, 2.0, 0.05, 6)
+GRID = SearchGrid(apart_m=math.inf)  # as the odometry searches
 TRUE = np.array([0.4, -0.2, 0.1])
 SURE = np.diag([0.02**-2, 0.02**-2, math.radians(0.5) ** -2])
 
@@ -31,26 +33,25 @@ def room(start: FloatArray, length_m: float = 9.0) -> FloatArray:
 
 
 @pytest.fixture(scope="module")
-def walls() -> SurfaceMap:
+def walls() -> Submap:
     """The hall, seen from around the middle with the scanner's noise."""
-    map_, rng = empty_map(0.025, 1024), np.random.default_rng(1)
+    submap, rng = Submap(0.025, model=MODEL, grid=GRID, window_cells=1024), np.random.default_rng(1)
     for _ in range(20):
         pose = np.array([*rng.uniform(-0.3, 0.3, 2), rng.uniform(-0.1, 0.1)])
         noisy = room(pose)
         noisy[:, :2] += rng.normal(0.0, 0.008, (len(noisy), 2))
-        insert_all(map_, se2.transform(pose, noisy), 50.0)
-    return map_
+        submap.insert(noisy, pose)
+    return submap
 
 
-def found_from(walls: SurfaceMap, predicted: FloatArray, motion: Motion) -> tuple[Match, Match | None]:
+def found_from(walls: Submap, predicted: FloatArray, motion: Motion) -> tuple[Match, Match | None]:
     """Return the match near a prediction, and the jump from there."""
     hits, prior = Hits(room(TRUE), len(room(TRUE)), layered=False), Prior(predicted, SURE)
-    near = match(walls, hits, prior, predicted, MODEL)
-    place = Place(walls, room(np.zeros(3)), MODEL)
-    return near, jump(place, hits, near, prior, motion, SearchSettings())
+    near = walls.align(hits, prior)
+    return near, jump(walls, hits, near, prior, motion, WheelModel(OdometrySettings(), motion), SearchSettings())
 
 
-def test_a_kidnapped_machine_is_found(walls: SurfaceMap) -> None:
+def test_a_kidnapped_machine_is_found(walls: Submap) -> None:
     near, found = found_from(walls, TRUE + np.array([0.25, -0.2, math.radians(15.0)]), Motion(OdometrySettings()))
     assert near.support < 0.4
     assert found is not None
@@ -58,50 +59,55 @@ def test_a_kidnapped_machine_is_found(walls: SurfaceMap) -> None:
     assert abs(found.pose[2] - TRUE[2]) < math.radians(0.2)
 
 
-def test_a_pose_that_fits_is_left_alone(walls: SurfaceMap) -> None:
+def test_a_pose_that_fits_is_left_alone(walls: Submap) -> None:
     near, found = found_from(walls, TRUE + np.array([0.01, 0.01, 0.0]), Motion(OdometrySettings()))
     assert near.support > 0.9
     assert found is None
 
 
-def wheeled(gap_s: float = 0.02) -> Motion:
-    """Return a motion whose last step wheels have measured."""
-    motion = Motion(OdometrySettings(), np.zeros(3))
+def wheeled(gap_s: float = 0.02) -> tuple[Motion, WheelModel]:
+    """Return a motion whose last step wheels have measured, and the wheels."""
+    motion, wheels = unwheeled()
     motion.predict(gap_s)
-    motion.fuse_speed(FORWARD, 0.0, 0.01, scaled=False)
-    motion.fuse_speed(TURNING, 0.0, 0.01, scaled=False)
+    wheels.gate.fuse(FORWARD, 0.0, 0.01, scaled=False)
+    wheels.gate.fuse(TURNING, 0.0, 0.01, scaled=False)
     assert motion.measured
-    return motion
+    return motion, wheels
 
 
-def test_wheels_that_disagree_want_more_support(walls: SurfaceMap) -> None:
+def unwheeled() -> tuple[Motion, WheelModel]:
+    """Return a motion of a machine without wheels."""
+    motion = Motion(OdometrySettings(), np.zeros(3))
+    return motion, WheelModel(OdometrySettings(), motion)
+
+
+def test_wheels_that_disagree_want_more_support(walls: Submap) -> None:
     """The better place wins against wheels where its support is far better, not where it is a little better: a crowd's chance."""
     predicted = TRUE + np.array([0.25, -0.2, math.radians(15.0)])
     hits, prior = Hits(room(TRUE), len(room(TRUE)), layered=False), Prior(predicted, SURE)
-    away = match(walls, hits, prior, predicted, MODEL)
-    seen, wide = room(np.zeros(3)), SearchSettings()
-    assert jump(Place(walls, seen, MODEL), hits, away, prior, wheeled(), wide) is not None
+    away, wide = walls.align(hits, prior), SearchSettings()
+    assert jump(walls, hits, away, prior, *wheeled(), wide) is not None
     close = away._replace(support=0.75)  # as if a crowd hid what is wrong there
-    free = jump(Place(walls, seen, MODEL), hits, close, prior, Motion(OdometrySettings()), wide)
+    free = jump(walls, hits, close, prior, *unwheeled(), wide)
     assert free is not None
     assert free.support > close.support
-    assert jump(Place(walls, seen, MODEL), hits, close, prior, wheeled(), wide) is None
+    assert jump(walls, hits, close, prior, *wheeled(), wide) is None
 
 
-def test_a_jump_back_to_where_the_wheels_lead_is_cheap(walls: SurfaceMap) -> None:
+def test_a_jump_back_to_where_the_wheels_lead_is_cheap(walls: Submap) -> None:
     """A crowd wins four times by 6 degrees: each step judged alone, wheels spoke against the way back as they had before."""
     predicted = TRUE + np.array([0.03, 0.0, math.radians(3.0)])
     hits, prior = Hits(room(TRUE), len(room(TRUE)), layered=False), Prior(predicted, SURE)
-    close = match(walls, hits, prior, predicted, MODEL)._replace(pose=predicted, support=0.82)
-    seen, wide, back = room(np.zeros(3)), SearchSettings(), TRUE - predicted
-    assert jump(Place(walls, seen, MODEL), hits, close, prior, wheeled(), wide) is None
-    found = jump(Place(walls, seen, MODEL), hits, close, prior, wheeled(), wide, owed=-back)
+    close = walls.align(hits, prior)._replace(pose=predicted, support=0.82)
+    wide, back = SearchSettings(), TRUE - predicted
+    assert jump(walls, hits, close, prior, *wheeled(), wide) is None
+    found = jump(walls, hits, close, prior, *wheeled(), wide, owed=-back)
     assert found is not None
     assert np.hypot(*(found.pose - TRUE)[:2]) < 0.01
 
 
 @pytest.mark.parametrize(("gap_s", "found"), [(0.02, False), (2.0, True)])
-def test_after_a_gap_all_that_the_settings_allow_is_searched(walls: SurfaceMap, gap_s: float, found: bool) -> None:
+def test_after_a_gap_all_that_the_settings_allow_is_searched(walls: Submap, gap_s: float, found: bool) -> None:
     """Sure of its pose, the filter searches 0.3 m; wheels that hung through a gap are 1.4 m off and as sure."""
     motion = Motion(OdometrySettings(), np.zeros(3))
     motion.predict(gap_s)
@@ -113,7 +119,7 @@ def test_after_a_gap_all_that_the_settings_allow_is_searched(walls: SurfaceMap, 
 
 def test_a_velocity_that_is_distrusted_is_hardly_known() -> None:
     """Else the speed that a jump gives would carry the next pose away, and the scans could not take it back."""
-    motion = wheeled()
+    motion, _ = wheeled()
     motion.distrust_velocity(np.array([1.5, 0.0, 0.2]))
     assert motion.velocity.tolist() == [1.5, 0.0, 0.2]
     motion.predict(0.1)

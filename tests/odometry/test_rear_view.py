@@ -14,11 +14,11 @@ from lhdmap.kinematics import T_base_rear
 from lhdmap.logs.source import LogSource
 from lhdmap.machine import Machine
 from lhdmap.messages import FloatArray, Joints, LaserScan
-from lhdmap.odometry.matching import Hits, MatchModel, Prior, match
 from lhdmap.odometry.rear_view import Behind, JointOffset, RearView, behind
-from lhdmap.odometry.surface_map import empty_map, insert_all
 from lhdmap.pipeline.mapping import MappingPipeline
 from lhdmap.pipeline.track import Rows, resample
+from lhdmap.scan_matching.matching import Hits, MatchModel, Prior, match
+from lhdmap.scan_matching.surface_map import empty_map, insert_all
 from lhdmap.simulation.drive import simulate_drift
 from lhdmap.simulation.scenario import DriftScenario
 from lhdmap.simulation.sections import DriftSettings, DriveSettings

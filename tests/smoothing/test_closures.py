@@ -8,13 +8,14 @@ import numpy as np
 import pytest
 from lhdmap.geometry import se2
 from lhdmap.messages import FloatArray
+from lhdmap.scan_matching.key_scan import KeyScan
 from lhdmap.smoothing.closures import Closure, _confirmed, find_closures
-from lhdmap.smoothing.graph import smoothed
-from lhdmap.smoothing.keys import KeyScan, KeyScans
+from lhdmap.smoothing.graph import chained, smoothed
+from lhdmap.smoothing.keys import KeyScans
 from lhdmap.smoothing.settings import SmoothingSettings
 from lhdmap.smoothing.smoother import Smoother
 
-from tests.smoothing.places import SIGMA_M, WALK, drifted, keys_of, lap, square, straight
+from tests.smoothing.places import SIGMA_M, SIGMA_RAD, WALK, drifted, keys_of, lap, square, straight
 
 SETTINGS = SmoothingSettings()
 NO_POINTS = np.zeros((1, 3), dtype=np.float32)
@@ -40,7 +41,7 @@ def test_a_second_lap_closes_the_loop(twice_round: tuple[FloatArray, list[KeySca
 def test_the_graph_shrinks_the_error(twice_round: tuple[FloatArray, list[KeyScan]]) -> None:
     true, keys = twice_round
     before = np.array([key.pose for key in keys])
-    after = smoothed(keys, find_closures(keys, SETTINGS)).poses
+    after = smoothed(keys, find_closures(keys, SETTINGS), SETTINGS).poses
     assert after[0] == pytest.approx(true[0], abs=1e-4)
     assert (
         np.hypot(*(after[64:, :2] - true[64:, :2]).T).mean()
@@ -75,7 +76,8 @@ def test_there_and_back_in_a_smooth_drift_fixes_nothing_along() -> None:
 
 
 def plain_keys(count: int) -> list[KeyScan]:
-    return [KeyScan(k, np.array([float(k), 0.0, 0.0]), float(k), NO_POINTS, WALK) for k in range(count)]
+    poses = [np.array([float(k), 0.0, 0.0]) for k in range(count)]
+    return [KeyScan(k, pose, float(k), NO_POINTS, WALK) for k, pose in enumerate(poses)]
 
 
 def closure(earlier: int, current: int, shift_m: float = 0.0) -> Closure:
@@ -96,10 +98,10 @@ def test_a_lone_closure_is_dropped() -> None:
 
 def test_the_graph_of_a_tiny_loop_has_the_least_squares_solution() -> None:
     """Three steps of 1 m along a line and a closure that says 3.3: with equal weights the rest is shared out evenly."""
-    keys, sigma = plain_keys(4), SIGMA_M
+    keys, sigma = plain_keys(4), math.hypot(SIGMA_M, SETTINGS.along_sigma)
     variance = 1e4 * np.diag([sigma**2, sigma**2, 1.0])  # so weak that the robust kernel stays quadratic
     shift = 0.001
-    found = smoothed(keys, [Closure(0, 3, np.array([3.0 + shift, 0.0, 0.0]), variance)]).poses
+    found = smoothed(keys, [Closure(0, 3, np.array([3.0 + shift, 0.0, 0.0]), variance)], SETTINGS).poses
     weight = (1 / (1e4 * sigma**2)) / (1 / (1e4 * sigma**2) + 1 / (3 * sigma**2))
     assert found[3, 0] - 3.0 == pytest.approx(shift * weight, rel=0.01)
     assert np.diff(found[:, 0]) == pytest.approx(np.full(3, 1.0 + shift * weight / 3), abs=1e-9)
@@ -107,7 +109,7 @@ def test_the_graph_of_a_tiny_loop_has_the_least_squares_solution() -> None:
 
 def test_one_gross_closure_does_not_bend_the_graph() -> None:
     right = [closure(k, k + 30) for k in range(20)]
-    found = smoothed(plain_keys(50), [*right, closure(10, 41, shift_m=15.0)]).poses
+    found = smoothed(plain_keys(50), [*right, closure(10, 41, shift_m=15.0)], SETTINGS).poses
     assert np.abs(found[:, 0] - np.arange(50.0)).max() < 0.1
 
 
@@ -118,12 +120,17 @@ def test_without_closures_the_odometry_stands() -> None:
     assert smoother.correction() is None
 
 
-def test_keys_are_a_metre_apart_and_add_up_what_their_steps_may_be_off() -> None:
+def test_keys_are_a_metre_apart_and_say_how_far_their_steps_may_be_off() -> None:
+    """A random walk of a heading swings the way that follows: its variance grows with the cube of the length."""
     keys = KeyScans(SETTINGS)
-    for k in range(101):
+    for k in range(1006):
         keys.update(k, np.array([0.1 * k, 0.0, 0.0]), np.ones((5, 3)), WALK, unseen=30 <= k < 70)
     places = np.array([key.pose[0] for key in keys.keys])
     assert np.diff(places) == pytest.approx(1.0, abs=0.11)
-    assert keys.unseen_m == pytest.approx(4.0)
-    assert keys.keys[1].error.walk[0, 0] == pytest.approx(round(10 * places[1]) * WALK.walk[0, 0])
     assert keys.keys[-1].travelled_m == pytest.approx(places[-1])
+    assert keys.unseen_m == pytest.approx(4.0)
+    end, steps, way_m = chained(keys.keys), 10.0 * places[-1], places[-1]
+    assert end.walk[0, 0] == pytest.approx(steps * SIGMA_M**2)
+    assert end.walk[2, 2] == pytest.approx(steps * SIGMA_RAD**2)
+    assert end.walk[1, 1] == pytest.approx(steps * (SIGMA_M**2 + (SIGMA_RAD * way_m) ** 2 / 3.0), rel=0.01)
+    assert keys.rest.walk[0, 0] == pytest.approx(round(10.0 * (keys.travelled_m - way_m)) * SIGMA_M**2)

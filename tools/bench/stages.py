@@ -22,8 +22,10 @@ from lhdmap.messages import FloatArray, LaserScan, Mount
 from lhdmap.odometry.flow_scan import Pyramid
 from lhdmap.odometry.planar import PlanarOdometry
 from lhdmap.odometry.range_flow import Flow, flow
-from lhdmap.odometry.scan_points import planar_points
 from lhdmap.odometry.settings import OdometrySettings, RangeFlowSettings
+from lhdmap.scan_matching.matching import Hits
+from lhdmap.scan_matching.scan_points import planar_points
+from lhdmap.scan_matching.submap import Submap, unsure
 from lhdmap.simulation.planar import PlanarScanner, drift_world, drive_along, simulate_scans
 
 from tools.evaluate.figures import Figure
@@ -32,6 +34,7 @@ LEVEL, RATE_HZ, SPEED_MPS = np.eye(4), 25.0, 12.0 / 3.6
 _GROUP = "CPU time a scan by stage"
 _WARM = 30
 _NO_PRIOR = 1e-3 * np.eye(3)
+_SUBMAP_CELL_M = 0.04
 
 
 @nb.njit(cache=True)
@@ -80,6 +83,10 @@ def stage_figures() -> Iterator[Figure]:
             targets = (0.5, 1.0) if goal and method == "anchored" else (None, None)
             rows.append((f"{name}, {beams}", timer.times_ms(_odometry(scans, method)), targets))
         rows.append((f"integration, {beams}", timer.times_ms(_integration(poses, scans)), (None, None)))
+    poses, scans = _drive(0.19)  # 1,001 beams
+    hits = [planar_points(scan, LEVEL, np.zeros(3))[:1000] for scan in scans[:300]]
+    rows.append(("scan matching, 1,000 hits: map of a scan", timer.times_ms(_maps(hits)), (None, None)))
+    rows.append(("scan matching, 1,000 hits: match with it", timer.times_ms(_matches(poses, hits)), (1.0, None)))
     reference = float(np.median(timer.reference_ms))
     yield Figure(_GROUP, "reference kernel (50,000 sines, roots, divisions)", reference, "ms", note="ratio 1")
     for name, times, (median, p99) in rows:
@@ -113,6 +120,19 @@ def _pairs(poses: FloatArray, scans: list[LaserScan]) -> Iterator[Callable[[], A
 def _compare(before: Pyramid, points: FloatArray, guess: FloatArray, settings: RangeFlowSettings) -> Flow:
     now = Pyramid(points, settings.width_m, 1)
     return flow(before, now, guess, _NO_PRIOR, 0.012, iterations=settings.iterations)
+
+
+def _maps(hits: list[FloatArray]) -> Iterator[Callable[[], Any]]:
+    for points in hits:
+        yield partial(Submap.of, points, _SUBMAP_CELL_M)
+
+
+def _matches(poses: FloatArray, hits: list[FloatArray]) -> Iterator[Callable[[], Any]]:
+    """The newer scan aligned with the map of the one before; the prediction is 1 cm off."""
+    for k in range(1, len(hits)):
+        submap = Submap.of(hits[k - 1], _SUBMAP_CELL_M)
+        guess = se2.between(poses[k - 1], poses[k]) + np.array([0.01, 0.003, 0.001])
+        yield partial(submap.align, Hits(hits[k], len(hits[k]), layered=False), unsure(guess))
 
 
 def _odometry(scans: list[LaserScan], method: str) -> Iterator[Callable[[], Any]]:

@@ -28,17 +28,22 @@ RESULT = Path(__file__).resolve().parents[2] / "evaluation" / "trust.md"
 SEEDS = (401, 402, 403, 404)  # worlds that no constant was chosen on (those were 201 to 208, in space 301 to 310)
 SPACE_SEEDS = (451, 452, 453, 454, 455, 456)
 LENGTHS_M = (1.0, 10.0, 100.0)
-MACHINES = [Sensors(True, True, True), Sensors(False, True, True), Sensors(False, False, True), Sensors(False, False, False)]
+MACHINES = [
+    Sensors(True, True, True),
+    Sensors(False, True, True),
+    Sensors(False, False, True),
+    Sensors(False, False, False),
+]
 HEADING = """\
 # Trust: is the stated error true?
 
-Written by `python -m tools.evaluate.trust`; not edited by hand. Worlds {seeds} (planar, 12 km/h, 25 Hz) and {space} (in space, 90 m, scanners
-tilted by 2.5°, inclinometer with 0.1° of noise and a bias of 0.03°, one standard deviation), that no constant was chosen on.
+Written by `python -m tools.evaluate.trust`; not edited by hand. Worlds that no constant was chosen on: {seeds} (planar, 12 km/h,
+25 Hz) and {space} (in space, 90 m, scanners tilted by 2.5°, inclinometer with 0.1° of noise and a bias of 0.03°, one sigma).
 
 ## Steps
 
-Errors of all steps of a length over their stated standard deviation, each half metre: root mean square (1 where true), and in brackets
-how many of 100 are within two deviations (95 where true). Steps of 100 m overlap: few of them are independent.
+Errors of all steps of a length over their stated standard deviation, each half metre: root mean square (1 where true), and in
+brackets how many of 100 are within two deviations (95 where true). Steps of 100 m overlap: few of them are independent.
 
 | walls, course | m | along | across | heading |
 | --- | --- | --- | --- | --- |
@@ -138,7 +143,9 @@ def step_rows(measured: Sequence[Measured]) -> Iterator[str]:
     for title, members in groups:
         for length_m in LENGTHS_M:
             found = np.concatenate([one.ratios[length_m] for one in measured if one.name in members])
-            cells = (f"{r:.2f} ({100 * s:.0f})" for r, s in zip(_rms(found), (np.abs(found) < 2.0).mean(axis=0), strict=True))
+            cells = (
+                f"{r:.2f} ({100 * s:.0f})" for r, s in zip(_rms(found), (np.abs(found) < 2.0).mean(axis=0), strict=True)
+            )
             yield f"| {title} | {length_m:g} | " + " | ".join(cells) + " |"
 
 

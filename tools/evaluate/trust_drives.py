@@ -8,16 +8,16 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
+from lhdmap.config import Settings
 from lhdmap.geometry import se2
 from lhdmap.logs.source import LogSource
 from lhdmap.machine import Machine
 from lhdmap.messages import FloatArray
 from lhdmap.odometry.planar import PlanarOdometry
 from lhdmap.odometry.steps import OdometryStep
-from lhdmap.config import Settings
-from lhdmap.pipeline.mapping import MappingPipeline
+from lhdmap.pipeline.mapping import MappingPipeline, feed
 from lhdmap.pipeline.outcome import ROLES_READ
-from lhdmap.pipeline.track import resample
+from lhdmap.pipeline.track import Rows, resample
 from lhdmap.simulation.drive import simulate_drift
 from lhdmap.simulation.planar import PlanarScanner, drift_world, drive_along, simulate_scans
 from lhdmap.simulation.scenario import DriftScenario
@@ -43,8 +43,10 @@ _HIT = np.zeros((1, 3))
 
 
 class Driven(NamedTuple):
-    """A drive: true and estimated poses (N, 3) of the processed scans, the odometry's steps, what is expected of the end, and its
-    error: in the plane (m), heading (°), height (m, None: not observed)."""
+    """A drive: true and estimated poses (N, 3) of the processed scans, the odometry's steps, what is expected of the end.
+
+    `end`: its error in the plane (m), heading (°), height (m, None: not observed).
+    """
 
     truth: FloatArray
     estimate: FloatArray
@@ -116,23 +118,19 @@ def _scenario(walls: str, seed: int) -> DriftScenario:
     )
 
 
-def _mapped(log: Path, truth: object, sensors: Sensors) -> Driven:
-    pipeline, steps = MappingPipeline(Settings(), Machine(), cloud=sensors.rear), []
-    seen: list[int] = []
+def _mapped(log: Path, truth: Rows, sensors: Sensors) -> Driven:
+    pipeline = MappingPipeline(Settings(), Machine(), cloud=sensors.rear)
     with LogSource([log]) as source:
-        for role, message in source.messages([role for role in sensors.roles if role in source.roles]):
-            pipeline.update(role, message)
-    pipeline.finish()
+        feed(pipeline, source.messages([role for role in sensors.roles if role in source.roles]))
     rows = pipeline.path.final.rows()
-    true = resample(truth, rows.times_ns).poses  # type: ignore[arg-type]
-    height_std_m = pipeline.attitude.height_std_m(_SPACE_M) if pipeline.has_inclinometer else None
+    true = resample(truth, rows.times_ns).poses
+    height_std_m = pipeline.front_end.attitude.height_std_m(_SPACE_M) if pipeline.has_inclinometer else None
     expected = expected_error(pipeline.smoother.keys, height_std_m)
     assert expected is not None
-    del seen
     flat, flat_true = rows.poses[:, [0, 1, 5]], true[:, [0, 1, 5]]
     risen_m = float((rows.poses[-1, 2] - rows.poses[0, 2]) - (true[-1, 2] - true[0, 2]))
     end = (*_end_error(flat_true, flat), risen_m if pipeline.has_inclinometer else None)
-    return Driven(flat_true, flat, steps, expected, end)
+    return Driven(flat_true, flat, [], expected, end)
 
 
 def _end_error(truth: FloatArray, estimate: FloatArray) -> tuple[float, float]:

@@ -9,7 +9,7 @@ import numba as nb
 import numpy as np
 
 from lhdmap.messages import FloatArray
-from lhdmap.odometry.surface_map import LINE, fit_line
+from lhdmap.scan_matching.surface_map import LINE, fit_line
 
 # Finest cells that a pose may move before lines are fitted anew. Where the walls hold: measured, no loss, half the time. Where
 # they hardly do, one step corrects only a part of an error along them, and what pulls towards standing still adds up. There lines
@@ -37,7 +37,7 @@ class MatchModel(NamedTuple):
 class Hits(NamedTuple):
     """Points (N, 3) in the level base frame, heights absolute; `front`: how many come from the front scanner, which are first.
 
-    `layered`: the scanner tilts, heights matter; `slants` (N, 2) of `lhdmap.odometry.slant`, or none. Other scanners'
+    `layered`: the scanner tilts, heights matter; `slants` (N, 2) of `lhdmap.scan_matching.slant`, or none. Other scanners'
     hits help to place the scan; how well it fits is judged by the front one's alone.
     """
 

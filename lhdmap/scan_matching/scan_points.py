@@ -7,7 +7,7 @@ import math
 import numba as nb
 import numpy as np
 
-from lhdmap.messages import FloatArray, LaserScan
+from lhdmap.messages import Float32Array, FloatArray, LaserScan
 
 NO_BOXES = np.zeros((0, 6))
 
@@ -43,6 +43,13 @@ def planar_points(
         out,
     )
     return out[:count]
+
+
+def flattened(points: FloatArray | Float32Array) -> FloatArray:
+    """Return points (N, 3) at height zero: heights of two visits of a place differ by the drift of the height."""
+    flat: FloatArray = points.astype(np.float64)
+    flat[:, 2] = 0.0
+    return flat
 
 
 def half_sweep_ns(scan: LaserScan) -> int:

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 from lhdmap.messages import LaserScan
-from lhdmap.odometry.scan_points import planar_points
+from lhdmap.scan_matching.scan_points import planar_points
 
 
 @pytest.mark.parametrize("nothing", [0.0, -1.0, math.inf, math.nan, 31.0])

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from lhdmap.messages import FloatArray
-from lhdmap.odometry.surface_map import LAYER_M, LINE, SurfaceMap, empty_map, fit_line, insert, insert_all
+from lhdmap.scan_matching.surface_map import LAYER_M, LINE, SurfaceMap, empty_map, fit_line, insert, insert_all
 
 CELL_M = 0.025
 CELLS = 256
