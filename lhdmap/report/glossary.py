@@ -49,6 +49,11 @@ TERMS = (
         "drift, the tunnel", "A horizontal tunnel in a mine.", r"(the|a|smooth) drift\b(?! (of|itself|is not|between))"
     ),
     Term(
+        "expected error",
+        "How far the end of the path may be off against its start, so that 95 of 100 drives are within: put together from what each "
+        "step may be off, closed loops taken into account. 'At least' where nothing told the motion on a stretch.",
+    ),
+    Term(
         "face",
         "The surface of the pile, or of whatever closes the drift, that the machine looks at.",
         r"\bface\b",
