@@ -47,23 +47,28 @@ _SECTIONS = {
     "recording": Case("recording"),
     "rockbreaker": Case("plan"),
 }
+
+
+_WITH_FLOOR = {"neighbours_min": 0, "slope_from": "normals", "cluster_gap_m": 0.0}
+
+
 def _figure9(section: str, found: Mapping[str, Any]) -> dict[str, Case]:
     """Return the cases of the constants of Fig. 9, which are in two sections."""
-    rough = {**found, f"{section}.roughness": "curvature", f"{section}.curvature_min": 0.01}
-    flat = {**rough, f"{section}.curvature_min": 0.0, f"{section}.slope_from": "normals"}
-    steep = {**found, f"{section}.steep_deg": 40.0}
+    rough = {**found, f"{section}.roughness": "curvature", f"{section}.curvature_min": 0.0}
+    with_floor = {**rough, **{f"{section}.{key}": value for key, value in _WITH_FLOOR.items()}}
+    steep = {**found, f"{section}.steep_deg": 20.0}
     values = {
-        "view_height_m": Case("pile", 0.0, flat),
-        "curvature_min": Case("pile", 0.02, rough),
-        "curvature_max": Case("pile", 0.02, rough),
+        "view_height_m": Case("pile", 0.0, with_floor),
+        "curvature_min": Case("pile", 1e-4, rough),
+        "curvature_max": Case("pile", 1e-4, rough),
         "cluster_gap_m": Case("pile", 0.15, found),
         "bound_share": Case("pile", 0.1, found),
         "points_min": Case("pile", 1000, found),
         "slope_radius_m": Case("pile", 0.5, {**found, f"{section}.slope_from": "normals"}),
-        "shallow_deg": Case("pile", 50.0, found),
-        "steep_deg": Case("pile", 40.0, found),
-        "wall_deg": Case("pile", 42.0, steep),
-        "overhang_deg": Case("pile", 43.0, {**steep, f"{section}.wall_deg": 42.0}),
+        "shallow_deg": Case("pile", 40.0, found),
+        "steep_deg": Case("pile", 20.0, found),
+        "wall_deg": Case("pile", 25.0, steep),
+        "overhang_deg": Case("pile", 26.0, {**steep, f"{section}.wall_deg": 25.0}),
     }
     return {f"{section}.{key}": case for key, case in values.items()}
 
@@ -77,34 +82,37 @@ _SETTINGS = {
     "odometry.weak_ratio": Case("smooth"),
     "odometry.blind_sigma_m": Case("smooth", 0.001),
     "odometry.weak_inflation": Case("smooth"),
-    "odometry.weak_sigma_deg": Case("smooth", 0.01),
-    "anchor.insert_deg": Case("tilted", 0.1),
+    "odometry.weak_sigma_deg": Case("tilted", 0.05),
+    "anchor.insert_deg": Case("tilted", 0.1, {"anchor.insert_m": 5.0}),
     "anchor.hit_limit": Case("tilted", 5.0),
-    "anchor.rounds": Case("tilted", 2),
+    "anchor.rounds": Case("tilted", 1),
     "anchor.min_support": Case("jump", 0.9),
-    "search.reach_m": Case("jump", 0.3),
+    "search.reach_m": Case("jump", 0.1),
     "search.turn_deg": Case("jump", 5.0),
     "range_flow.spacing_deg": Case("level", 2.0, _FLOW),
     "range_flow.min_support": Case("jump", 0.9, _FLOW),
-    "range_flow.levels": Case("level", 2, _FLOW),
+    "range_flow.levels": Case("jump", 2, _FLOW),
     "range_flow.iterations": Case("level", 1, _FLOW),
     "cloud_odometry.kiss_voxel_m": Case("clouds", base=_KISS),
     "cloud_odometry.min_range_m": Case("clouds", 3.0),
     "cloud_odometry.max_range_m": Case("clouds", 8.0),
-    "cloud_odometry.insert_deg": Case("clouds", 0.1),
-    "cloud_odometry.window_m": Case("returning", 5.0, {"cloud_odometry.max_range_m": 4.0, "cloud_odometry.insert_m": 0.5}),
+    "cloud_odometry.insert_deg": Case("clouds", 0.1, {"cloud_odometry.insert_m": 5.0}),
+    "cloud_odometry.window_m": Case(
+        "returning", 5.0, {"cloud_odometry.max_range_m": 4.0, "cloud_odometry.insert_m": 0.5}
+    ),
+    "cloud_odometry.step_m": Case("clouds", 1.0),
     "cloud_odometry.step_deg": Case("clouds", 0.05, _WAITS),
     "cloud_odometry.step_s": Case("clouds", 0.2, _WAITS),
     "cloud_odometry.weak_sigma_m": Case("clouds", 0.005),
-    "cloud_odometry.weak_sigma_deg": Case("clouds", 0.01),
+    "cloud_odometry.weak_sigma_deg": Case("clouds", 0.001),
     "cloud_odometry.min_support": Case("clouds", 0.95),
     "cloud_odometry.max_speed_mps": Case("clouds", 0.5),
-    "cloud_odometry.reach_m": Case("clouds", 0.0, {"cloud_odometry.min_support": 0.99}),
+    "cloud_odometry.reach_m": Case("cut", 0.0, {"cloud_odometry.voxel_m": 0.2}),
     "attitude.max_gap_s": Case("faulty"),
     "attitude.jump_deg": Case("faulty"),
     "attitude.frozen_s": Case("faulty", 0.3),
     "attitude.keep_s": Case("rare", 1.0),
-    "wheels.unknown_articulation_deg": Case("tachometer"),
+    "wheels.unknown_articulation_deg": Case("clouds"),
     "wheels.pose_distance_std": Case("poses"),
     "wheels.pose_turn_std": Case("poses"),
     "wheels.pose_drift_deg": Case("poses"),
@@ -115,6 +123,7 @@ _SETTINGS = {
     "wheels.max_jump_m": Case("poses", 3.0),
     "wheels.max_pose_gap_s": Case("poses", 1.0),
     "wheels.keep_s": Case("rare", 1.0),
+    "slip.window_s": Case("tilted", 1.0),
     "integration.range_min_m": Case("tilted", 3.0),
     "integration.range_max_m": Case("tilted", 5.0),
     "integration.min_hits": Case("tilted", 8),
@@ -129,9 +138,9 @@ _SETTINGS = {
     "smoothing.agree_m": Case("lap", 0.01),
     "smoothing.agree_deg": Case("lap", 0.1),
     "pile.reach_m": Case("pile", 15.0),
-    "pile.deadline_m": Case("pile", 20.0, {"pile.sure": 1.0}),
-    "pile.sure": Case("pile", 1.0),
-    "pile.likely": Case("pile", 1.0, {"pile.sure": 1.0}),
+    "pile.deadline_m": Case("pile", 20.0),
+    "pile.sure": Case("pile", 0.9),
+    "pile.likely": Case("pile", 0.99),
     "rockbreaker.clearance_m": Case("rock"),
     **_figure9("figure9", _FOUND),
     **_figure9("figure9_repaired", {"pile.method": "figure9_repaired"}),

@@ -106,7 +106,7 @@ def pile(settings: Settings) -> str:
     """Return the digest of `pile.json`, and of the distances of all estimates, after a drive towards a pile."""
     watch = PileWatch(settings)
     for scan in streams.towards_a_pile():
-        watch.update(cast(PlacedScan, _Hits(scan)))
+        watch.update(cast("PlacedScan", _Hits(scan)))
     report = watch.report()
     return digest(report.to_json(), [one.distance_m for one in report.history])
 
@@ -135,7 +135,10 @@ def recording(settings: Settings) -> str:
 def _drawn(batches: list[Any]) -> list[Any]:
     """Return the columns of an entity, less those that tell when the file was made."""
     names = [name for name in batches[0].schema.names if not name.startswith(("rerun.", "log_t", "RecordingInfo"))]
-    return [[name, *(str(batch.column(name).to_pylist()) for batch in batches if name in batch.schema.names)] for name in names]
+    return [
+        [name, *(str(batch.column(name).to_pylist()) for batch in batches if name in batch.schema.names)]
+        for name in names
+    ]
 
 
 def plan(settings: Settings) -> str:
@@ -169,9 +172,7 @@ def _untimed(values: Any) -> Any:
     return [_untimed(value) for value in values] if isinstance(values, list) else values
 
 
-def _mapped(
-    stream: Callable[[], Stream], primary: Literal["front", "points"] = "front", *, own: bool = False
-) -> Probe:
+def _mapped(stream: Callable[[], Stream], primary: Literal["front", "points"] = "front", *, own: bool = False) -> Probe:
     return lambda settings: run(settings, stream(), primary, own=own)
 
 
@@ -186,6 +187,7 @@ PROBES: dict[str, Probe] = {
     "jump": _mapped(partial(streams.planar, wheels="none", jumps=True)),
     "clouds": _mapped(streams.clouds, "points"),
     "returning": _mapped(streams.returning, "points"),
+    "cut": _mapped(streams.cut, "points"),
     "lap": lap,
     "pile": pile,
     "recording": recording,

@@ -20,6 +20,7 @@ from lhdmap.messages import (
     Tachometer,
     WheelPose,
 )
+from lhdmap.pile.stage import ScanHits
 from lhdmap.simulation.drive import records
 from lhdmap.simulation.planar import (
     PlanarScanner,
@@ -32,8 +33,6 @@ from lhdmap.simulation.planar import (
 from lhdmap.simulation.scenario import DriftScenario
 from lhdmap.simulation.sections import DriftSettings, DriveSettings, ScannerSettings
 from lhdmap.simulation.world import DriftWorld
-
-from lhdmap.pile.stage import ScanHits
 from lhdmap.smoothing.keys import KeyScan
 
 from tests.odometry import cloud_drives
@@ -44,9 +43,14 @@ Stream = tuple[tuple[str, Message], ...]
 TILTED = DriftScenario(
     seed=5,
     truth=False,
-    drift=DriftSettings(pieces=((4.0, 0.0, -6.0), (4.0, 10.0, 0.0), (6.0, 0.0, 4.0)), mesh_m=0.12),
-    drive=DriveSettings(distance_m=6.0, speed_kmh=10.0, standstill_s=0.3),
+    drift=DriftSettings(pieces=((4.0, 0.0, -6.0), (4.0, 10.0, 0.0), (10.0, 0.0, 4.0)), mesh_m=0.12),
+    drive=DriveSettings(distance_m=9.5, speed_kmh=12.0, acceleration_mps2=2.0, standstill_s=0.8),
     scanner=ScannerSettings(beams=191, sweep=True, dust_share=0.01),
+)
+CLOUDED = DriftScenario(
+    seed=3,
+    drift=DriftSettings(mesh_m=0.12, roughness_m=0.03),
+    drive=DriveSettings(distance_m=30.0, speed_kmh=20.0, acceleration_mps2=3.0, standstill_s=0.3),
 )
 RATE_HZ, SPEED_MPS, FROM_M, WAY_M = 25.0, 3.0, 5.0, 7.0
 CLOUDS = 30
@@ -56,7 +60,7 @@ _JUMP = np.array([0.6, 0.2, math.radians(20.0)])
 
 @functools.cache
 def tilted() -> Stream:
-    """Return a drive of 6 m with all sensors: tilted front and rear scanner, inclinometer, tachometer, joint; some dust."""
+    """Return a drive of 9.5 m with all sensors, tilted, and some dust: the rear scanner comes to where the front one was."""
     return tuple((role, one.message) for one in records(DriftWorld(TILTED)) if (role := _role(one)))
 
 
@@ -78,7 +82,7 @@ def _role(record: Record) -> str:
 @functools.cache
 def faulty() -> Stream:
     """Return the drive with gaps of 0.6 s and 0.3 s, an outlier and a frozen value of each of its slow sensors."""
-    start_ns = tilted()[-1][1].stamp_ns - 7_000_000_000
+    start_ns = tilted()[-1][1].stamp_ns - 6_000_000_000
     kept: list[tuple[str, Message]] = []
     held: Inclination | None = None
     for role, message in tilted():
@@ -172,13 +176,13 @@ def _wheel_poses(poses: FloatArray, stamps: list[int]) -> list[WheelPose]:
 
 @functools.cache
 def clouds() -> Stream:
-    """Return a drive of 3 s of a 3D scanner in a smooth drift, with tachometer and inclinometer."""
-    world = cloud_drives.drift_world(3, DriftSettings(mesh_m=0.12, roughness_m=0.03), 12.0)
+    """Return a drive of 8 m of a 3D scanner in a smooth drift, with tachometer and inclinometer."""
+    world = DriftWorld(CLOUDED)
     drive = cloud_drives.simulate(world, 15.0, count=CLOUDS)
     first_ns = drive.clouds[0].stamp_ns
     times_s = np.arange(0.0, cloud_drives.PERIOD_S * (CLOUDS + 2), 0.02)
     rows, behind = world.motion.at(times_s), world.motion.at(np.maximum(times_s - 0.02, 0.0))
-    messages: list[tuple[str, Message]] = [("points", cloud) for cloud in drive.clouds]
+    messages: list[tuple[str, Message]] = [("points", _thinned(cloud)) for cloud in drive.clouds]
     for t, row, before in zip(times_s, rows, behind, strict=True):
         stamp = first_ns + round(float(t) * 1e9)
         roll, pitch = float(row[3]), float(row[4])
@@ -188,28 +192,39 @@ def clouds() -> Stream:
     return (("tf_static", Mount(0, "base_link", "lidar", cloud_drives.T_BASE_SENSOR)), *messages)
 
 
-@functools.cache
+def _thinned(cloud: PointCloud) -> PointCloud:
+    """Return one point in three, for speed."""
+    return cloud._replace(points_m=cloud.points_m[::3], time_offsets_s=cloud.time_offsets_s[::3])
+
+
 def returning() -> Stream:
-    """Return the clouds of the drive, then the same ones back to where it began; without times in the sweep."""
-    there = [message for role, message in clouds() if isinstance(message, PointCloud)]
-    ways = [*there, *there[::-1]]
-    first_ns = there[0].stamp_ns
-    messages = [
-        cloud._replace(stamp_ns=first_ns + 100_000_000 * k, time_offsets_s=cloud_drives.NO_TIMES)
-        for k, cloud in enumerate(ways)
-    ]
-    return (clouds()[0], *(("points", cloud) for cloud in messages))
+    """Return the clouds of the drive, then the same ones back to where it began."""
+    return _clouds_of([*range(CLOUDS), *reversed(range(CLOUDS))])
+
+
+def cut() -> Stream:
+    """Return the clouds of the drive without eight of them: it jumps by 4 m."""
+    return _clouds_of([*range(16), *range(24, CLOUDS)])
+
+
+def _clouds_of(rows: list[int]) -> Stream:
+    """Return some clouds of the drive in an order, one each 0.1 s, without times in the sweep and without other sensors."""
+    all_ = [message for _, message in clouds() if isinstance(message, PointCloud)]
+    first_ns = all_[0].stamp_ns
+    chosen = [all_[row]._replace(time_offsets_s=cloud_drives.NO_TIMES) for row in rows]
+    steps = [cloud._replace(stamp_ns=first_ns + 100_000_000 * k) for k, cloud in enumerate(chosen)]
+    return (clouds()[0], *(("points", cloud) for cloud in steps))
 
 
 @functools.cache
 def lap_scans() -> tuple[KeyScan, ...]:
     """Return scans each metre of a lap and a quarter around a pillar, placed by an odometry that drifts."""
     true = places.lap(80)
-    keys = places.keys_of(places.square(), true, places.drifted(true, 1.005, 0.025))
+    keys = places.keys_of(places.square(), true, places.drifted(true, 1.02, 0.12))
     return tuple(key._replace(weak=20 <= k < 30) for k, key in enumerate(keys))
 
 
 @functools.cache
 def towards_a_pile() -> tuple[ScanHits, ...]:
-    """Return scans each 0.2 m of a drive of 23 m towards a pile of 45 degrees, which ends 3 m before it."""
-    return tuple(CastDrift(45.0).scans(from_m=10.0, to_m=33.0))[::2]
+    """Return scans each 0.2 m of a drive of 23 m towards a shallow pile, which ends 3 m before it."""
+    return tuple(CastDrift(31.0).scans(from_m=10.0, to_m=33.0))[::2]
