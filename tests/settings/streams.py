@@ -21,6 +21,7 @@ from lhdmap.messages import (
     WheelPose,
 )
 from lhdmap.pile.stage import ScanHits
+from lhdmap.scan_matching.key_scan import KeyScan
 from lhdmap.simulation.drive import records
 from lhdmap.simulation.planar import (
     PlanarScanner,
@@ -33,7 +34,6 @@ from lhdmap.simulation.planar import (
 from lhdmap.simulation.scenario import DriftScenario
 from lhdmap.simulation.sections import DriftSettings, DriveSettings, ScannerSettings
 from lhdmap.simulation.world import DriftWorld
-from lhdmap.smoothing.keys import KeyScan
 
 from tests.odometry import cloud_drives
 from tests.pile.cast_drift import CastDrift
