@@ -24,6 +24,7 @@ from lhdmap.settings import setting
 
 _SILENT_S = 1.0  # not worth a word below
 LARGEST_TILT_RAD = math.radians(60.0)
+_BEST_STD_RAD = math.radians(0.03)  # no attitude claims to be better
 JUMP_RUN = 10  # so many samples in a row at a new level are no outliers but the level
 THIRD_DIFFERENCE = math.sqrt(20.0)  # its standard deviation for white noise of one
 NOISE_EVERY = 50
@@ -55,7 +56,6 @@ class AttitudeSettings:
     jump_deg: float = setting(
         4.0, unit="deg", minimum=0.1, doc="A sample this far from the last one is an outlier, unless it lasts."
     )
-    std_floor_deg: float = setting(0.03, unit="deg", minimum=0.0, doc="No attitude claims to be better than this.")
     frozen_s: float = setting(
         5.0, unit="s", minimum=0.1, doc="A sensor that repeats one value for this long is reported."
     )
@@ -92,7 +92,7 @@ class AttitudeFilter:
         self._jump_rad = math.radians(settings.jump_deg)
         self._outliers = 0
         self._same_since_ns: int | None = None
-        self._noise_rad = math.radians(settings.std_floor_deg)
+        self._noise_rad = _BEST_STD_RAD
         self._taken = 0
         self._finished = False
         self._asked: tuple[int, int] = (0, -1)
@@ -175,13 +175,13 @@ class AttitudeFilter:
         noise = float(factor[0])
         if not math.isfinite(noise):
             return None
-        std_rad = math.hypot(self._noise_rad * noise, math.radians(self.settings.std_floor_deg))
+        std_rad = math.hypot(self._noise_rad * noise, _BEST_STD_RAD)
         return Attitude(float(values[0, 0]), float(values[0, 1]), std_rad)
 
     def attitudes_at(self, stamps_ns: npt.NDArray[np.int64]) -> Attitudes:
         """Return the attitudes of `base_link` at many times, shape (N,), in any order."""
         values, factor = self._fit(np.asarray(stamps_ns, dtype=np.int64))
-        std = np.hypot(self._noise_rad * factor, math.radians(self.settings.std_floor_deg))
+        std = np.hypot(self._noise_rad * factor, _BEST_STD_RAD)
         return Attitudes(values[:, 0], values[:, 1], std, np.isfinite(factor))
 
     def _fit(self, stamps_ns: npt.NDArray[np.int64]) -> tuple[FloatArray, FloatArray]:

@@ -57,7 +57,7 @@ def test_what_is_kept_is_said_and_nothing_else(
     """Inside a part of the run that takes long."""
     words = ["build-map", str(log), "-o", str(tmp_path / "map"), "--one-process", "--json", "--quiet"]
     code = SLOW.format(module=module, name=name, words=words)
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False, timeout=60)
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False, timeout=240)
     told = json.loads(done.stdout)["error"]
     assert (done.returncode, told["exit_code"], told["kind"]) == (4, 4, "interrupted")
     partial = tmp_path / "map.partial"
@@ -100,7 +100,7 @@ sys.argv = ["lhdmap", *{words!r}]
 from lhdmap.cli.start import entry_point
 entry_point()
 """
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False, timeout=60)
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False, timeout=240)
     found = json.loads(done.stdout)
     assert done.returncode == found["error"]["exit_code"] == 4
     assert [row["attempt"] for row in found["rows"]] == ["A"]

@@ -16,7 +16,8 @@ from lhdmap.errors import InputError, LhdmapWarning, UsageError, kept_with
 from lhdmap.interrupts import put_in_order
 from lhdmap.mapfolder import MapFolderWriter
 from lhdmap.outputs import OutputFiles, OutputFolder
-from lhdmap.runfolder import RunFolderWriter, RunInfo
+from lhdmap.provenance import sha256_of
+from lhdmap.runfolder import RunFolder, RunFolderWriter, RunInfo
 
 from tests.cli.logs import write_room_log
 
@@ -285,3 +286,30 @@ def test_a_place_below_a_file_is_refused_before_the_work(tmp_path: Path) -> None
         OutputFolder(tmp_path / "file" / "run")
     with pytest.raises(InputError, match="cannot be made"), OutputFiles(tmp_path / "file" / "a.png"):
         pass
+
+
+@pytest.mark.parametrize(
+    ("kind", "words", "sources"),
+    [
+        ("map", ["build-map", "{log}", "--one-process"], ["{log}"]),
+        ("pile", ["pile", "{log}", "--set", "pile.reach_m=40.0"], ["{log}"]),
+        ("plan", ["rockbreaker", "plan", "--to", "6.27,-2.15,-1", "--no-pictures"], []),
+        ("workspace", ["rockbreaker", "workspace"], []),
+    ],
+)
+def test_each_command_says_what_it_made_and_of_what(
+    kind: str, words: list[str], sources: list[str], log: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main([*(word.format(log=log) for word in words), "-o", str(tmp_path / "out"), "--quiet"]) == 0
+    run = RunFolder.open(tmp_path / "out", [kind])
+    assert run.changed_files() == []
+    listed = {path.relative_to(run.path).as_posix() for path in run.path.rglob("*") if path.is_file()}
+    assert listed - set(run.info["files"]) == {"map.json" if kind == "map" else "run.json"}
+    wanted = [Path(source.format(log=log)) for source in sources]
+    assert [one["path"] for one in run.info["sources"]] == [str(path) for path in wanted]
+    assert [one["sha256"] for one in run.info["sources"]] == [sha256_of(path) for path in wanted]
+    capsys.readouterr()
+    assert main(["info", str(run.path), "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert (found["kind"], found["changed"]) == (kind, [])
+    assert found["settings"] == ({"pile.reach_m": 40.0} if kind == "pile" else {})
