@@ -29,6 +29,7 @@ from lhdmap.pipeline.mapping import MappingPipeline
 from lhdmap.pipeline.pile import PileWatch, PlacedScan
 from lhdmap.rockbreaker.machine import Rockbreaker
 from lhdmap.simulation.grizzly import simulate_grizzly
+from lhdmap.smoothing.trust import expected_error
 
 from tests.report.synthetic import START_NS, report_data
 from tests.report.test_recording import read
@@ -88,6 +89,7 @@ def run(settings: Settings, stream: Stream, primary: Literal["front", "points"] 
         records.tachometer(),
         records.articulation(),
         pipeline.covariances,
+        expected_error(pipeline.smoother.keys, pipeline.front_end.attitude.height_std_m(10.0)),
         pipeline.sweeps.cloud(),
         pipeline.warnings,
         pipeline.sweeps.warnings,
@@ -98,7 +100,7 @@ def lap(settings: Settings) -> str:
     """Return the digest of the smoother's corrections after a lap and a quarter around a pillar, scans each half metre."""
     stage = MappingPipeline(settings).smoother
     for key in streams.lap_scans():
-        stage.keys.update(key.time_ns, key.pose, key.points.astype(np.float64), weak=key.weak)
+        stage.keys.update(key.time_ns, key.pose, key.points.astype(np.float64), key.error)
     return digest(stage.correction())
 
 
@@ -178,6 +180,7 @@ def _mapped(stream: Callable[[], Stream], primary: Literal["front", "points"] = 
 
 PROBES: dict[str, Probe] = {
     "tilted": _mapped(streams.tilted, own=True),
+    "unlevelled": _mapped(streams.unlevelled, own=True),
     "faulty": _mapped(streams.faulty, own=True),
     "rare": _mapped(streams.rare, own=True),
     "level": _mapped(streams.planar),
