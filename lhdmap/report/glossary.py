@@ -50,8 +50,8 @@ TERMS = (
     ),
     Term(
         "expected error",
-        "How far the end of the path may be off against its start, so that 95 of 100 drives are within: put together from what each "
-        "step may be off, closed loops taken into account. 'At least' where nothing told the motion on a stretch.",
+        "How far the end of the path may be off against its start, so that 95 of 100 drives are within: put together from what "
+        "each step may be off, closed loops taken into account. 'At least' where nothing told the motion on a stretch.",
     ),
     Term(
         "face",
