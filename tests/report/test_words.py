@@ -10,7 +10,7 @@ import pytest
 from lhdmap.report.data import ReportData, Summary
 from lhdmap.report.glossary import TERMS, as_markdown, list_of
 from lhdmap.report.page import fill_in_cost, render_report, write_report
-from lhdmap.report.text import cost_figures, cost_line, missing_parts
+from lhdmap.report.text import cost_figures, cost_line, headline, missing_parts, trust_line
 
 from tests.report.synthetic import report_data
 
@@ -50,6 +50,36 @@ def test_the_words_follow_the_factor(factor: float, value: str, meaning: str) ->
     figure = cost_figures(_summary(realtime_factor=factor))[0]
     assert figure.value == value
     assert figure.meaning.startswith(meaning)
+
+
+def test_the_page_begins_with_how_far_the_map_may_be_off(data: ReportData) -> None:
+    error = {
+        "end_m": 0.184,
+        "end_pct": 0.23,
+        "heading_deg": 0.31,
+        "height_m": None,
+        "lower_bound": False,
+        "unseen_m": 1.0,
+    }
+    known = replace(data, summary=replace(data.summary, expected_error=error))
+    first = headline(known)[0]
+    assert (first.value, first.name) == ("18.4 cm", "expected error")
+    assert "heading 0.31°, height not observed" in first.meaning
+    assert (
+        trust_line({"expected_error": error})
+        == "18.4 cm at its end (0.23 %), heading 0.31°, height not observed (95 %)"
+    )
+    least = error | {"lower_bound": True, "unseen_m": 42.0, "height_m": 1.5}
+    told = trust_line({"expected_error": least})
+    assert told is not None
+    assert told.startswith("at least 18.4 cm")
+    assert "on up to 42 m neither walls nor wheels" in told
+    assert "height 1.50 m" in told
+
+
+def test_nothing_is_said_of_an_error_that_nobody_knows(data: ReportData) -> None:
+    assert trust_line({"expected_error": None}) is None
+    assert "expected error" not in [figure.name for figure in headline(data)]
 
 
 def test_compiling_is_told_apart() -> None:
