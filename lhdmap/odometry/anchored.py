@@ -124,8 +124,10 @@ class AnchoredMatcher:
         self._owed = _OWED_KEPT * self._owed if self._doubt else NOTHING_OWED
         residual_m = result.residual_sigmas * self._noise_m
         noise = direction_noise(result.pose, hits, result.lines, self._anchor.cell_m, model)
-        seen = (self._layered, len(hits.points) == hits.front)
-        return Matched(result.information, residual_m, result.support, False, doubtful, self._jumped, noise, *seen)
+        alone = len(hits.points) == hits.front
+        return Matched(
+            result.information, residual_m, result.support, False, doubtful, self._jumped, noise, self._layered, alone
+        )
 
     def _hits(self, points: FloatArray, seen: Behind, rise: FloatArray) -> Hits:
         """Return what is matched: a level scanner sees the same curve of the walls again by itself."""

@@ -56,6 +56,10 @@ class AttitudeSettings:
     jump_deg: float = setting(
         4.0, unit="deg", minimum=0.1, doc="A sample this far from the last one is an outlier, unless it lasts."
     )
+    bias_std_deg: float = setting(
+        0.03, unit="deg", minimum=0.0, source="lhdmap: of an inclinometer whose mount was levelled",
+        doc="How far its zero may be off, standard deviation: a height integrated over a way is off by that slope.",
+    )  # fmt: skip
     frozen_s: float = setting(
         5.0, unit="s", minimum=0.1, doc="A sensor that repeats one value for this long is reported."
     )
@@ -162,7 +166,7 @@ class AttitudeFilter:
 
     def height_std_m(self, way_m: float) -> float:
         """Return the standard deviation (m) of a height that was integrated along the slope of a way."""
-        constant_m = math.radians(self.settings.std_floor_deg) * way_m
+        constant_m = math.radians(self.settings.bias_std_deg) * way_m
         return math.hypot(constant_m, self._noise_rad * math.sqrt(_ALIKE_M * way_m), _AT_BENDS_M)
 
     def texts(self) -> list[str]:

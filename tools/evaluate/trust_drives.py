@@ -38,7 +38,7 @@ COURSES: dict[str, tuple[tuple[tuple[float, float], ...] | None, float | None, f
 }
 _KMH, _RATE_HZ = 12.0, 25.0
 _SPACE_M = 90.0
-_BIAS_STD_DEG = 0.03  # of the inclinometer: `attitude.std_floor_deg`
+_BIAS_STD_DEG = 0.03  # of the inclinometer: `attitude.bias_std_deg`
 _HIT = np.zeros((1, 3))
 
 
