@@ -42,12 +42,12 @@ def jump(
         s: limits of the search.
         owed: by how much jumps a moment ago left the motion (3,): wheels speak against staying there, and for the way back.
     """
-    found = submap.locate(hits, prior, _reach(motion, s))
-    if not found:
-        return None
-    odds = [one.support - _dissent(one, prior, wheels, owed) / _NATS_PER_SUPPORT for one in (near, *found)]
-    best = int(np.argmax(odds[1:]))
-    return found[best] if odds[best + 1] > odds[0] + _GAIN else None
+    best = near
+    for found in submap.locate(hits, prior, _reach(motion, s)):
+        dissent = _dissent(found, prior, wheels, owed) - _dissent(best, prior, wheels, owed)
+        if found.support > best.support + _GAIN + dissent / _NATS_PER_SUPPORT:
+            best = found
+    return None if best is near else best
 
 
 def left_by(result: Match, prior: Prior) -> FloatArray:

