@@ -26,6 +26,7 @@ from lhdmap.scan_matching.step_error import NO_ERROR
 
 _FIRST_SCANS = 10
 _SLOWEST_REAR_MPS = 0.1
+_MOSTLY_NOISE = 0.5  # of what a scan tells: then the walls tell nothing of one direction
 _WALLS_ALONE = 0.6  # support below which a crowd may be what the scan is held by
 
 
@@ -179,6 +180,7 @@ class PlanarOdometry:
             matched.lost,
             self.wheels.use,
             self._error,
+            not self.wheels.use.used and (matched.lost or matched.doubtful or self._errors.noise > _MOSTLY_NOISE),
         )
 
     def _weak(self, information: FloatArray) -> bool:

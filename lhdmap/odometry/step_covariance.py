@@ -21,7 +21,7 @@ _SPREAD_CELLS2 = 2.2
 _MOST_NOISE = 2.0  # share of noise: lines of few cells make it larger than all that the scan tells
 _USUAL_LEVER_M, _LEAST_LEVER_M, _LONGEST_LEVER_M = 5.0, 3.0, 50.0
 _LEVER_POWER = 1.5
-_OF_PAIRS = 0.5  # share of noise where scans are compared in pairs: each link of the chain adds its error
+_OF_PAIRS = 0.24  # share of noise where scans are compared in pairs: each link of the chain adds its error
 _SECOND = 2
 _LITTLE = np.diag([1e-3, 1e-3, 1e-3])  # information of no scan
 _SWAY = np.diag(
@@ -30,13 +30,14 @@ _SWAY = np.diag(
 
 
 class StepErrors:
-    """`of` each processed scan in turn: the error of the step from the one before."""
+    """`of` each processed scan in turn: the error of the step from the one before; `noise`: share of noise in the last one."""
 
     def __init__(self, settings: TrustSettings) -> None:
         self._settings = settings
         self._pose: FloatArray | None = None
         self._variance = np.zeros(3)  # of the pose against the map
         self._scans = 0
+        self.noise = 0.0
 
     def of(self, pose: FloatArray, matched: Matched, covariance: FloatArray, *, levelled: bool = True) -> StepError:
         """Take a scan's pose (3,) with its covariance (3, 3) against the map, in the body's axes.
@@ -55,6 +56,7 @@ class StepErrors:
         if matched.lost:  # nothing holds the pose: what the motion is off stays
             return StepError(start + np.diag(grown), np.zeros(3), covariance)
         seen = _seen(matched, float(pose[2]))
+        self.noise = seen.noise
         short = _USUAL_LEVER_M / min(max(seen.lever_m, _LEAST_LEVER_M), _LONGEST_LEVER_M)
         noisy = min(seen.noise, 1.0)
         lasting = s.walk_per_m * (seen.noise_along + seen.noise**2)

@@ -53,7 +53,7 @@ class OdometryStep(NamedTuple):
     scan was not processed; `information`: (3,) along, across (1/m²), heading (1/rad²) of this scan, the others unknown;
     `degenerate`: a direction was not observed; `substitute`: what stood in for it (`wheels`, `motion` or empty);
     `processed`: False where the adaptive rate only predicted; `lost`: the scan did not fit the map; `wheels`: what became of the
-    wheels' step before it, and why (`WheelUse`).
+    wheels' step before it, and why (`WheelUse`); `unseen`: neither walls nor wheels told the motion in all directions.
     """
 
     stamp_ns: int
@@ -70,3 +70,4 @@ class OdometryStep(NamedTuple):
     lost: bool
     wheels: str = "none"
     error: StepError = NO_ERROR
+    unseen: bool = False

@@ -170,8 +170,7 @@ class MappingPipeline:
         self.track.append(time_ns, step.T_odom_base, *self.front_end.attitude_at(time_ns))
         believed = odometry.wheels.use.used
         self._newest = Newest(step.covariance, step.velocity, odometry.wheels.scale if believed else None)
-        unseen = step.lost or step.substitute == "motion"
-        self.smoother.keys.update(time_ns, step.T_odom_base, odometry.points, step.error, unseen=unseen)
+        self.smoother.keys.update(time_ns, step.T_odom_base, odometry.points, step.error, unseen=step.unseen)
         aligned = AlignedScan(time_ns, step.T_odom_base, odometry.points, odometry.points_behind, weak=step.lost)
         self.path.update(aligned)
         self._record(scan.stamp_ns, time_ns, step)

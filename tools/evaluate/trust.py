@@ -157,8 +157,15 @@ def _rms(values: FloatArray) -> FloatArray:
 def end_rows(ends: Sequence[Ended]) -> Iterator[str]:
     """Yield the rows of the ends: each class, then all."""
     names = list(dict.fromkeys(one.name for one in ends))
-    for title, members in [*((name, [name]) for name in names), ("**all**", names)]:
-        chosen = [one for one in ends if one.name in members]
+    groups = [(name, [one for one in ends if one.name == name]) for name in names]
+    groups += [
+        ("**all that are no lower bound**", [one for one in ends if not one.lower_bound]),
+        ("**lower bounds**", [one for one in ends if one.lower_bound]),
+        ("**all**", list(ends)),
+    ]
+    for title, chosen in groups:
+        if not chosen:
+            continue
         error, expected = np.array([one.error for one in chosen]), np.array([one.expected for one in chosen])
         inside = [_inside(error[:, axis], expected[:, axis]) for axis in range(3)]
         m = f"{np.median(error[:, 0]):.3f} m", f"{np.median(expected[:, 0]):.3f} m"
