@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 import math
+from collections.abc import Sequence
 
 import numpy as np
 from lhdmap.geometry import se2
@@ -42,7 +43,7 @@ def smooth() -> PlanarWorld:
     return _world([(-30, 2), (30, 2)], [(-30, -2), (30, -2)])
 
 
-def _world(*walls: list[tuple[float, float]]) -> PlanarWorld:
+def _world(*walls: Sequence[tuple[float, float]]) -> PlanarWorld:
     return world_from_polylines([np.array(wall, dtype=float) for wall in walls], np.zeros((1, 3)))
 
 
