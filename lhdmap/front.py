@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import os
 from collections.abc import Mapping, Sequence
 from functools import cached_property
@@ -31,8 +30,8 @@ class Map:
     """
 
     def __init__(self, folder: MapFolder) -> None:
-        self.folder = folder.path.absolute()
-        self._files = type(folder)(self.folder, folder.info)
+        self.folder = folder.path
+        self._files = folder
 
     @cached_property
     def trajectory(self) -> Trajectory:
@@ -79,16 +78,7 @@ class Map:
         Raises:
             InputError: the file is damaged.
         """
-        path = self.folder / "pile.json"
-        if not path.is_file():
-            return None
-        try:
-            found = json.loads(path.read_text(encoding="utf-8"))
-        except (OSError, ValueError) as error:
-            raise InputError(f"{path}: not the description of a pile ({error}); build the map again") from error
-        if not isinstance(found, dict):
-            raise InputError(f"{path}: not the description of a pile (no table in it); build the map again")
-        return found
+        return self._files.json("pile.json") if (self.folder / "pile.json").is_file() else None
 
     @property
     def report(self) -> Path:

@@ -27,7 +27,8 @@ def before_interrupt(action: Action) -> Iterator[None]:
     try:
         yield
     finally:
-        _actions.remove(action)
+        if action in _actions:
+            _actions.remove(action)
 
 
 def put_in_order() -> list[Path]:
@@ -42,12 +43,20 @@ def put_in_order() -> list[Path]:
 
 @contextlib.contextmanager
 def undisturbed() -> Iterator[None]:
-    """Hold Ctrl-C back for a moment: for steps that belong together, and for processes that are to start deaf to it."""
+    """Hold Ctrl-C back for a moment: for steps that belong together, and for processes that are to start deaf to it.
+
+    The mask is what a new process inherits; here another thread may still get the signal, so it is noted, and raised afterwards.
+    """
     if threading.current_thread() is not threading.main_thread() or not hasattr(signal, "pthread_sigmask"):
         yield
         return
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    heard: list[int] = []
+    handler = signal.signal(signal.SIGINT, lambda number, _: heard.append(number))
+    mask = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     try:
         yield
     finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+        signal.pthread_sigmask(signal.SIG_SETMASK, mask)
+        signal.signal(signal.SIGINT, signal.SIG_DFL if handler is None else handler)
+        if heard:
+            signal.raise_signal(signal.SIGINT)

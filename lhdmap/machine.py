@@ -7,17 +7,15 @@ Frames as in the contract: `base_link` is the middle of the FRONT axle on the fl
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
-from lhdmap.errors import ConfigError
 from lhdmap.geometry import se3
 from lhdmap.messages import FloatArray
-from lhdmap.settings import load_section, nearest, read_toml, section_toml, setting
+from lhdmap.settings import REQUIRED, check_corners, setting
+from lhdmap.settings_tree import load_tree, part, tree_toml
 
 PAPER = "topological_navigation, section 3.1"
 ASSUMED = "assumed, typical of 10 to 11-t loaders"
@@ -69,11 +67,15 @@ class BodyBox:
         "base_link", source="frames of the log", choices=("base_link", "rear_link"), doc="Body that carries the part."
     )
     min_m: tuple[float, float, float] = setting(
-        (0.0, 0.0, 0.0), unit="m", source=ASSUMED, doc="Lower corner (x, y, z) in that frame."
+        REQUIRED, unit="m", source=ASSUMED, doc="Lower corner (x, y, z) in that frame."
     )
     max_m: tuple[float, float, float] = setting(
-        (0.0, 0.0, 0.0), unit="m", source=ASSUMED, doc="Upper corner (x, y, z) in that frame."
+        REQUIRED, unit="m", source=ASSUMED, doc="Upper corner (x, y, z) in that frame."
     )
+
+    def __post_init__(self) -> None:
+        """Raise ConfigError where it has no inside."""
+        check_corners(self.min_m, self.max_m)
 
 
 @dataclass(frozen=True, slots=True)
@@ -118,10 +120,10 @@ def _default_mounts() -> dict[str, SensorMount]:
 class Machine:
     """A machine: its dimensions, the boxes of its bodies and the mounts of its sensors, both by name."""
 
-    name: str = "lhd_11t"
-    dimensions: Dimensions = field(default_factory=Dimensions)
-    bodies: dict[str, BodyBox] = field(default_factory=_default_bodies)
-    mounts: dict[str, SensorMount] = field(default_factory=_default_mounts)
+    name: str = setting("lhd_11t", doc="Name of the machine.")
+    dimensions: Dimensions = part(Dimensions)
+    bodies: dict[str, BodyBox] = part(_default_bodies, key="body")
+    mounts: dict[str, SensorMount] = part(_default_mounts, key="mount")
 
     def boxes(self, frame: str) -> FloatArray:
         """Return the boxes on `frame` (`base_link` or `rear_link`) as lower and upper corners, shape (N, 2, 3), m."""
@@ -141,34 +143,10 @@ def load_machine(path: Path | None = None) -> Machine:
     """
     if path is None:
         return Machine()
-    table = read_toml(path, "machine file")
-    try:
-        return _machine(table, default_name=path.stem)
-    except ConfigError as error:
-        raise ConfigError(f"{path}: {error}") from error
-
-
-def _machine(table: Mapping[str, Any], *, default_name: str) -> Machine:
-    known = ("name", "dimensions", "body", "mount")
-    for key in table:
-        if key not in known:
-            raise ConfigError(f"unknown section '{key}'{nearest(key, known)}")
-    bodies = {name: load_section(BodyBox, f"body.{name}", part) for name, part in table.get("body", {}).items()}
-    mounts = {name: load_section(SensorMount, f"mount.{name}", part) for name, part in table.get("mount", {}).items()}
-    for name, box in bodies.items():
-        if any(low >= high for low, high in zip(box.min_m, box.max_m, strict=True)):
-            raise ConfigError(f"body.{name}: each value of min_m must be below that of max_m")
-    return Machine(
-        name=str(table.get("name", default_name)),
-        dimensions=load_section(Dimensions, "dimensions", table.get("dimensions", {})),
-        bodies=bodies or _default_bodies(),
-        mounts=mounts or _default_mounts(),
-    )
+    machine = load_tree(Machine, path, "machine file", Machine(path.stem))
+    return replace(machine, bodies=machine.bodies or _default_bodies(), mounts=machine.mounts or _default_mounts())
 
 
 def machine_toml(machine: Machine) -> str:
     """Print `machine` as a TOML file that `load_machine` reads back, each value with meaning, unit and source."""
-    parts = [f'name = "{machine.name}"\n', section_toml("dimensions", machine.dimensions)]
-    parts += [section_toml(f"body.{name}", body) for name, body in machine.bodies.items()]
-    parts += [section_toml(f"mount.{name}", mount) for name, mount in machine.mounts.items()]
-    return "\n".join(parts)
+    return tree_toml(machine)

@@ -1,16 +1,9 @@
-"""The map folder: written under a partial name, renamed when complete, over another one only with `force`; and its reader.
-
-`MapFolderWriter` is a context manager. Each `write_…` leaves a whole file; `complete` hashes all files, writes
-`map.json` and renames the folder. Left without `complete` (an error, Ctrl-C), the folder keeps its partial name, and
-what was finished stays in it; without anything finished it is removed.
-"""
+"""The map folder: a run's folder (`lhdmap.runfolder`) with the files of a map and `map.json`; its writer and its reader."""
 
 from __future__ import annotations
 
-import json
-import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import replace
 from pathlib import Path
 from types import TracebackType
 from typing import Any, NamedTuple, Self
@@ -18,26 +11,15 @@ from typing import Any, NamedTuple, Self
 import numpy as np
 import numpy.typing as npt
 
-from lhdmap.errors import InputError
+from lhdmap.descriptions import MAP
 from lhdmap.messages import FloatArray
-from lhdmap.names import shown
-from lhdmap.outputs import PARTIAL_SUFFIX, SOFTWARE, OutputFolder
-from lhdmap.provenance import file_entry, sha256_of, source_entry
+from lhdmap.runfolder import RunFolder, RunFolderWriter, RunInfo
 from lhdmap.trajectory import Trajectory, read_tum, write_tum
 
-FORMAT_VERSION = 1
-LOG_SUFFIXES = (".mcap", ".bag", ".db3", ".clf")
 FRAMES = {
     "map": "gravity-aligned, z up; position and heading of base_link at the first scan are its origin",
     "base_link": "middle of the front axle on the floor, x forward, y left, z up; the poses of the trajectories",
 }
-
-
-def looks_like_log(path: Path) -> bool:
-    """Return whether a path is that of a log, by its name, or by what is in the folder."""
-    if path.is_dir():
-        return (path / "metadata.yaml").is_file() or any(path.glob("*.mcap")) or any(path.glob("*.db3"))
-    return path.name.lower().removesuffix(".gz").removesuffix(".bz2").endswith(LOG_SUFFIXES)
 
 
 class Diagnostics(NamedTuple):
@@ -45,8 +27,9 @@ class Diagnostics(NamedTuple):
 
     `residual` (the matcher's, m), `inliers` (share or count, as the matcher gives it), `information_along`,
     `information_across` (1/m^2) and `information_heading` (1/rad^2) in the machine's frame, `degenerate` (an axis was
-    not observed), `substitute` (what was used instead: `wheels`, `motion`, or empty), `slip` (speed of the wheels over
-    that of the machine minus one, NaN where not known).
+    not observed), `substitute` (what was used instead: `wheels`, `motion`, or empty), `slip` (skid factor of
+    the wheels, Eq. (7) of the loading paper; NaN where not known), `wheels` (what became of the wheels' step before the scan,
+    and why: `lhdmap.odometry.wheel_model`).
     """
 
     stamp_ns: npt.NDArray[np.int64]
@@ -58,17 +41,10 @@ class Diagnostics(NamedTuple):
     degenerate: npt.NDArray[np.bool_]
     substitute: Sequence[str]
     slip: FloatArray
+    wheels: Sequence[str]
 
 
-@dataclass(frozen=True, slots=True)
-class MapInfo:
-    """What `map.json` says besides versions and hashes of the folder's files."""
-
-    sources: Sequence[Path]
-    options: Mapping[str, Any] = field(default_factory=dict)
-    counts: Mapping[str, Any] = field(default_factory=dict)
-    warnings: Sequence[str] = ()
-    frames: Mapping[str, str] = field(default_factory=lambda: dict(FRAMES))
+_TEXTS = ("substitute", "wheels")
 
 
 class MapFolderWriter:
@@ -81,8 +57,8 @@ class MapFolderWriter:
             UsageError: the target is no name of a folder to make, or is there already, and must not be replaced.
             InputError: the folder cannot be made.
         """
-        self._folder = OutputFolder(target, force=force, inputs=inputs)
-        self.path = self._folder.path
+        self._run = RunFolderWriter(MAP, target, force=force, inputs=inputs)
+        self.path = self._run.path
 
     def __enter__(self) -> Self:
         return self
@@ -91,12 +67,11 @@ class MapFolderWriter:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         """Keep the partial folder as it is, if something in it was finished."""
-        self._folder.__exit__(kind, error, trace)
+        self._run.__exit__(kind, error, trace)
 
     def finished(self, path: Path) -> Path:
         """Note that a file of the folder is whole, and return its path: it is kept if the run ends before its time."""
-        self._folder.finished.append(path.name)
-        return path
+        return self._run.finished(path)
 
     def write_trajectory(self, trajectory: Trajectory) -> Path:
         """Write `trajectory.tum`: base_link in map, final, one line for each scan of the front scanner."""
@@ -108,46 +83,23 @@ class MapFolderWriter:
 
     def write_diagnostics(self, diagnostics: Diagnostics) -> Path:
         """Write `diagnostics.parquet`."""
-        import pyarrow as pa
-        import pyarrow.parquet as pq
-
-        columns = diagnostics._asdict() | {"substitute": pa.array(list(diagnostics.substitute), pa.string())}
-        path = self.path / "diagnostics.parquet"
-        with path.open("wb") as file:
-            pq.write_table(pa.table(columns), file, compression="zstd")
-        return self.finished(path)
+        texts = {name: list(getattr(diagnostics, name)) for name in _TEXTS}
+        return self._run.write_table("diagnostics.parquet", diagnostics._asdict() | texts)
 
     def write_json(self, name: str, values: Mapping[str, Any]) -> Path:
         """Write another JSON file of the contract (`pile.json`, `topology.geojson`)."""
-        return self.finished(_write_json(self.path / name, values))
+        return self._run.write_json(name, values)
 
-    def complete(self, info: MapInfo, source_hashes: Mapping[Path, Any] | None = None) -> Path:
-        """Write `map.json`, rename the folder and return its final path.
+    def complete(self, info: RunInfo, source_hashes: Mapping[Path, Any] | None = None) -> Path:
+        """Write `map.json`, rename the folder and return its final path; as `RunFolderWriter.complete`.
 
-        `source_hashes` are those of `source_entry`, where the caller has them already (they are slow for large logs).
+        The frames are those of each map (`FRAMES`), but for what `info` says of them.
 
         Raises:
             UsageError: the name was taken meanwhile.
             InputError: a source cannot be read, or the folder cannot be renamed.
         """
-        known = source_hashes or {}
-        entries = [known[path] if path in known else source_entry(path) for path in info.sources]
-        names = sorted(path for path in self.path.iterdir() if path.is_file() and not path.name.startswith("."))
-        files = {path.name: file_entry(path) for path in names}
-        _write_json(
-            self.path / "map.json",
-            {
-                "format_version": FORMAT_VERSION,
-                "software": SOFTWARE,
-                "options": info.options,
-                "sources": entries,
-                "frames": info.frames,
-                "counts": info.counts,
-                "files": files,
-                "warnings": list(info.warnings),
-            },
-        )
-        return self._folder.complete()
+        return self._run.complete(replace(info, frames=FRAMES | dict(info.frames)), source_hashes)
 
     def _write_tum(self, name: str, trajectory: Trajectory) -> Path:
         write_tum(self.path / name, trajectory)
@@ -157,9 +109,9 @@ class MapFolderWriter:
 class MapFolder:
     """A complete map folder, opened with `MapFolder.open`; the files are read when they are asked for."""
 
-    def __init__(self, path: Path, info: Mapping[str, Any]) -> None:
-        self.path = path
-        self.info = info
+    def __init__(self, run: RunFolder) -> None:
+        self.path, self.info = run.path, run.info
+        self._run = run
 
     @classmethod
     def open(cls, path: Path) -> Self:
@@ -168,23 +120,7 @@ class MapFolder:
         Raises:
             InputError: there is no map folder, it is partial, or of a newer format.
         """
-        if not path.is_dir():
-            found = "there is a file" if path.exists() else "there is nothing"
-            found = "there is a log; lhdmap build-map makes a map of it" if looks_like_log(path) else found
-            raise InputError(f"{path}: a map folder was wanted, {found}")
-        file = path / "map.json"
-        if not file.exists() and path.name.endswith(PARTIAL_SUFFIX):
-            raise InputError(f"{path}: this map was interrupted before it was complete; run build-map again")
-        try:
-            info = json.loads(file.read_text(encoding="utf-8"))
-            version = int(info["format_version"])
-        except FileNotFoundError:
-            raise InputError(f"{path}: a map folder was wanted, it has no map.json") from None
-        except (OSError, ValueError, KeyError, TypeError) as error:
-            raise InputError(f"{file}: not the description of a map ({error})") from error
-        if version > FORMAT_VERSION:
-            raise InputError(f"{path}: format version {version}, this software reads up to {FORMAT_VERSION}; update it")
-        return cls(path, info)
+        return cls(RunFolder.open(path, [MAP]))
 
     def trajectory(self) -> Trajectory:
         """Return the final trajectory, base_link in map."""
@@ -200,17 +136,8 @@ class MapFolder:
         Raises:
             InputError: the file is missing, damaged or lacks a column.
         """
-        import pyarrow as pa
-        import pyarrow.parquet as pq
-
-        path = self.file("diagnostics.parquet")
-        try:
-            with path.open("rb") as file:
-                table = pq.read_table(file, columns=list(Diagnostics._fields))
-            columns = {name: table.column(name).to_numpy() for name in Diagnostics._fields}
-        except (pa.ArrowException, OSError, KeyError) as error:
-            raise InputError(f"{path}: not readable as diagnostics ({error})") from error
-        return Diagnostics(**columns | {"substitute": [str(text) for text in columns["substitute"]]})
+        columns: dict[str, Any] = self._run.table("diagnostics.parquet", Diagnostics._fields)
+        return Diagnostics(**columns | {name: [str(text) for text in columns[name]] for name in _TEXTS})
 
     def file(self, name: str) -> Path:
         """Return the path of one file of the folder.
@@ -218,35 +145,12 @@ class MapFolder:
         Raises:
             InputError: the folder has no such file.
         """
-        path = self.path / name
-        if not path.is_file():
-            raise InputError(f"{self.path}: the map folder has no {name}")
-        return path
+        return self._run.file(name)
+
+    def json(self, name: str) -> dict[str, Any]:
+        """Return the table in one of the folder's JSON files; raises InputError where it is missing or damaged."""
+        return self._run.json(name)
 
     def changed_files(self) -> list[str]:
         """Return the names of files that are missing or differ from the hashes in `map.json`."""
-        recorded = self.info.get("files", {})
-        return [
-            name
-            for name, entry in recorded.items()
-            if not (self.path / name).is_file() or sha256_of(self.path / name) != entry["sha256"]
-        ]
-
-
-def _write_json(path: Path, values: Mapping[str, Any]) -> Path:
-    text = json.dumps(_plain(values), indent=2, ensure_ascii=False, allow_nan=False)
-    path.write_text(text + "\n", encoding="utf-8")
-    return path
-
-
-def _plain(value: Any) -> Any:
-    """Return numpy values, paths and tuples as what JSON knows; what is not finite as null."""
-    if isinstance(value, Mapping):
-        return {shown(key): _plain(item) for key, item in value.items()}
-    if isinstance(value, (list, tuple)):
-        return [_plain(item) for item in value]
-    if isinstance(value, (np.generic, np.ndarray)):
-        return _plain(value.tolist())
-    if isinstance(value, float) and not math.isfinite(value):
-        return None
-    return value if value is None or isinstance(value, (bool, int, float)) else shown(value)
+        return self._run.changed_files()

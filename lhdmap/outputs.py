@@ -7,45 +7,22 @@ was there stays whole.
 from __future__ import annotations
 
 import contextlib
-import json
+import errno
 import os
 import shutil
 import warnings
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from types import TracebackType
-from typing import Any, Self
+from typing import Self
 
-from lhdmap import __version__
+from lhdmap.descriptions import described
 from lhdmap.errors import InputError, LhdmapWarning, UsageError, mark_kept
 from lhdmap.interrupts import before_interrupt, undisturbed
 
 PARTIAL_SUFFIX = ".partial"
-SOFTWARE = {"name": "lhdmap", "version": __version__}
-DESCRIPTIONS = ("map.json", "run.json")
-_KINDS = {"map": "trajectory.tum", "pile": "pile.json", "plan": "plan.json", "workspace": "workspace.json"}
+_FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 _MARK = ".lhdmap"  # in a folder that grows: whose it is; locked as long as its run goes on
-
-
-def described(folder: Path) -> Mapping[str, Any] | None:
-    """Return the description of a folder that lhdmap has made (`map.json` or `run.json`), None for any other folder."""
-    for name in DESCRIPTIONS:
-        with contextlib.suppress(OSError, ValueError):
-            found = json.loads((folder / name).read_text(encoding="utf-8"))
-            if isinstance(found, dict) and dict(found.get("software") or {}).get("name") == SOFTWARE["name"]:
-                return found
-    return None
-
-
-def kind_of(folder: Path) -> str | None:
-    """Return what a folder of lhdmap is: `map`, `pile`, `plan`, `workspace`, `demo`, `suite` …; None for any other."""
-    found = described(folder)
-    if found is None:
-        return None
-    for kind, file in _KINDS.items():
-        if "kind" not in found and (folder / file).is_file():
-            return kind
-    return str(found.get("kind", "run"))
 
 
 def free_folder(target: Path, *, force: bool = False, inputs: Sequence[Path] = ()) -> None:
@@ -140,11 +117,7 @@ class OutputFolder:
         kept = self._leave()
         if kept is not None and error is not None:
             mark_kept(error, kept)
-
-    def describe(self, kind: str, values: Mapping[str, Any] | None = None) -> None:
-        """Write `run.json`: what kind of run this is, for folders that are no map."""
-        text = json.dumps({"software": SOFTWARE, "kind": kind, **(values or {})}, indent=2, ensure_ascii=False)
-        (self.path / "run.json").write_text(text + "\n", encoding="utf-8")
+        _name_place(error, self.path)
 
     def complete(self) -> Path:
         """Give the folder its name and return it; what it replaces is removed then, and not before.
@@ -217,6 +190,12 @@ class OutputFolder:
         return None
 
 
+def _name_place(error: BaseException | None, path: Path) -> None:
+    """Say on an error that the disk is full which one: the operating system names no file where writing to an open one fails."""
+    if isinstance(error, OSError) and error.filename is None and error.errno in _FULL:
+        error.filename = str(path)
+
+
 def _locked(descriptor: int) -> bool:
     """Return whether the lock was free, or there is no such thing here; it is given back with the file, by a crash too."""
     try:
@@ -241,7 +220,7 @@ class OutputFiles:
 
     def __init__(self, *paths: Path | None, force: bool = False, inputs: Sequence[Path] = ()) -> None:
         self._paths = [path for path in paths if path is not None]
-        free_files(self._paths, force=force, inputs=inputs)
+        free_files(self._paths[::-1], force=force, inputs=inputs)
         self._end = contextlib.ExitStack()
 
     def at(self, path: Path) -> Path:
@@ -267,6 +246,7 @@ class OutputFiles:
         self._end.close()
         if kind is not None:
             self._drop()
+            _name_place(error, self._paths[-1])
             return
         with undisturbed():
             for path in self._paths:

@@ -13,18 +13,24 @@ from __future__ import annotations
 
 import dataclasses
 import difflib
+import itertools
+import json
 import math
 import re
 import tomllib
 import types
 import typing
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any, TypeVar
 
 from lhdmap.errors import ConfigError, InputError
 
 T = TypeVar("T")
+Profile = float | tuple[tuple[float, float], ...]
+"""One value, or `[[at, value], …]` with `at` rising: linear between, held before the first and after the last."""
+REQUIRED: Any = object()
+"""Default of a setting that must be given."""
 _MOST_NAMES = 6
 _ALIKE, _AS_GOOD = 0.6, 0.08  # likeness of two names, 0 to 1: from where on it counts, and how far behind the best
 
@@ -38,10 +44,32 @@ def setting(
     minimum: float | None = None,
     maximum: float | None = None,
     choices: tuple[str, ...] = (),
+    key: str = "",
 ) -> Any:
-    """Declare one setting of a section: its default, unit, the source of the value, its meaning and its valid range."""
+    """Declare one setting of a section: its default, unit, the source of the value, its meaning and its valid range.
+
+    `default` may be `REQUIRED`; `key` is its name in a file, where that is not the field's.
+    """
     meta = {"unit": unit, "source": source, "doc": doc, "minimum": minimum, "maximum": maximum, "choices": choices}
+    meta |= {"key": key, "required": default is REQUIRED}
+    if default is REQUIRED:
+        return dataclasses.field(default_factory=_missing, metadata=meta)
     return dataclasses.field(default=default, metadata=meta)
+
+
+def check_corners(min_m: tuple[float, ...], max_m: tuple[float, ...]) -> None:
+    """Raise ConfigError where the corners of a box are not in order."""
+    if any(low >= high for low, high in zip(min_m, max_m, strict=True)):
+        raise ConfigError("each value of min_m must be below that of max_m")
+
+
+def key_of(field: dataclasses.Field[Any]) -> str:
+    """Return the name of a setting in a file."""
+    return str(field.metadata.get("key") or field.name)
+
+
+def _missing() -> Any:
+    raise TypeError("a setting that has no default was not given")
 
 
 def load_section(kind: type[T], name: str, values: Mapping[str, Any]) -> T:
@@ -55,8 +83,7 @@ def load_section(kind: type[T], name: str, values: Mapping[str, Any]) -> T:
     for key in values:
         if key not in fields:
             raise ConfigError(f"unknown setting '{name}.{key}'{nearest(key, fields)}")
-    checked = {key: _checked(f"{name}.{key}", value, hints[key], fields[key]) for key, value in values.items()}
-    return kind(**checked)
+    return kind(**{key: checked(f"{name}.{key}", value, hints[key], fields[key]) for key, value in values.items()})
 
 
 def read_toml(path: Path, kind: str) -> dict[str, Any]:
@@ -85,6 +112,8 @@ def nearest(key: str, known: typing.Iterable[str]) -> str:
 
 def figure(value: float) -> str:
     """Return a figure for a person: `39` for 39.0785, `12.5`, `0.35`."""
+    if abs(value) >= 1e5 and math.isfinite(value):
+        return f"{value:,.0f}"
     if not math.isfinite(value) or f"{value:g}" == f"{value:.3g}":
         return f"{value:g}"
     return f"{value:.0f}" if abs(value) >= 10.0 else f"{value:.2g}"
@@ -108,13 +137,19 @@ def _words(name: str) -> list[str]:
     return [part for part in re.split(r"[^a-z0-9]+", name.lower()) if part]
 
 
-def _checked(path: str, value: Any, hint: Any, field: dataclasses.Field[Any]) -> Any:
+def checked(path: str, value: Any, hint: Any, field: dataclasses.Field[Any]) -> Any:
+    """Return a value as the type `hint` of its setting; `path` names it in an error.
+
+    Raises:
+        ConfigError: it has the wrong type or range, or is none of the choices.
+    """
     value = _converted(path, value, hint)
     meta = field.metadata
-    if meta.get("choices") and value not in meta["choices"]:
-        raise ConfigError(f"{path} = {value!r}: one of {', '.join(meta['choices'])} was wanted")
-    for item in value if isinstance(value, tuple) else (value,):
-        low, high = meta.get("minimum"), meta.get("maximum")
+    for item in _items(value) if meta.get("choices") else ():
+        if item not in meta["choices"]:
+            raise ConfigError(f"{path} = {item!r}: one of {', '.join(meta['choices'])} was wanted")
+    low, high = meta.get("minimum"), meta.get("maximum")
+    for item in _items(_profile_values(path, value) if hint == Profile else value):
         if isinstance(item, (int, float)) and ((low is not None and item < low) or (high is not None and item > high)):
             raise ConfigError(
                 f"{path} = {_told(value)} is outside its range: {_range(low, high, meta['unit'])} was wanted"
@@ -122,8 +157,27 @@ def _checked(path: str, value: Any, hint: Any, field: dataclasses.Field[Any]) ->
     return value
 
 
+def _items(value: Any) -> Iterator[Any]:
+    """Yield a value, or those in a list of lists."""
+    if isinstance(value, tuple):
+        for item in value:
+            yield from _items(item)
+    else:
+        yield value
+
+
+def _profile_values(path: str, value: Any) -> tuple[float, ...]:
+    """Return the values of a profile; raises ConfigError where it has none, or they are not in order."""
+    if not isinstance(value, tuple):
+        return (value,)
+    places = [at for at, _ in value]
+    if not places or any(after <= before for before, after in itertools.pairwise(places)):
+        raise ConfigError(f"{path} = {toml_value(value)}: [[at, value], …] with rising 'at' was wanted")
+    return tuple(one for _, one in value)
+
+
 def _told(value: Any) -> str:
-    return f"{value:g}" if isinstance(value, float) else _toml(value)
+    return f"{value:g}" if isinstance(value, float) else toml_value(value)
 
 
 def _range(low: float | None, high: float | None, unit: str) -> str:
@@ -146,7 +200,10 @@ def _converted(path: str, value: Any, hint: Any) -> Any:
             raise ConfigError(f"{path} has {len(value)} values: {len(inner)} were wanted")
         return tuple(_converted(path, item, kind) for item, kind in zip(value, inner, strict=True))
     if origin in (types.UnionType, typing.Union):
-        raise ConfigError(f"{path}: a setting has one type")
+        kinds = [one for one in typing.get_args(hint) if one is not types.NoneType]
+        lists = [one for one in kinds if typing.get_origin(one) is tuple]
+        others = [one for one in kinds if one not in lists]
+        return _converted(path, value, (lists or others if isinstance(value, list) else others or lists)[0])
     if hint is float and isinstance(value, int) and not isinstance(value, bool):
         value = float(value)
     if not isinstance(value, hint) or (hint in (int, float) and isinstance(value, bool)):
@@ -162,17 +219,22 @@ def section_toml(name: str, section: Any) -> str:
     doc = (type(section).__doc__ or "").strip().splitlines()
     lines += [f"# {doc[0]}"] if doc else []
     for field in dataclasses.fields(section):
-        meta = field.metadata
-        lines.append(f"# {meta['doc']} Unit: {meta['unit']}. Source: {meta['source']}.")
-        lines.append(f"{field.name} = {_toml(getattr(section, field.name))}")
+        lines += [comment_of(field), f"{key_of(field)} = {toml_value(getattr(section, field.name))}"]
     return "\n".join(lines) + "\n"
 
 
-def _toml(value: Any) -> str:
+def comment_of(field: dataclasses.Field[Any]) -> str:
+    """Return the comment of a setting in a file: its meaning, unit and source."""
+    meta = field.metadata
+    return f"# {meta['doc']} Unit: {meta['unit']}. Source: {meta['source']}."
+
+
+def toml_value(value: Any) -> str:
+    """Return a value as it stands in a TOML file."""
     if isinstance(value, bool):
         return "true" if value else "false"
     if isinstance(value, tuple):
-        return "[" + ", ".join(_toml(item) for item in value) + "]"
+        return "[" + ", ".join(toml_value(item) for item in value) + "]"
     if isinstance(value, str):
-        return '"' + value.replace("\\", "\\\\").replace('"', '\\"') + '"'
+        return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
     return repr(value)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import warnings
+from collections.abc import Iterator
 from pathlib import Path
 from typing import NamedTuple
 
@@ -16,6 +17,7 @@ from lhdmap.tables.pose_table import read_pose_table
 from lhdmap.tables.stamps import stamp_ns
 
 _TUM_LINE = "%d.%09d %.6f %.6f %.6f %.9f %.9f %.9f %.9f\n"
+_LINES = 10_000  # formatted at a time: as Python numbers they take ten times the memory
 
 
 class Trajectory(NamedTuple):
@@ -33,11 +35,17 @@ class Trajectory(NamedTuple):
 
 def write_tum(path: Path, trajectory: Trajectory) -> None:
     """Write a TUM file: seconds with 9 decimals (exact nanoseconds), metres with 6."""
-    seconds, nanoseconds = np.divmod(trajectory.stamps_ns, 1_000_000_000)
+    with path.open("w", encoding="ascii") as file:
+        for first in range(0, len(trajectory.stamps_ns), _LINES):
+            file.writelines(_lines(trajectory, slice(first, first + _LINES)))
+
+
+def _lines(trajectory: Trajectory, rows: slice) -> Iterator[str]:
+    seconds, nanoseconds = np.divmod(trajectory.stamps_ns[rows], 1_000_000_000)
     stamps = zip(seconds.tolist(), nanoseconds.tolist(), strict=True)
-    poses = np.column_stack([trajectory.positions_m, trajectory.quaternions_xyzw]).tolist()  # plain floats print faster
-    lines = [_TUM_LINE % (*stamp, *pose) for stamp, pose in zip(stamps, poses, strict=True)]
-    path.write_text("".join(lines), encoding="ascii")
+    # plain floats print faster
+    poses = np.column_stack([trajectory.positions_m[rows], trajectory.quaternions_xyzw[rows]]).tolist()
+    return (_TUM_LINE % (*stamp, *pose) for stamp, pose in zip(stamps, poses, strict=True))
 
 
 def read_tum(path: Path) -> Trajectory:

@@ -17,7 +17,7 @@ import lhdmap
 import pytest
 from lhdmap.config import Settings, load_settings, settings_table, settings_toml
 from lhdmap.errors import ConfigError, UsageError
-from lhdmap.machine import Machine, load_machine
+from lhdmap.machine import Machine, load_machine, machine_toml
 from lhdmap.resources import resource
 from lhdmap.rockbreaker.machine import Rockbreaker, load_rockbreaker, rockbreaker_toml
 from lhdmap.simulation.scenario import load_scenario, scenario_toml
@@ -27,9 +27,9 @@ PACKAGE = ROOT / "lhdmap"
 
 FLOORS = [
     {"errors"},
-    {"messages", "settings", "resources", "names", "interrupts"},
-    {"geometry", "tables", "provenance", "outputs"},
-    {"trajectory"},
+    {"messages", "settings", "resources", "names", "interrupts", "descriptions"},
+    {"geometry", "tables", "provenance", "outputs", "json_files", "roles", "settings_tree"},
+    {"trajectory", "runfolder"},
     {"machine", "mapfolder"},
     {"kinematics"},
     {"scan_matching"},
@@ -128,6 +128,9 @@ def test_default_toml_is_what_the_code_says() -> None:
 
 
 def test_the_machine_file_is_the_default_machine() -> None:
+    remark, _, text = resource("pipelines/machines/lhd_11t.toml").read_text(encoding="utf-8").partition("\n")
+    assert remark.startswith("#")
+    assert text == machine_toml(Machine())
     assert load_machine(resource("pipelines/machines/lhd_11t.toml")) == Machine()
 
 

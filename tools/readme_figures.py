@@ -25,12 +25,12 @@ LOGS = {"intel": "Intel Research Lab", "aces": "ACES building", "csail": "MIT CS
 # From evaluation/pile.md and evaluation/rockbreaker.md, by hand.
 PILE = (
     (
-        "simulated drifts that end in a pile, from the log alone, 15 m before the toe (40 scenes a kind); and 66 of a second generator, written "
-        "independently"
+        "simulated drifts that end in a pile, from the log alone, 15 m before the toe (40 scenes a kind); and 66 of a second "
+        "generator, written independently"
     ),
     (
-        "width and inclination wrong by **0.06 m, 1.2°** on the mean (the loading paper, six real piles: 0.58 m, 1.7°), before a stope 0.09 m, "
-        "1.3°; second generator 0.07 m, 1.3°; 78 of 80 boulders found; no wall or hang-up called loadable"
+        "width and inclination wrong by **0.06 m, 1.2°** on the mean (the loading paper, six real piles: 0.58 m, 1.7°), before a "
+        "stope 0.09 m, 1.3°; second generator 0.07 m, 1.3°; 78 of 80 boulders found; no wall or hang-up called loadable"
     ),
 )
 ROCKBREAKER = (

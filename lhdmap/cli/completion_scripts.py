@@ -38,8 +38,8 @@ _ZSH = """\
 # Tab completion of lhdmap for zsh: source <(lhdmap completion zsh), after compinit
 _lhdmap_words() {{
     local -a open=(${{(M)@:#*=}}) whole=(${{@:#*=}})
-    (( $#open )) && compadd -S '' -- $open
-    (( $#whole )) && compadd -- $whole
+    if (( $#open )); then compadd -S '' -- $open; fi
+    if (( $#whole )); then compadd -- $whole; fi
 }}
 _lhdmap() {{
     local command= prev=$words[CURRENT-1] i

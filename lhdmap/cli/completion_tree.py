@@ -81,7 +81,7 @@ def _words(name: str) -> list[str]:
 
         return list(SECTIONS)
     if name == "roles":
-        from lhdmap.logs.topics import ROLES
+        from lhdmap.roles import ROLES
 
         return [f"{one}=" for one in ROLES]
     return [name]

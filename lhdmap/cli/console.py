@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import math
 import sys
@@ -13,6 +14,7 @@ from lhdmap.errors import LhdmapError
 from lhdmap.names import shown
 
 T = TypeVar("T")
+STANDARD_OUTPUT = "standard output"
 _TELLING_SHARE = 0.05  # before that the time is start-up (the first run compiles), and says nothing of the rest
 
 
@@ -55,22 +57,23 @@ class Console:
         if failure is not None:
             self._values |= failure_of(failure.kind, str(failure), failure.exit_code)
         if not self.json:
-            print(shown(text))
+            _out(shown(text))
         if at_once:
             self.close()
             sys.stdout.flush()
 
     def fail(self, kind: str, text: str, exit_code: int) -> None:
         """Print an error; with `--json` the object has it, beside what was found before."""
-        print(f"lhdmap: {shown(text)}", file=sys.stderr)
         self._values |= failure_of(kind, text, exit_code)
-        self.close()
+        with contextlib.suppress(OSError):  # nobody listens any more: the exit code says it
+            print(f"lhdmap: {shown(text)}", file=sys.stderr)
+            self.close()
 
     def close(self) -> None:
         """Print the JSON object, once."""
         if self.json and self._values and not self._printed:
             self._printed = True
-            print(json.dumps(self._values, allow_nan=False))
+            _out(json.dumps(self._values, allow_nan=False))
 
     def progress(self, items: Iterable[T], *, total: float, label: str, position: Any) -> Iterator[T]:
         """Yield `items`, showing rate and time left: a bar on a terminal, a plain line every 10 s otherwise.
@@ -85,6 +88,15 @@ class Console:
             meter.at(position(item))
             yield item
         meter.close()
+
+
+def _out(text: str) -> None:
+    """Print on standard output; where that fails, the error says that it was this file."""
+    try:
+        print(text)
+    except OSError as error:
+        error.filename = STANDARD_OUTPUT
+        raise
 
 
 def failure_of(kind: str, message: str, exit_code: int) -> dict[str, Any]:

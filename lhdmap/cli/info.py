@@ -8,10 +8,14 @@ from pathlib import Path
 from typing import Any
 
 from lhdmap.cli.console import Console
-from lhdmap.errors import InputError
 
 _SETTINGS_SHOWN = 4
-_WHAT = {"map": "map", "pile": "ore pile", "plan": "rockbreaker's plan", "workspace": "rockbreaker's workspace"}
+_WHAT = {
+    "pile": "ore pile",
+    "plan": "rockbreaker's plan",
+    "workspace": "rockbreaker's workspace",
+    "suite": "suite of scenes",
+}
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -32,44 +36,24 @@ def folder_values(path: Path) -> dict[str, Any]:
     Raises:
         InputError: it is none of lhdmap, or not complete.
     """
-    from lhdmap.outputs import described, kind_of
+    from lhdmap.runfolder import RunFolder
 
-    info = described(path) if path.is_dir() else None
-    if info is None:
-        raise InputError(f"{path}: {_instead(path)}")
-    sizes = {one.name: one.stat().st_size for one in sorted(path.iterdir()) if one.is_file()}
-    listed = {name: int(entry["bytes"]) for name, entry in info.get("files", {}).items()}
+    folder = RunFolder.open(path)
+    info = folder.info
     return {
         "path": str(path),
-        "kind": kind_of(path),
+        "kind": folder.kind,
         "software": info.get("software"),
         "format_version": info.get("format_version"),
         "sources": [source | {"there": Path(source["path"]).exists()} for source in info.get("sources", [])],
         "counts": info.get("counts", {}),
         "frames": info.get("frames", {}),
         "settings": _changed_settings(info.get("options", {})),
-        "files": sizes,
-        "changed": [name for name, size in listed.items() if sizes.get(name) != size],
-        "warnings": info.get("warnings", []),
+        "files": {one.name: one.stat().st_size for one in sorted(path.iterdir()) if one.is_file()},
+        "changed": folder.changed_files(by_size=True),
+        "warnings": folder.warnings,
         **({"map": folder_values(path / info["map"])} if "map" in info else {}),
     }
-
-
-def _instead(path: Path) -> str:
-    """Return what is at a path that is no folder of lhdmap, and what to do with it."""
-    from lhdmap.mapfolder import looks_like_log
-    from lhdmap.outputs import PARTIAL_SUFFIX
-
-    if not path.exists():
-        return "no such file or folder; a map or run folder was wanted"
-    if path.is_dir() and path.name.endswith(PARTIAL_SUFFIX):
-        names = ", ".join(sorted(one.name for one in path.iterdir() if not one.name.startswith("."))) or "nothing"
-        return f"the run was interrupted before it was complete; run it again (in the folder: {names})"
-    if looks_like_log(path):
-        return "is a log; lhdmap doctor tells what is in it, lhdmap build-map makes a map of it"
-    if path.suffix == ".rrd":
-        return "is a Rerun recording; lhdmap view opens it"
-    return "a map or run folder of lhdmap was wanted, it has no map.json or run.json of one"
 
 
 def _changed_settings(options: Mapping[str, Any]) -> dict[str, Any]:

@@ -32,16 +32,22 @@ def told(kept: Sequence[Path]) -> str:
 
 
 def _end(_number: int, _frame: FrameType | None) -> None:
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    if os.getpid() in _program:
-        text = told(put_in_order())
-        _end_children()
-        try:
-            (Console.current or Console()).fail("interrupted", text, EXIT_INTERRUPTED)
-            sys.stdout.flush()
-        except Exception:  # noqa: BLE001  # where it came in the middle of writing, the stream refuses
-            os.write(2, f"lhdmap: {text}\n".encode(errors="surrogateescape"))
-    os._exit(EXIT_INTERRUPTED)
+    try:
+        signal.signal(signal.SIGINT, signal.SIG_IGN)
+        if os.getpid() in _program:
+            _put_in_order()
+    finally:
+        os._exit(EXIT_INTERRUPTED)
+
+
+def _put_in_order() -> None:
+    text = told(put_in_order())
+    try:
+        (Console.current or Console()).fail("interrupted", text, EXIT_INTERRUPTED)
+        sys.stdout.flush()
+    except Exception:  # noqa: BLE001  # where it came in the middle of writing, the stream refuses
+        os.write(2, f"lhdmap: {text}\n".encode(errors="surrogateescape"))
+    _end_children()
 
 
 def _end_children() -> None:

@@ -15,7 +15,7 @@ import warnings
 from collections.abc import Callable, Sequence
 
 from lhdmap import __version__
-from lhdmap.cli.console import Console
+from lhdmap.cli.console import STANDARD_OUTPUT, Console
 from lhdmap.cli.interrupt import EXIT_INTERRUPTED, told
 from lhdmap.cli.options import add_common
 from lhdmap.cli.parser import CommandLineError, Parser
@@ -139,7 +139,8 @@ def _system_text(error: OSError) -> str:
     number = error.errno if error.errno is not None else errno.ENOSPC if "No space left" in str(error) else 0
     where = "" if error.filename is None else f"{error.filename}: "
     reason = error.strerror or " ".join(str(error).split()) or type(error).__name__
-    return f"{where}{reason}{_HINTS.get(number, '')}"
+    hint = "" if error.filename == STANDARD_OUTPUT else _HINTS.get(number, "")
+    return f"{where}{reason}{hint}"
 
 
 def _shower(console: Console, *, everything: bool) -> Callable[..., None]:

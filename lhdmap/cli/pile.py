@@ -4,12 +4,16 @@ from __future__ import annotations
 
 import argparse
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from lhdmap.cli.console import Console
 from lhdmap.cli.options import add_output, add_poses, add_settings, add_topics, topic_overrides
 from lhdmap.names import beside, name_of
 from lhdmap.outputs import free_folder
+from lhdmap.provenance import file_entry
+
+if TYPE_CHECKING:
+    from lhdmap.config import Settings
 
 CLOUD_SUFFIXES = (".ply", ".pcd", ".laz", ".las")
 
@@ -33,35 +37,48 @@ def run(arguments: argparse.Namespace, console: Console) -> int:
     """Find and measure the pile, write `pile.json`, print what was found."""
     if arguments.input.suffix.lower() in CLOUD_SUFFIXES:
         return _run_cloud(arguments, console)
-    from lhdmap.config import load_settings, settings_table
+    from lhdmap.config import load_settings
     from lhdmap.machine import load_machine
-    from lhdmap.mapfolder import MapFolderWriter, MapInfo
     from lhdmap.pipeline.identify import identify
     from lhdmap.report.pile_page import write_pile_report
     from lhdmap.report.pile_recording import write_pile_recording
+    from lhdmap.runfolder import RunFolderWriter, RunInfo
 
     settings = load_settings(arguments.config, arguments.set)
     machine = load_machine(arguments.machine) if arguments.machine else None
     topics = topic_overrides(arguments.topic)
     target = arguments.output or beside(arguments.input, "pile")
-    with MapFolderWriter(target, force=arguments.force, inputs=[arguments.input]) as folder:
+    with RunFolderWriter("pile", target, force=arguments.force, inputs=[arguments.input]) as folder:
         report = identify(arguments.input, settings, arguments.poses, machine, topics)
         values = report.to_json()
         folder.write_json("pile.json", values)
         write_pile_report(report, folder.path / "report.html", f"Ore pile, {name_of(arguments.input)}")
         write_pile_recording(report, folder.path / "pile.rrd", name_of(arguments.input))
-        path = folder.complete(MapInfo([arguments.input], settings_table(settings), warnings=values["warnings"]))
+        folder.finished(folder.path / "report.html")
+        path = folder.complete(RunInfo([arguments.input], _options(arguments, settings), warnings=values["warnings"]))
     for text in values["warnings"]:
         console.warn(text)
     console.result(values | {"folder": str(path)}, _text(values, path))
     return 0
 
 
+def _options(arguments: argparse.Namespace, settings: Settings) -> dict[str, Any]:
+    """Return the settings, and what else was asked for."""
+    from lhdmap.config import settings_table
+
+    request = {
+        "poses": arguments.poses or None,
+        "topics": topic_overrides(arguments.topic),
+        "machine": arguments.machine and file_entry(arguments.machine) | {"path": str(arguments.machine)},
+    }
+    return {**settings_table(settings), "request": request}
+
+
 def _run_cloud(arguments: argparse.Namespace, console: Console) -> int:
     from lhdmap.errors import UsageError
-    from lhdmap.mapfolder import MapFolderWriter, MapInfo
     from lhdmap.pile.heap import run_cloud
     from lhdmap.pile.result import estimate_json
+    from lhdmap.runfolder import RunFolderWriter, RunInfo
 
     given = [f"--{name}" for name in ("config", "set", "topic", "poses", "machine") if getattr(arguments, name)]
     if given:
@@ -72,9 +89,9 @@ def _run_cloud(arguments: argparse.Namespace, console: Console) -> int:
     values = estimate_json(estimate) | more
     values["reason"] = values["reason"] or None
     if arguments.output is not None:
-        with MapFolderWriter(arguments.output, force=arguments.force, inputs=[arguments.input]) as folder:
+        with RunFolderWriter("pile", arguments.output, force=arguments.force, inputs=[arguments.input]) as folder:
             folder.write_json("pile.json", values)
-            path = folder.complete(MapInfo([arguments.input], {"up": arguments.up}, warnings=estimate.warnings))
+            path = folder.complete(RunInfo([arguments.input], {"up": arguments.up}, warnings=estimate.warnings))
         values |= {"folder": str(path)}
     for text in estimate.warnings:
         console.warn(text)

@@ -13,13 +13,13 @@ from lhdmap.cli.options import add_common, add_output, add_settings
 from lhdmap.errors import EvaluationShortfall, UsageError
 
 if TYPE_CHECKING:
-    from lhdmap.mapfolder import MapFolderWriter
     from lhdmap.messages import FloatArray
     from lhdmap.rockbreaker.collision import Obstacles
     from lhdmap.rockbreaker.machine import Rockbreaker
     from lhdmap.rockbreaker.plan import Planner, Request, Trajectory
     from lhdmap.rockbreaker.rocks import Scene
     from lhdmap.rockbreaker.settings import RockbreakerSettings
+    from lhdmap.runfolder import RunFolderWriter
 
 TASKS = {
     "plan": "a trajectory between two tips, or from the cloud of a grizzly to above its largest oversize rock",
@@ -102,11 +102,11 @@ class Outcome:
 
 def _run_plan(arguments: argparse.Namespace, console: Console, machine: Rockbreaker) -> int:
     from lhdmap.config import load_settings
-    from lhdmap.mapfolder import MapFolderWriter
+    from lhdmap.runfolder import RunFolderWriter
 
     settings = load_settings(arguments.config, arguments.set)
     sources = _sources(arguments)
-    with MapFolderWriter(_target(arguments), force=arguments.force, inputs=sources) as folder:
+    with RunFolderWriter("plan", _target(arguments), force=arguments.force, inputs=sources) as folder:
         outcome = _plan(arguments, machine, settings.rockbreaker)
         values = _write(folder, arguments, settings, outcome)
     failure = None if values["feasible"] else EvaluationShortfall(f"not feasible: {values['reason']['text']}")
@@ -232,11 +232,11 @@ def _finite(value: float, option: str) -> float:
     return value
 
 
-def _write(folder: MapFolderWriter, arguments: argparse.Namespace, settings: Any, outcome: Outcome) -> dict[str, Any]:
+def _write(folder: RunFolderWriter, arguments: argparse.Namespace, settings: Any, outcome: Outcome) -> dict[str, Any]:
     """Write the folder; return the values with the paths in it."""
     from lhdmap.config import settings_table
-    from lhdmap.mapfolder import MapInfo
     from lhdmap.rockbreaker.table import UNITS, joined, sampled, write_table
+    from lhdmap.runfolder import RunInfo
 
     values, target = outcome.values, _target(arguments)
     rows = None
@@ -249,7 +249,7 @@ def _write(folder: MapFolderWriter, arguments: argparse.Namespace, settings: Any
     folder.write_json("plan.json", values | {"csv": csv, "csv_columns": UNITS})  # it may be moved: names only
     values |= {"csv": None if csv is None else str(target / csv), "folder": str(target)}
     options = {"rockbreaker": settings_table(settings)["rockbreaker"]}
-    folder.complete(MapInfo(_sources(arguments), options, frames=FRAMES))
+    folder.complete(RunInfo(_sources(arguments), options, frames=FRAMES))
     return values
 
 
@@ -295,18 +295,18 @@ def _point(values: Any) -> str:
 def _run_workspace(arguments: argparse.Namespace, console: Console, machine: Rockbreaker) -> int:
     import numpy as np
 
-    from lhdmap.mapfolder import MapFolderWriter, MapInfo
     from lhdmap.report.rockbreaker_page import write_workspace_report
     from lhdmap.rockbreaker.reach import workspace_json
+    from lhdmap.runfolder import RunFolderWriter, RunInfo
 
     at_m = np.array(numbers(arguments.at, 3, "--at")) if arguments.at is not None else None
     target, sources = _target(arguments), [arguments.machine] if arguments.machine else []
     values = workspace_json(machine, at_m)
     if not arguments.no_pictures:
-        with MapFolderWriter(target, force=arguments.force, inputs=sources) as folder:
+        with RunFolderWriter("workspace", target, force=arguments.force, inputs=sources) as folder:
             folder.write_json("workspace.json", values)
             write_workspace_report(folder.path / "report.html", machine, values, at_m)
-            values["folder"] = str(folder.complete(MapInfo(sources, frames=FRAMES)))
+            values["folder"] = str(folder.complete(RunInfo(sources, frames=FRAMES)))
     failure = EvaluationShortfall("the tip cannot be there") if values["reached"] is False else None
     console.result(values, _workspace_text(values), failure=failure)
     return 0 if failure is None else failure.exit_code

@@ -172,7 +172,9 @@ def _run_suite(arguments: argparse.Namespace, console: Console) -> int:
     def told(name: str, done: int, of: int) -> None:
         console.note(f"{done} of {of}: {name}")
 
-    table = write_suite(scenes, folder, jobs=arguments.jobs, told=told, force=arguments.force)
+    table = write_suite(
+        scenes, folder, jobs=arguments.jobs, told=told, force=arguments.force, sources=[arguments.suite]
+    )
     console.result(
         {"folder": str(folder), "truth": str(table), "scenes": len(scenes)}, f"{len(scenes)} scenes: {table}"
     )

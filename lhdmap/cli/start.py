@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+import _signal  # type: ignore[import-not-found]  # what `signal` is made of: there at once
 import os
-import signal
 import sys
 
 EARLY = '{"error": {"kind": "interrupted", "message": "interrupted", "exit_code": 4}}\n'
@@ -11,7 +11,7 @@ EARLY = '{"error": {"kind": "interrupted", "message": "interrupted", "exit_code"
 
 def entry_point() -> None:
     """Console script: `main` with the process's exit code."""
-    signal.signal(signal.SIGINT, _end_early)
+    _signal.signal(_signal.SIGINT, _end_early)
     for threads in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):  # libraries' thread pools wait for each other: one each
         os.environ.setdefault(threads, "1")
     import gc
@@ -35,13 +35,14 @@ def _end_early(_number: int, _frame: object) -> None:
 
 def _leave(exit_code: int) -> None:
     """End with a code, without taking the libraries down in order: that would take as long as a small command."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    _signal.signal(_signal.SIGINT, _signal.SIG_IGN)
     try:
         sys.stdout.flush()
     except BrokenPipeError:
         pass
     except OSError as error:
-        os.write(2, f"lhdmap: standard output: {error.strerror}\n".encode())
-        exit_code = 3
+        if exit_code == 0:  # told already otherwise
+            os.write(2, f"lhdmap: standard output: {error.strerror}\n".encode())
+            exit_code = 3
     sys.stderr.flush()
     os._exit(exit_code)

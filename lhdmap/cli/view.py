@@ -17,14 +17,16 @@ from pathlib import Path
 from lhdmap.cli.console import Console
 from lhdmap.cli.options import add_output, add_topics, topic_overrides
 from lhdmap.cli.viewer import check_recording, started, viewer
+from lhdmap.descriptions import described, kind_of
 from lhdmap.errors import InputError, UsageError
 from lhdmap.interrupts import before_interrupt
 from lhdmap.names import in_utf8, name_of
-from lhdmap.outputs import OutputFiles, described, free_files, kind_of
+from lhdmap.outputs import OutputFiles, free_files
 
 WINDOW = "1600x1000"
 SCREENSHOT_LIMIT_S = 180.0
 _SERVER_LIMIT_S = 30.0
+_LAST_PORT = 65535
 RECORDINGS = ("recording.rrd", "pile.rrd")
 
 
@@ -38,10 +40,16 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--bind", default="127.0.0.1", help="with --web, address to serve on (default: this machine only)"
     )
     parser.add_argument(
-        "--port", type=int, default=9090, help="with --web, port of the page; the data is on the next one"
+        "--port", type=_port, default=9090, help="with --web, port of the page; the data is on the next one"
     )
     add_topics(parser, "of a log, as in build-map")
     add_output(parser, "of a log, keep the recording in this file", "RRD")
+
+
+def _port(text: str) -> int:
+    if not (text.isdecimal() and 0 < int(text) < _LAST_PORT):
+        raise argparse.ArgumentTypeError(f"'{text}': a number from 1 to {_LAST_PORT - 1} was wanted")
+    return int(text)
 
 
 def run(arguments: argparse.Namespace, console: Console) -> int:

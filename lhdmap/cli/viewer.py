@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import importlib.util
+import os
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -35,6 +36,8 @@ def started(command: list[str], **how: Any) -> Iterator[subprocess.Popen[str]]:
 
         def end() -> None:
             process.kill()
+            with contextlib.suppress(ChildProcessError):
+                os.waitpid(process.pid, 0)  # `wait` may be what was interrupted, and holds its lock
 
         with before_interrupt(end):
             try:

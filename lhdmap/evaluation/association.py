@@ -17,6 +17,7 @@ import numpy.typing as npt
 from lhdmap.errors import InputError
 from lhdmap.evaluation.poses import Poses, poses_from_quaternions
 from lhdmap.messages import FloatArray
+from lhdmap.settings import figure
 from lhdmap.trajectory import Trajectory
 
 IndexArray = npt.NDArray[np.int64]
@@ -117,6 +118,6 @@ def _too_few(estimate: Trajectory, truth: Trajectory, found: int, nearest_ns: in
     apart = max(estimate.stamps_ns.min(), truth.stamps_ns.min()) > min(estimate.stamps_ns.max(), truth.stamps_ns.max())
     hint = "they share no time: are both of one clock?" if apart else "raise --tolerance if both have the same clock"
     return (
-        f"{found} matching stamps: at least 2 within {tolerance_ns / 1e9:g} s were wanted, the nearest are "
-        f"{nearest_ns / 1e9:g} s apart ({', '.join(spans)}); {hint}"
+        f"{found} matching stamps: at least 2 within {figure(tolerance_ns / 1e9)} s were wanted, the nearest are "
+        f"{figure(nearest_ns / 1e9)} s apart ({', '.join(spans)}); {hint}"
     )

@@ -18,6 +18,7 @@ from lhdmap.evaluation.metrics import Statistics, statistics
 from lhdmap.evaluation.poses import Poses, angles, between, poses_from_quaternions, taken
 from lhdmap.geometry.se3 import quaternions_from_rpy
 from lhdmap.messages import FloatArray
+from lhdmap.settings import figure
 from lhdmap.trajectory import Trajectory, seconds_to_ns
 
 SHORT_S, LONG_S = 5.0, 60.0
@@ -101,8 +102,8 @@ def evaluate_relations(
     kept = np.flatnonzero(away_ns <= tolerance_ns)
     if not len(kept):
         raise InputError(
-            f"no relation has both its stamps in the estimate: {tolerance_ns / 1e9:g} s were allowed, the nearest are "
-            f"{away_ns.min() / 1e9:.6f} s off; the estimate must have one pose for each scan of the same log"
+            f"no relation has both its stamps in the estimate: {figure(tolerance_ns / 1e9)} s were allowed, the nearest are "
+            f"{figure(float(away_ns.min()) / 1e9)} s off; the estimate must have one pose for each scan of the same log"
         )
     poses = poses_from_quaternions(estimate.positions_m, estimate.quaternions_xyzw)
     moved = between(taken(poses, first[kept]), taken(poses, second[kept]))

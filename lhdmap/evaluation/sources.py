@@ -12,10 +12,10 @@ from typing import Any, TextIO
 
 import numpy as np
 
+from lhdmap.descriptions import looks_like_log
 from lhdmap.errors import InputError, LhdmapWarning
 from lhdmap.evaluation.ordering import file_in_order
 from lhdmap.geometry.se3 import quaternions_from_rpy
-from lhdmap.mapfolder import looks_like_log
 from lhdmap.messages import GroundTruth
 from lhdmap.trajectory import Trajectory, read_tum, seconds_to_ns
 

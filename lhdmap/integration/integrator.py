@@ -131,6 +131,10 @@ class Integrator:
         )
         return cloud.with_normals(found.normals, found.curvature)
 
+    def forget(self) -> None:
+        """Begin with an empty map: the memory of this one is given back."""
+        self.grid = VoxelGrid(self.settings.voxel_size_m)
+
     def _rig(self, frame_id: str) -> Rig:
         try:
             return self._rigs[frame_id]

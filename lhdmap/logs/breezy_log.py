@@ -19,6 +19,7 @@ from lhdmap.logs.findings import Findings
 from lhdmap.logs.text_lines import text_lines
 from lhdmap.logs.text_log import Found, TextLog, Wanted, every
 from lhdmap.messages import Float32Array, LaserScan, WheelPose
+from lhdmap.roles import ODOMETRY, SCAN
 
 WORDS, FIRST_RANGE, BEAMS = 706, 24, 682
 _FOV_RAD = math.radians(240.0)
@@ -55,8 +56,8 @@ class BreezyLog(TextLog):
     def topics(self) -> dict[str, TopicInfo]:
         """Return the topics by name."""
         return {
-            _SCAN: TopicInfo(_SCAN, "sensor_msgs/msg/LaserScan", self._count, "laser"),
-            _ODOMETRY: TopicInfo(_ODOMETRY, "nav_msgs/msg/Odometry", self._count, "odom"),
+            _SCAN: TopicInfo(_SCAN, SCAN, self._count, "laser"),
+            _ODOMETRY: TopicInfo(_ODOMETRY, ODOMETRY, self._count, "odom"),
         }
 
     def _messages(self, topics: Collection[str], wanted: Wanted = every) -> Iterator[Found]:

@@ -18,9 +18,9 @@ from lhdmap.logs.carmen_survey import FRAMES, PARSERS, CarmenSurvey, survey
 from lhdmap.logs.findings import Findings
 from lhdmap.logs.text_log import Found, TextLog, Wanted, every
 from lhdmap.messages import GroundTruth, LaserScan, Mount, WheelPose
+from lhdmap.roles import ODOMETRY, ROLES, SCAN, TRANSFORMS
 
-_SCAN, _ODOMETRY, _TRANSFORMS = "sensor_msgs/msg/LaserScan", "nav_msgs/msg/Odometry", "tf2_msgs/msg/TFMessage"
-_MOUNTS = "/tf_static"
+_MOUNTS = ROLES["tf_static"].topic
 _TRUTH = "/ground_truth/"
 
 
@@ -44,11 +44,11 @@ class CarmenLog(TextLog):
     def topics(self) -> dict[str, TopicInfo]:
         """Return the topics by name."""
         found = self._found
-        listed = {name: TopicInfo(name, _SCAN, found.counts[name], FRAMES[name]) for name in self._lasers}
+        listed = {name: TopicInfo(name, SCAN, found.counts[name], FRAMES[name]) for name in self._lasers}
         if found.mounts:
-            listed[_MOUNTS] = TopicInfo(_MOUNTS, _TRANSFORMS, len(self._lasers))
+            listed[_MOUNTS] = TopicInfo(_MOUNTS, TRANSFORMS, len(self._lasers))
         for keyword, topic in self._pose_topics.items():
-            listed[topic] = TopicInfo(topic, _ODOMETRY, found.counts[keyword])
+            listed[topic] = TopicInfo(topic, ODOMETRY, found.counts[keyword])
         return listed
 
     def stated_end_rad(self, topic: str) -> float | None:

@@ -18,7 +18,7 @@ from lhdmap.logs.clock import ClockStep, LogClock, Timed
 from lhdmap.logs.cloud_times import CloudTimes
 from lhdmap.logs.container import Container, Contents, OpenContainer
 from lhdmap.logs.cursor import Cursor
-from lhdmap.logs.decoders import DECODERS, LASER_SCAN, UNSTAMPED_TYPES, Decoder, ground_truth, scan_numbers, transforms
+from lhdmap.logs.decoders import DECODERS, UNSTAMPED_TYPES, Decoder, ground_truth, scan_numbers, transforms
 from lhdmap.logs.findings import Findings
 from lhdmap.logs.kinds import of_one_type
 from lhdmap.logs.pointcloud import point_cloud
@@ -26,6 +26,7 @@ from lhdmap.logs.stamp_clocks import Sample, StampClocks, find_clocks
 from lhdmap.logs.stamps import StampKeeper, TopicStamps
 from lhdmap.logs.topics import is_ground_truth
 from lhdmap.messages import Message, Mount, Record
+from lhdmap.roles import ODOMETRY, SCAN
 
 _ENCODINGS = frozenset({"cdr", "ros1"})
 _FIRST_NS = 1_000_000_000
@@ -119,7 +120,7 @@ class DecodedLog:
     def stated_end_rad(self, topic: str) -> float | None:
         """Return the `angle_max` of the first LaserScan of `topic`, None where there is none."""
         for channel, _, data in self.raw({topic}):
-            if channel.type_name != LASER_SCAN or channel.encoding not in _ENCODINGS:
+            if channel.type_name != SCAN or channel.encoding not in _ENCODINGS:
                 continue
             try:
                 return scan_numbers(Cursor(data, channel.encoding))[2][1]
@@ -211,7 +212,7 @@ class DecodedLog:
     def _plan(self, channel: Channel) -> _Plan | None:
         truth = channel.topic in self.truth_topics or is_ground_truth(channel.topic)
         decoder = DECODERS.get(channel.type_name)
-        if truth and channel.type_name == "nav_msgs/msg/Odometry":
+        if truth and channel.type_name == ODOMETRY:
             decoder = ground_truth
         if decoder is None or channel.encoding not in _ENCODINGS:
             return None

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 
@@ -22,11 +23,13 @@ from lhdmap.messages import (
     LaserScan,
     Message,
     Mount,
+    PointCloud,
     Pressure,
     Tachometer,
     Text,
     WheelPose,
 )
+from lhdmap.roles import OLD_TRANSFORMS, ROLES, TEXT, TRANSFORMS, messages_of
 
 Decoder = Callable[[Cursor], tuple[Message, ...]]
 
@@ -140,19 +143,22 @@ def _transform(cursor: Cursor) -> Mount:
     return Mount(stamp, parent, child.lstrip("/"), T)
 
 
-LASER_SCAN = "sensor_msgs/msg/LaserScan"
-DECODERS: dict[str, Decoder] = {
-    LASER_SCAN: _laser_scan,
-    "sensor_msgs/msg/PointCloud2": point_cloud,
-    "sensor_msgs/msg/Imu": _imu,
-    "sensor_msgs/msg/JointState": _joints,
-    "sensor_msgs/msg/FluidPressure": _pressure,
-    "geometry_msgs/msg/TwistStamped": _tachometer,
-    "nav_msgs/msg/Odometry": _odometry,
-    "lhd_msgs/msg/MachineCommand": _command,
-    "std_msgs/msg/String": _text,
-    "tf2_msgs/msg/TFMessage": transforms,
-    "tf/msg/tfMessage": transforms,
+_BY_MESSAGE: dict[type[Any], Decoder] = {
+    LaserScan: _laser_scan,
+    PointCloud: point_cloud,
+    Inclination: _imu,
+    Joints: _joints,
+    Pressure: _pressure,
+    Tachometer: _tachometer,
+    WheelPose: _odometry,
+    GroundTruth: ground_truth,
+    Command: _command,
+    Text: _text,
+    Mount: transforms,
 }
+# Odometry is that of the wheels, unless the topic is one of ground truth: the first role of a type decodes it.
+DECODERS: dict[str, Decoder] = {
+    role.type_name: _BY_MESSAGE[next(iter(messages_of(role.type_name)))] for role in ROLES.values()
+} | {OLD_TRANSFORMS: transforms}
 # Types whose messages carry no stamp of their own, or one that says nothing about a measurement.
-UNSTAMPED_TYPES = frozenset({"std_msgs/msg/String", "tf2_msgs/msg/TFMessage", "tf/msg/tfMessage"})
+UNSTAMPED_TYPES = frozenset({TEXT, TRANSFORMS, OLD_TRANSFORMS})

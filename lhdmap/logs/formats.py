@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from pathlib import Path
 
+from lhdmap.descriptions import described, kind_of
 from lhdmap.errors import InputError
 from lhdmap.logs.bag_log import BagFile
 from lhdmap.logs.base import LogReader
@@ -18,7 +19,6 @@ from lhdmap.logs.packed import SUFFIXES as PACKED
 from lhdmap.logs.packed import PackedFile
 from lhdmap.logs.sqlite_log import MAGIC as SQLITE_MAGIC
 from lhdmap.logs.sqlite_log import SqliteFile
-from lhdmap.outputs import described, kind_of
 
 Opener = Callable[[Path], LogReader]
 

@@ -18,9 +18,10 @@ from lhdmap.logs.scan_health import ScanWatch
 from lhdmap.logs.scan_repair import AS_IT_IS
 from lhdmap.logs.stamp_health import StampWatch
 from lhdmap.logs.survey import Survey, take_survey
-from lhdmap.logs.topics import SCAN, is_ground_truth, missing_scanner, roles_and_doubt
+from lhdmap.logs.topics import is_ground_truth, missing_scanner, roles_and_doubt
 from lhdmap.logs.value_health import ValueWatch
 from lhdmap.messages import LaserScan, Message, Record
+from lhdmap.roles import CLOUD, SCAN
 
 # Words of readers' remarks on what was guessed or left out.
 _GUESSED = (
@@ -165,7 +166,7 @@ def _missing(reader: LogReader, roles: Mapping[str, str], watches: _Watches) -> 
     """Return what the log lacks."""
     found = []
     topics = reader.topics()
-    scanners = [name for name, info in topics.items() if info.type_name in (SCAN, "sensor_msgs/msg/PointCloud2")]
+    scanners = [name for name, info in topics.items() if info.type_name in (SCAN, CLOUD)]
     if not scanners:
         found.append(Finding(Severity.FATAL, "", str(missing_scanner(topics)), "record the scanner's topic"))
     elif scanners == [roles.get("rear")]:

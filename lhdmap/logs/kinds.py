@@ -7,10 +7,10 @@ from dataclasses import replace
 
 from lhdmap.logs.base import TopicInfo
 from lhdmap.logs.decoders import DECODERS
-from lhdmap.logs.topics import ROLES, TEXT
+from lhdmap.roles import ROLES, TEXT
 
-_BY_NAME = set(ROLES.values())
-_SENSORS = {kind for _, kind in ROLES.values()} - {TEXT}
+_BY_NAME = {(role.topic, role.type_name) for role in ROLES.values()}
+_SENSORS = {role.type_name for role in ROLES.values()} - {TEXT}
 
 
 def of_one_type(found: Iterable[TopicInfo]) -> tuple[dict[str, TopicInfo], list[str]]:

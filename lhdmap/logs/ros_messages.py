@@ -23,6 +23,7 @@ from lhdmap.messages import (
     Text,
     WheelPose,
 )
+from lhdmap.roles import COMMAND, TYPE_OF
 
 MACHINE_COMMAND = """std_msgs/Header header
 float64 propel
@@ -33,7 +34,7 @@ bool full_rpm
 bool brake
 """
 _STORE = get_typestore(Stores.ROS2_HUMBLE)
-_STORE.register(get_types_from_msg(MACHINE_COMMAND, "lhd_msgs/msg/MachineCommand"))
+_STORE.register(get_types_from_msg(MACHINE_COMMAND, COMMAND))
 _T = _STORE.types
 _SECOND_NS = 1_000_000_000
 _FLOAT32 = 7  # sensor_msgs/PointField
@@ -55,8 +56,8 @@ def serialized(message: Message | Sequence[Mount]) -> tuple[str, bytes]:
         KeyError: it is no message of `lhdmap.messages`.
     """
     kind = Mount if isinstance(message, list) else type(message)
-    type_name, build = _BUILDERS[kind]
-    return type_name, bytes(_STORE.serialize_cdr(build(message), type_name))
+    type_name = TYPE_OF[kind]
+    return type_name, bytes(_STORE.serialize_cdr(_BUILDERS[kind](message), type_name))
 
 
 def _header(stamp_ns: int, frame: str) -> Any:
@@ -172,7 +173,7 @@ def _pressure(pressure: Pressure) -> Any:
 
 
 def _command(command: Command) -> Any:
-    return _T["lhd_msgs/msg/MachineCommand"](
+    return _T[COMMAND](
         header=_header(command.stamp_ns, "base_link"),
         propel=command.propel,
         steering_rate=command.steering_rate_rps,
@@ -202,16 +203,16 @@ def _transform(mount: Mount) -> Any:
     return _T["geometry_msgs/msg/TransformStamped"](header=header, child_frame_id=mount.child_frame, transform=pose)
 
 
-_BUILDERS: dict[type[Any], tuple[str, Callable[[Any], Any]]] = {
-    LaserScan: ("sensor_msgs/msg/LaserScan", _laser_scan),
-    PointCloud: ("sensor_msgs/msg/PointCloud2", _point_cloud),
-    Inclination: ("sensor_msgs/msg/Imu", _imu),
-    Joints: ("sensor_msgs/msg/JointState", _joints),
-    Tachometer: ("geometry_msgs/msg/TwistStamped", _tachometer),
-    WheelPose: ("nav_msgs/msg/Odometry", _wheel_pose),
-    GroundTruth: ("nav_msgs/msg/Odometry", _ground_truth),
-    Pressure: ("sensor_msgs/msg/FluidPressure", _pressure),
-    Command: ("lhd_msgs/msg/MachineCommand", _command),
-    Text: ("std_msgs/msg/String", _text),
-    Mount: ("tf2_msgs/msg/TFMessage", _transforms),
+_BUILDERS: dict[type[Any], Callable[[Any], Any]] = {
+    LaserScan: _laser_scan,
+    PointCloud: _point_cloud,
+    Inclination: _imu,
+    Joints: _joints,
+    Tachometer: _tachometer,
+    WheelPose: _wheel_pose,
+    GroundTruth: _ground_truth,
+    Pressure: _pressure,
+    Command: _command,
+    Text: _text,
+    Mount: _transforms,
 }

@@ -13,7 +13,7 @@ from typing import Self
 import numpy as np
 import numpy.typing as npt
 
-from lhdmap.errors import InputError
+from lhdmap.errors import InputError, UsageError
 from lhdmap.logs.base import LogReader, TopicInfo
 from lhdmap.logs.finding import Severity
 from lhdmap.logs.formats import open_log
@@ -22,6 +22,8 @@ from lhdmap.logs.kinds import of_one_type
 from lhdmap.logs.survey import Survey, take_survey, transform_topics
 from lhdmap.logs.topics import assign_topics, missing_scanner
 from lhdmap.messages import Message
+from lhdmap.roles import ROLES
+from lhdmap.settings import nearest
 
 _MOUNTS = "tf_static"
 
@@ -131,8 +133,15 @@ class LogSource:
     def messages(self, roles: Collection[str] | None = None) -> Iterator[tuple[str, Message]]:
         """Yield (role, message) of the wanted roles (all that the log fills by default) in log-time order.
 
-        Transforms come first, whenever they were sent: they hold for the whole log.
+        Transforms come first, whenever they were sent: they hold for the whole log. A role that the log does not fill has no
+        messages.
+
+        Raises:
+            UsageError: there is no such role.
         """
+        for role in roles or ():
+            if role not in ROLES:
+                raise UsageError(f"unknown role '{role}'{nearest(role, ROLES)}")
         wanted = {topic: role for role, topic in self.roles.items() if roles is None or role in roles}
         mounts = self.survey.frames.transforms() if _MOUNTS in wanted.values() else []
         measured = self._measured({topic: role for topic, role in wanted.items() if role != _MOUNTS})

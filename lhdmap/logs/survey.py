@@ -15,13 +15,11 @@ from lhdmap.logs.frames import FrameTree
 from lhdmap.logs.scan_health import fatal_findings
 from lhdmap.logs.scan_kinds import kinds_of
 from lhdmap.logs.scan_repair import AS_IT_IS, ScanRepair
-from lhdmap.logs.topics import TRANSFORMS
 from lhdmap.logs.value_health import ValueWatch
 from lhdmap.messages import LaserScan, Message, Mount
+from lhdmap.roles import ROLES, TRANSFORMS, judged_as
 
 _SCANS, _VALUES, _TRANSFORMS = 300, 800, 4000
-_WHEELS = ("wheel_odometry", "tachometer")
-_SLOW = (*_WHEELS, "inclinometer", "joints")
 _STATIC = "tf_static"
 
 
@@ -75,9 +73,9 @@ def _sampled(
 ) -> tuple[dict[str, list[LaserScan]], dict[str, ValueWatch]]:
     """Read the sample: scans by topic, watches of the slow sensors by role; transforms go into `frames`."""
     static = transform_topics(readers)
-    role_of = {roles[role]: role for role in _SLOW if role in roles}
+    role_of = {roles[role]: role for role in judged_as("value", "speed") if role in roles}
     most = dict.fromkeys(role_of, _VALUES) | dict.fromkeys(static, _TRANSFORMS)
-    most |= {roles[role]: _SCANS for role in ("front", "rear") if role in roles}
+    most |= {roles[role]: _SCANS for role in judged_as("scan") if role in roles}
     scans: dict[str, list[LaserScan]] = {}
     values = {role: ValueWatch(topic) for topic, role in role_of.items()}
     for reader in readers:
@@ -103,7 +101,7 @@ def _judge_scans(survey: Survey, topic: str, scans: list[LaserScan], reader: Log
 
 def _judge_values(survey: Survey, role: str, watch: ValueWatch) -> None:
     """Leave out a sensor that says the same for ever: but zero of one that is level, or straight, is as good as none."""
-    if not watch.never_changes or (role not in _WHEELS and watch.is_zero):
+    if not watch.never_changes or (ROLES[role].survey == "value" and watch.is_zero):
         return
     what = "it never moves" if role == "wheel_odometry" else f"its value never changes ({watch.last_text})"
     survey.left_out[role] = what

@@ -14,6 +14,7 @@ from lhdmap.odometry.motion import Motion
 from lhdmap.odometry.rear_view import NO_POINTS, NOTHING_BEHIND, Behind, JointOffset
 from lhdmap.odometry.settings import AnchorSettings, OdometrySettings, RangeFlowSettings, SearchSettings
 from lhdmap.odometry.steps import BY_DEFINITION, Matched
+from lhdmap.odometry.wheel_model import WheelModel
 from lhdmap.scan_matching.information import marginal_information
 from lhdmap.scan_matching.matching import Hits, Match, MatchModel, Prior
 from lhdmap.scan_matching.search import SearchGrid
@@ -46,6 +47,7 @@ class AnchoredMatcher:
     def __init__(
         self,
         motion: Motion,
+        wheels: WheelModel,
         settings: OdometrySettings,
         anchor: AnchorSettings,
         wide: SearchSettings,
@@ -53,7 +55,8 @@ class AnchoredMatcher:
     ) -> None:
         self._flow = range_flow
         self._first: FlowReference | None = None
-        self._motion, self._noise_m, self._anchor, self._wide = motion, settings.range_noise_m, anchor, wide
+        self._motion, self._wheels = motion, wheels
+        self._noise_m, self._anchor, self._wide = settings.range_noise_m, anchor, wide
         self._map = self._empty_map(_model(settings, anchor))
         self._inserted: FloatArray | None = None
         self._origin = np.zeros(3)
@@ -147,7 +150,7 @@ class AnchoredMatcher:
         result = self._map.align(hits, prior)
         if self._trusted(result):
             return self._freed(hits, result, prior)
-        found = jump(self._map, hits, result, prior, self._motion, self._wide, self._owed)
+        found = jump(self._map, hits, result, prior, self._motion, self._wheels, self._wide, self._owed)
         if found is None:
             return result
         self._doubt, self._jumped = _DOUBT_SCANS, True

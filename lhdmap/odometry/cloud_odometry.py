@@ -48,6 +48,7 @@ class CloudStep(NamedTuple):
     substitute: str
     processed: bool
     lost: bool
+    wheels: str = "none"
 
 
 class _First(NamedTuple):

@@ -10,13 +10,14 @@ from lhdmap.geometry import se2
 from lhdmap.messages import FloatArray
 from lhdmap.odometry.motion import Motion
 from lhdmap.odometry.settings import SearchSettings
+from lhdmap.odometry.wheel_model import WheelModel
 from lhdmap.scan_matching.matching import Hits, Match, Prior
 from lhdmap.scan_matching.submap import Submap
 
-# A jump must bring that much more support, and more where wheels speak against it: the logarithm of the odds (Student's t, for
-# wheels that slip or lag) over the nats that support is worth. Measured: crowds win by chance with more, slip stays with less.
+# A jump must bring that much more support, and more where wheels speak against it: the logarithm of the odds over the nats that
+# support is worth. Measured: crowds win by chance with more, slip stays with less.
 NOTHING_OWED = np.zeros(3)
-_GAIN, _NATS_PER_SUPPORT, _WHEELS_FREEDOM = 0.02, 22.0, 4.0
+_GAIN, _NATS_PER_SUPPORT = 0.02, 22.0
 
 
 def jump(
@@ -25,6 +26,7 @@ def jump(
     near: Match,
     prior: Prior,
     motion: Motion,
+    wheels: WheelModel,
     s: SearchSettings,
     owed: FloatArray = NOTHING_OWED,
 ) -> Match | None:
@@ -35,13 +37,14 @@ def jump(
         hits: the scan.
         near: the match that was found from the prediction.
         prior: the prediction.
-        motion: tells how far to search, and whether wheels have measured.
+        motion: tells how far to search.
+        wheels: tell how much they speak against a pose.
         s: limits of the search.
         owed: by how much jumps a moment ago left the motion (3,): wheels speak against staying there, and for the way back.
     """
     best = near
     for found in submap.candidates(hits, prior, _reach(motion, s)):
-        dissent = _dissent(found, prior, motion, owed) - _dissent(best, prior, motion, owed)
+        dissent = _dissent(found, prior, wheels, owed) - _dissent(best, prior, wheels, owed)
         if found.support > best.support + _GAIN + dissent / _NATS_PER_SUPPORT:
             best = found
     return None if best is near else best
@@ -54,12 +57,9 @@ def left_by(result: Match, prior: Prior) -> FloatArray:
     return error
 
 
-def _dissent(result: Match, prior: Prior, motion: Motion, owed: FloatArray) -> float:
-    """Return how much (nats) the wheels speak against a pose: with slip and lag, large errors are likelier than normal."""
-    if not motion.measured:
-        return 0.0
-    error = left_by(result, prior) + owed
-    return 0.5 * _WHEELS_FREEDOM * math.log1p(float(error @ prior.information @ error) / _WHEELS_FREEDOM)
+def _dissent(result: Match, prior: Prior, wheels: WheelModel, owed: FloatArray) -> float:
+    """Return how much (nats) the wheels speak against a pose."""
+    return wheels.dissent_nats(left_by(result, prior) + owed, prior.information)
 
 
 def _reach(motion: Motion, s: SearchSettings) -> FloatArray:

@@ -11,13 +11,6 @@ from lhdmap.odometry import motion_filter
 from lhdmap.odometry.settings import OdometrySettings
 
 FORWARD, LATERAL, TURNING, SCALE = 3, 4, 5, 6
-_GATE_SIGMAS = 4.0
-# Share of what wheels that slip were off by at first, within which they are believed again: walls alone tell the speed less and
-# less, and what still slips soon comes within the gate.
-_AGAIN = 0.5
-# Where walls do not hold the motion: wheels that turn faster than the machine moves slip, for seconds; wheels that say anything
-# else for longer than a moment are right, and the match has run away.
-_SLIP_S, _DISSENT_S = 3.0, 0.5
 _SHORTEST_STEP_S, _LONGEST_STEP_S = 1e-3, 1.0
 _STARTING_VARIANCE = np.diag([0.2**2, 0.05**2, 0.05**2])  # of a starting velocity from a dry run
 _DISTRUSTED_VARIANCE = np.diag([3.0**2, 0.3**2, 2.0**2])
@@ -35,8 +28,7 @@ class Motion:
             [settings.forward_acceleration, settings.lateral_acceleration, settings.turning_acceleration]
         )
         self.state, self.P = motion_filter.initial(np.zeros(3))
-        self._dissent_s = self._step_s = 0.0
-        self._off_mps = 0.0  # of wheels that slip
+        self._step_s = 0.0
         self._way, self._joint = np.zeros(3), np.zeros((10, 10))
         self._measured: set[int] = set()
         self.held = False  # whether walls hold it in all directions, as the last scan says
@@ -53,6 +45,16 @@ class Motion:
     def velocity(self) -> FloatArray:
         """Forward, lateral, turning speed, shape (3,), a copy."""
         return self.state[3:6].copy()
+
+    @property
+    def forward_mps(self) -> float:
+        """Forward speed, m/s."""
+        return float(self.state[FORWARD])
+
+    @property
+    def wheel_scale(self) -> float:
+        """What wheels measure over what the machine drives, as learned."""
+        return float(self.state[SCALE])
 
     @property
     def way_forward_m(self) -> float:
@@ -77,7 +79,6 @@ class Motion:
 
     def predict(self, dt_s: float) -> None:
         """Move on by `dt_s`. After a long gap the old speed says little: the model runs for a second at most."""
-        self._dissent_s += dt_s
         model_s = min(dt_s, _LONGEST_STEP_S)
         self._way, self._joint = motion_filter.predict(self.state, self.P, model_s, self._accelerations)
         self._step_s, self._measured = dt_s, set()
@@ -85,50 +86,31 @@ class Motion:
             self._joint[3:6, 3:6] += _GAP_VARIANCE
             self.P[:, :] = self._joint[:7, :7]
 
-    def fuse_speed(self, axis: int, measured: float, sigma: float, *, scaled: bool) -> bool:
-        """Fuse the wheels' mean speed over the step just predicted; False where it contradicts the motion (slip) and was left out.
+    def begin_measurement(self, axis: int) -> tuple[float, FloatArray]:
+        """Return the time (s) of the step just predicted and the direction (3,) of an axis in it, for a measured mean speed.
 
-        With `scaled` the wheels' scale is part of the state and learned.
+        After a gap the model tells nothing along it.
         """
         dt_s, heading = max(self._step_s, _SHORTEST_STEP_S), self.state[2] - 0.5 * self._way[2]
         direction = np.array([math.cos(heading), math.sin(heading), 0.0] if axis == FORWARD else [0.0, 0.0, 1.0])
         if dt_s > _LONGEST_STEP_S:
             self._open(direction, _GAP_VARIANCE[axis - FORWARD, axis - FORWARD] * dt_s**2)
-        scale = float(self.state[SCALE]) if scaled else 1.0
-        off_mps = abs(measured - scale * float(self.state[FORWARD])) if axis == FORWARD else 0.0
-        agrees = self.held or not off_mps > _AGAIN * self._off_mps > 0.0
-        if agrees:
-            nis = motion_filter.update_way(
-                self.state,
-                self._joint,
-                self._way,
-                direction,
-                measured * dt_s,
-                (sigma * dt_s) ** 2,
-                scaled,
-                _GATE_SIGMAS,
-            )
-            self.P[:, :] = self._joint[:7, :7]
-            agrees = bool(nis <= _GATE_SIGMAS**2)
-        if agrees:
-            self._measured.add(axis)
-        if axis != FORWARD:
-            return agrees
-        if agrees:
-            self._dissent_s = self._off_mps = 0.0
-            return True
-        self._off_mps = self._off_mps or off_mps
-        speed = float(self.state[FORWARD])
-        slips = measured * speed > 0.0 and abs(measured) > abs(speed)
-        if self.held or self._dissent_s < (_SLIP_S if slips else _DISSENT_S):
-            return False
-        self._override(direction, measured, sigma)
-        self.P[:, :] = self._joint[:7, :7]
-        self._dissent_s = self._off_mps = 0.0
-        return True
+        return dt_s, direction
 
-    def _override(self, direction: FloatArray, measured: float, sigma: float) -> None:
-        """Believe the wheels' speed: the way of this step was foretold wrongly, too."""
+    def measure_way(self, direction: FloatArray, way: float, variance: float, scaled: bool, gate_sigmas: float) -> bool:
+        """Fuse a way measured along a direction; return whether it was within the gate, else nothing changes."""
+        nis = motion_filter.update_way(
+            self.state, self._joint, self._way, direction, way, variance, scaled, gate_sigmas
+        )
+        self.P[:, :] = self._joint[:7, :7]
+        return bool(nis <= gate_sigmas**2)
+
+    def note_measured(self, axis: int) -> None:
+        """Take it that the step just predicted was measured along an axis."""
+        self._measured.add(axis)
+
+    def believe_speed(self, direction: FloatArray, measured: float, sigma: float) -> None:
+        """Believe a measured speed against the model: the way of this step was foretold wrongly, too."""
         dt_s = max(self._step_s, _SHORTEST_STEP_S)
         self._open(direction, (measured * dt_s - float(direction @ self._way)) ** 2)
         motion_filter.update_way(
@@ -136,6 +118,7 @@ class Motion:
         )
         self._joint[FORWARD, FORWARD] += (measured - float(self.state[FORWARD])) ** 2
         motion_filter.update_speed(self.state, self._joint, FORWARD, measured, sigma**2, False, math.inf)
+        self.P[:, :] = self._joint[:7, :7]
 
     def _open(self, direction: FloatArray, variance: float) -> None:
         """Let the way along a direction be anything within a variance: the model does not tell it."""

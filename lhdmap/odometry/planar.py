@@ -16,7 +16,7 @@ from lhdmap.odometry.motion import Motion
 from lhdmap.odometry.rear_view import NO_POINTS, NOTHING_BEHIND, Behind, RearView, behind
 from lhdmap.odometry.settings import AnchorSettings, OdometrySettings, RangeFlowSettings, SearchSettings
 from lhdmap.odometry.steps import Matched, OdometryStep, WheelStep
-from lhdmap.odometry.wheel_fusion import WheelFusion
+from lhdmap.odometry.wheel_model import WheelModel
 from lhdmap.scan_matching.information import body_information, inflated, marginal_information
 from lhdmap.scan_matching.scan_points import NO_BOXES, half_sweep_ns, planar_points
 from lhdmap.scan_matching.slant import NO_RISE
@@ -60,12 +60,14 @@ class PlanarOdometry:
     ) -> None:
         self._settings = settings or OdometrySettings()
         self._motion = Motion(self._settings, velocity)
+        self.wheels = WheelModel(self._settings, self._motion)
         self._matcher: AnchoredMatcher | FlowMatcher
         if self._settings.method == "range_flow":
             self._matcher = FlowMatcher(self._motion, self._settings, range_flow or RangeFlowSettings())
         else:
             self._matcher = AnchoredMatcher(
                 self._motion,
+                self.wheels,
                 self._settings,
                 anchor or AnchorSettings(),
                 wide or SearchSettings(),
@@ -74,8 +76,6 @@ class PlanarOdometry:
         self._clock = ScanClock()
         self._turn = 0
         self._rate = AdaptiveRate(self._settings)
-        self._wheels_used = False
-        self.wheels = WheelFusion(self._settings, self._motion)
         self.points = np.zeros((0, 3))  # hits of the last processed scan, level base frame, heights in odom
 
     def update(
@@ -84,7 +84,7 @@ class PlanarOdometry:
         """Process one scan; `T_level_sensor` (4, 4): mount and attitude, or what tells it where the scan is processed."""
         dt_s = self._clock.step(scan.stamp_ns)
         self._motion.predict(dt_s)
-        self._wheels_used = self.wheels.fuse(wheels, dt_s)
+        self.wheels.fuse(wheels, dt_s)
         if not self._rate.due(dt_s, self._motion.velocity) and not self._clock.bunched:
             return self._step(scan, None)
         if not isinstance(T_level_sensor, np.ndarray):
@@ -136,11 +136,23 @@ class PlanarOdometry:
         covariance = body_information(self._motion.P[:3, :3], pose[2])
         if matched is None:
             return OdometryStep(
-                stamp_ns, time_ns, pose, covariance, velocity, np.zeros(3), math.nan, math.nan, False, "", False, False
+                stamp_ns,
+                time_ns,
+                pose,
+                covariance,
+                velocity,
+                np.zeros(3),
+                math.nan,
+                math.nan,
+                False,
+                "",
+                False,
+                False,
+                self.wheels.use,
             )
         information = self._information(matched)
         weak = self._weak(information) or matched.lost or matched.doubtful
-        substitute = ("wheels" if self._wheels_used else "motion") if weak else ""
+        substitute = ("wheels" if self.wheels.use.used else "motion") if weak else ""
         if weak:
             covariance = inflated(covariance, int(np.argmin(information[:2])), self._settings.weak_inflation)
         return OdometryStep(
@@ -156,6 +168,7 @@ class PlanarOdometry:
             substitute,
             True,
             matched.lost,
+            self.wheels.use,
         )
 
     def _weak(self, information: FloatArray) -> bool:

@@ -46,7 +46,8 @@ class OdometryStep(NamedTuple):
     not move the scan as a whole; `covariance`: (3, 3) of the step from the scan before, in body axes (m, rad);
     `information`: (3,) along, across (1/m²) and heading (1/rad²) of this scan against the map, the others given;
     `degenerate`: a direction was not observed; `substitute`: what stood in for it (`wheels`, `motion` or empty);
-    `processed`: False where the adaptive rate only predicted; `lost`: the scan did not fit the map.
+    `processed`: False where the adaptive rate only predicted; `lost`: the scan did not fit the map; `wheels`: what became of the
+    wheels' step before it, and why (`WheelUse`).
     """
 
     stamp_ns: int
@@ -61,3 +62,4 @@ class OdometryStep(NamedTuple):
     substitute: str
     processed: bool
     lost: bool
+    wheels: str = "none"

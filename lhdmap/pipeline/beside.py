@@ -13,7 +13,7 @@ import queue
 import signal
 import threading
 import traceback
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from multiprocessing import resource_tracker
 from multiprocessing.connection import Connection
 from types import TracebackType
@@ -137,6 +137,8 @@ class Beside(Generic[T]):
             return
         order = pickle.dumps((wanted, method.__name__, args, kwargs), pickle.HIGHEST_PROTOCOL)
         with self._lock:
+            if self._told and len(order) > _BATCH_BYTES:
+                self._flush()
             self._told.append(order)
             self._bytes += len(order)
             if wanted or self._bytes > _BATCH_BYTES:
@@ -151,7 +153,7 @@ class Beside(Generic[T]):
         while (batch := self._batches.get()) is not None:
             try:
                 if self._alive:
-                    self._pipe.send(batch)
+                    _send_batch(self._pipe, batch)
             except OSError:  # a broken pipe must not look like that of standard output
                 self._alive = False
         self._pipe.close()
@@ -164,21 +166,37 @@ class Beside(Generic[T]):
         )
 
 
+def _send_batch(pipe: Connection, batch: list[bytes]) -> None:
+    """Send orders; one alone, which may hold a whole map, without a copy of it, and it is let go once it is on its way."""
+    if len(batch) == 1:
+        pipe.send(None)
+        pipe.send_bytes(batch.pop())
+    else:
+        pipe.send(batch)
+
+
+def _orders(pipe: Connection) -> Iterator[Any]:
+    """Yield what is ordered until the other side closes the pipe; what was unpacked is let go."""
+    with contextlib.suppress(EOFError):
+        while True:
+            told: list[bytes] | None = pipe.recv()
+            batch = [pipe.recv_bytes()] if told is None else told[::-1]
+            while batch:
+                yield pickle.loads(batch.pop())  # noqa: S301  # from our own parent
+
+
 def _serve(
     orders: Connection, answers: Connection, make: Callable[..., Served], args: tuple[Any, ...], kwargs: dict[str, Any]
 ) -> None:
     """Make the object and do what is ordered until the other side closes the pipe, or is gone."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # where signals cannot be held back (see above)
     served, failure = _tried(make, *args, **kwargs)
-    with contextlib.suppress(EOFError):
-        while True:
-            for order in orders.recv():
-                wanted, name, args, kwargs = pickle.loads(order)  # noqa: S301  # from our own parent
-                result = None
-                if failure is None:
-                    result, failure = _tried(getattr(served, name), *args, **kwargs)
-                if wanted:
-                    answers.send((failure, result))
+    for wanted, name, args, kwargs in _orders(orders):
+        result = None
+        if failure is None:
+            result, failure = _tried(getattr(served, name), *args, **kwargs)
+        if wanted:
+            answers.send((failure, result))
     if served is not None:
         served.close()
     os._exit(0)  # taking the libraries down in order would take as long as a report

@@ -17,7 +17,7 @@ from lhdmap.errors import InputError, LhdmapWarning
 from lhdmap.integration.cloud_io import write_cloud
 from lhdmap.logs.source import LogSource
 from lhdmap.machine import Machine
-from lhdmap.mapfolder import FRAMES, Diagnostics, MapFolderWriter, MapInfo
+from lhdmap.mapfolder import Diagnostics, MapFolderWriter
 from lhdmap.messages import Message
 from lhdmap.outputs import free_folder
 from lhdmap.pipeline.beside import Beside, HelperDied, Here
@@ -32,6 +32,7 @@ from lhdmap.pipeline.refusal import require_a_map
 from lhdmap.provenance import file_entry, source_entry
 from lhdmap.report.page import fill_in_cost
 from lhdmap.report.recording import Thinning
+from lhdmap.runfolder import RunInfo
 from lhdmap.trajectory import Trajectory
 
 _ASKED = "interrupted: what was read so far is being written; Ctrl-C once more ends at once"
@@ -100,11 +101,12 @@ def build_map(request: BuildRequest) -> BuildResult:
             pipeline = MappingPipeline(
                 request.settings,
                 machine_of(source, request.machine),
-                _sweep_sink(inspector),
+                _sweep_sink(inspector, request.settings.recording.scan_interval_s),
                 primary,
                 pile=PileBeside(inspector),
             )
-            _run(pipeline, source, request.progress, interruption)
+            with pipeline:
+                _run(pipeline, source, request.progress, interruption)
             as_recorded = partial(source.recorded_ns, primary)
             # An interruption of what follows must not lose it.
             folder.write_odometry(_stamped(odometry_of(pipeline), as_recorded))
@@ -120,7 +122,7 @@ def build_map(request: BuildRequest) -> BuildResult:
         own = Spent(peak_memory_mib(), compiling.seconds)
         figures = outcome.summary | cost(started, outcome.duration_s, own, beside)  # one for page, map.json and screen
         fill_in_cost(folder.path / "report.html", figures)
-        info = MapInfo(request.logs, _options(request), figures, outcome.warnings, _frames(request))
+        info = RunInfo(request.logs, _options(request), figures, outcome.warnings, _frames(request))
         path = folder.complete(info, known)
     return BuildResult(path, figures | {"map": str(path)}, outcome.warnings, final)
 
@@ -185,8 +187,8 @@ def _cores() -> int:
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
-def _sweep_sink(inspector: Inspector) -> Callable[[str, int, Any], None]:
-    thinning = Thinning()
+def _sweep_sink(inspector: Inspector, interval_s: float) -> Callable[[str, int, Any], None]:
+    thinning = Thinning(interval_s)
 
     def take(role: str, stamp_ns: int, points_map: Any) -> None:
         if thinning.take(stamp_ns, role):
@@ -219,4 +221,4 @@ def _options(request: BuildRequest) -> dict[str, Any]:
 
 
 def _frames(request: BuildRequest) -> dict[str, str]:
-    return FRAMES | ({"map": "that of the given poses"} if request.poses else {})
+    return {"map": "that of the given poses"} if request.poses else {}

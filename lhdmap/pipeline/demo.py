@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from lhdmap.config import Settings
+from lhdmap.config import Settings, settings_table
 from lhdmap.evaluation.trajectory import TrajectoryEvaluation, evaluate_trajectory
-from lhdmap.outputs import OutputFolder
 from lhdmap.pipeline.build import BuildRequest, BuildResult, Progress, build_map
 from lhdmap.resources import resource
+from lhdmap.runfolder import RunFolderWriter, RunInfo
 from lhdmap.simulation.drive import Progress as SimulationProgress
 from lhdmap.simulation.drive import SimulatedDrive, simulate_drift
 from lhdmap.simulation.scenario import load_scenario
@@ -49,14 +48,14 @@ def run_demo(
         UsageError: the folder is there already.
         InputError: it cannot be made.
     """
-    watcher = watcher or Watcher()
-    with OutputFolder(target, force=force) as folder:
-        demo = _demo(folder, settings or Settings(), watcher)
-        folder.describe("demo", {"log": demo.drive.log.name, "map": demo.built.folder.name})
-        return _moved(demo, folder.complete())
+    watcher, settings = watcher or Watcher(), settings or Settings()
+    with RunFolderWriter("demo", target, force=force) as folder:
+        demo = _demo(folder, settings, watcher)
+        within = {"log": demo.drive.log.name, "map": demo.built.folder.name}
+        return _moved(demo, folder.complete(RunInfo(options=settings_table(settings), more=within)))
 
 
-def _demo(folder: OutputFolder, settings: Settings, watcher: Watcher) -> Demo:
+def _demo(folder: RunFolderWriter, settings: Settings, watcher: Watcher) -> Demo:
     """Run the three steps in the folder that grows."""
     from lhdmap.report.evaluation_plot import plot_evaluation
 
@@ -64,15 +63,14 @@ def _demo(folder: OutputFolder, settings: Settings, watcher: Watcher) -> Demo:
     scenario = load_scenario(resource(SCENARIO))
     say(f"1/3 simulate: {scenario.drive.distance_m:g} m of drift at {scenario.drive.speed_kmh:g} km/h, 2 scanners")
     drive = simulate_drift(scenario, path / "drive.mcap", progress=watcher.simulate)
-    folder.finished.append("drive.mcap")
+    folder.finished(drive.log)
     say("2/3 build-map: from the log alone, its ground truth is not read")
     known_as = {drive.log: folder.target / drive.log.name}
     request = BuildRequest([drive.log], path / "drive_map", settings, progress=watcher.build, recorded_as=known_as)
     built = build_map(request)
     say("3/3 eval: the map's trajectory against the truth of the simulation")
     evaluation = evaluate_trajectory(built.trajectory, drive.truth)
-    evaluation_file, plot_file = path / "evaluation.json", path / "evaluation.png"
-    evaluation_file.write_text(json.dumps(evaluation.to_json(), indent=2) + "\n", encoding="utf-8")
+    evaluation_file, plot_file = folder.write_json("evaluation.json", evaluation.to_json()), path / "evaluation.png"
     plot_evaluation(evaluation, plot_file)
     return Demo(path, drive, built, evaluation, evaluation_file, plot_file)
 

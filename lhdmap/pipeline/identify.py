@@ -14,20 +14,21 @@ from lhdmap.errors import InputError, UsageError
 from lhdmap.geometry import se3
 from lhdmap.logs.source import LogSource
 from lhdmap.machine import Machine
-from lhdmap.messages import FloatArray, LaserScan, Mount
+from lhdmap.messages import FloatArray, LaserScan, Message, Mount
 from lhdmap.pile.face import Registration
 from lhdmap.pile.heap import measure_cloud
 from lhdmap.pile.result import Approach, PileReport, Snapshot
+from lhdmap.pipeline.front_end import own_boxes
 from lhdmap.pipeline.given import given_rows
-from lhdmap.pipeline.mapping import MappingPipeline, own_boxes
+from lhdmap.pipeline.mapping import MappingPipeline, feed
 from lhdmap.pipeline.mounts import Mounts, level_sensor, machine_of
 from lhdmap.pipeline.pile import NO_INCLINOMETER, PileWatch, PlacedScan
 from lhdmap.pipeline.said import said_once
 from lhdmap.pipeline.sweep_times import SweepTimes
 from lhdmap.pipeline.track import FinalTrack, Rows
+from lhdmap.roles import PILE, read_by
 from lhdmap.scan_matching.scan_points import half_sweep_ns
 
-_ROLES = ("tf_static", "front", "rear", "points", "inclinometer", "joints", "tachometer", "wheel_odometry")
 _LEVEL = (
     "no inclinometer in the log: no pile was looked for, its slope shows only where roll and pitch are known; "
     "--poses gives them"
@@ -64,7 +65,7 @@ def identify(
             rows = given_rows(poses, [log], topics or {})
             return _warned(identify_along(rows, [log], settings, body, topics), (*told, *source.damage))
         pipeline = MappingPipeline(settings, body, cloud=False)
-        _feed(pipeline, source)
+        feed(pipeline, _read(source))
     if pipeline.pile is None or not len(pipeline.track):
         raise InputError(f"{log}: no usable scan of a front scanner in it; lhdmap doctor tells what is wrong")
     told = (*told, *source.damage, *pipeline.warnings)
@@ -73,16 +74,14 @@ def identify(
     return _warned(pipeline.pile.report(), told)
 
 
-def _feed(pipeline: MappingPipeline, source: LogSource) -> None:
-    for role, message in source.messages([role for role in _ROLES if role in source.roles]):
-        pipeline.update(role, message)
-    pipeline.finish()
+def _read(source: LogSource) -> Iterator[tuple[str, Message]]:
+    return source.messages([role for role in read_by(PILE) if role in source.roles])
 
 
 def _in_cloud(source: LogSource, settings: Settings, machine: Machine | None) -> PileReport:
     """Look for the pile in the cloud of a 3D scanner: it sees the face at once, no drive is needed to climb it."""
     pipeline = MappingPipeline(settings, machine, primary="points")
-    _feed(pipeline, source)
+    feed(pipeline, _read(source))
     if not len(pipeline.track):
         raise InputError(f"{source.paths[0]}: no usable cloud in it; lhdmap doctor tells what is wrong")
     estimate = measure_cloud(pipeline.sweeps.cloud().points_m.astype(np.float64), "z").estimate

@@ -26,7 +26,7 @@ class Inspection:
     def __init__(self, folder: Path, title: str, start_ns: int, settings: Settings) -> None:
         self._folder = folder
         self._pile = PileWatch(settings)
-        self._recording = RecordingWriter(folder / "recording.rrd", title, start_ns)
+        self._recording = RecordingWriter(folder / "recording.rrd", title, start_ns, settings.recording)
         self._written = False
         self._compiling = CompileClock().start()
         threading.Thread(target=charts.load, name="charts").start()

@@ -5,11 +5,14 @@ from __future__ import annotations
 import contextlib
 import signal
 import threading
+import time
 from collections.abc import Iterator
 from types import FrameType, TracebackType
 from typing import Any, Self
 
 from lhdmap.interrupts import GIVE_WAY
+
+_LEAST_S = 5.0
 
 
 class Interruption:
@@ -18,11 +21,15 @@ class Interruption:
     Raised wherever the program happens to be, KeyboardInterrupt would leave locks of the compiler held (llvmlite's), and the
     thread that integrates would wait for them for ever. Outside of the main thread, or where the caller handles the signal,
     nothing changes.
+
+    In the program what is done after the first Ctrl-C takes at most half as long as the run until then, or 5 s, and ends like
+    with a second one: the kernels of a first run are compiled for a minute and more, for the little that was read.
     """
 
     def __init__(self) -> None:
         self.asked = False
         self._before: Any = None
+        self._started_s = time.monotonic()
 
     def __enter__(self) -> Self:
         """Take over the signal where it is Python's own to handle."""
@@ -59,3 +66,6 @@ class Interruption:
         if self.asked:
             self._before(number, frame)
         self.asked = True
+        if self._before is not signal.default_int_handler and hasattr(signal, "setitimer"):
+            signal.signal(signal.SIGALRM, self._before)
+            signal.setitimer(signal.ITIMER_REAL, max(_LEAST_S, 0.5 * (time.monotonic() - self._started_s)))

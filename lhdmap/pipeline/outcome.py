@@ -30,12 +30,14 @@ from lhdmap.pipeline.sweep_times import SweepTimes
 from lhdmap.pipeline.sweeps import SweepIntegration
 from lhdmap.pipeline.track import FinalTrack, Rows, resample, trajectory_of
 from lhdmap.proprioception.wheels import WheelOdometry
+from lhdmap.report.bounded import bounded
 from lhdmap.report.data import ReportData, Summary, TopicRow
+from lhdmap.roles import BUILD_MAP, GIVEN_POSES, read_by
 from lhdmap.smoothing.smoother import corrected
 from lhdmap.trajectory import Trajectory
 
-ROLES_READ = ("front", "rear", "points", "inclinometer", "joints", "tachometer", "wheel_odometry", "tf_static")
-_ROLES_PLACED = ("front", "rear", "points", "joints", "tf_static")  # what is read of a log whose poses are given
+ROLES_READ = read_by(BUILD_MAP)
+_ROLES_PLACED = read_by(GIVEN_POSES)
 _OF_ODOMETRY = ("odometry:", "wheels:", "wheel odometry:", "tachometer:", "inclinometer:")
 _WITNESSES = {"articulated": "tachometer", "tachometer": "tachometer", "wheel_pose": "wheel odometry"}
 _FEWEST_TOLD = 0.1  # of the scans
@@ -102,14 +104,18 @@ class Outcome:
         self.pipeline, self.ways = pipeline, ways
         self._inputs, self._source = inputs, source
         rows = ways.rows
+        if ways.moved:
+            pipeline.sweeps.forget()  # two clouds at a time would take twice the memory
         sweeps = integrate_again(inputs, pipeline, rows) if ways.moved else pipeline.sweeps
         self.cloud: Cloud = sweeps.cloud()
+        of_sweeps = sweeps.warnings
+        sweeps.forget()
         distance_m = float(np.linalg.norm(np.diff(rows.poses[:, :3], axis=0), axis=1).sum())
         if not len(self.cloud.points_m) and pipeline.records.degenerate_share == 1.0:
             raise InputError(f"{source.paths[0]}: its scans hold no hit; lhdmap doctor tells what is wrong")
         self.pile_reason = self._no_pile()
         self.pile = None if self.pile_reason else self._pile(pipeline.pile)
-        told = [*source.warnings, *source.damage, *_of_the_run(pipeline, inputs), *sweeps.warnings]
+        told = [*source.warnings, *source.damage, *_of_the_run(pipeline, inputs), *of_sweeps]
         told += _holes(rows) if inputs.poses else _remarks(pipeline)
         self.warnings = said_once([*told, *_of_the_pile(self.pile)])
         stamps, records = ways.odometry.stamps_ns, pipeline.records
@@ -161,16 +167,16 @@ class Outcome:
             provenance={"log": ", ".join(name_of(path) for path in inputs.logs)} | _given(inputs),
             poses=_poses_name(inputs),
         )
-        if inputs.poses:  # what the scans say of the motion took no part
-            return data
-        return replace(
-            data,
-            odometry=self.ways.odometry,
-            diagnostics=records.diagnostics(),
-            odometry_speed=records.speed(),
-            tachometer_speed=records.tachometer(),
-            witness=_witness(self.pipeline),
-        )
+        if not inputs.poses:  # else what the scans say of the motion took no part
+            data = replace(
+                data,
+                odometry=self.ways.odometry,
+                diagnostics=records.diagnostics(),
+                odometry_speed=records.speed(),
+                tachometer_speed=records.tachometer(),
+                witness=_witness(self.pipeline),
+            )
+        return bounded(data)
 
 
 def integrate_again(inputs: Inputs, pipeline: MappingPipeline, rows: Rows) -> SweepIntegration:
@@ -180,7 +186,7 @@ def integrate_again(inputs: Inputs, pipeline: MappingPipeline, rows: Rows) -> Sw
     """
     sweeps = SweepIntegration(inputs.settings, pipeline.machine, pipeline.mounts, None)
     wheels = WheelOdometry(inputs.settings.wheels, pipeline.machine or Machine())
-    track, times, sweep_times = FinalTrack(rows), iter(pipeline.records.times_ns), SweepTimes()
+    track, times, sweep_times = FinalTrack(rows), map(int, pipeline.records.times_ns), SweepTimes()
     with LogSource(list(inputs.logs), inputs.topics, force=inputs.force) as source:
         for role, message in source.messages(
             [role for role in ("front", "rear", "points", "joints") if role in source.roles]
@@ -198,7 +204,7 @@ def integrate_again(inputs: Inputs, pipeline: MappingPipeline, rows: Rows) -> Sw
 def _moments(pipeline: MappingPipeline) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.int64]]:
     """Return the stamps of the front scans and the times of their poses, shape (N,)."""
     records = pipeline.records
-    return np.array(records.stamps_ns, dtype=np.int64), np.array(records.times_ns, dtype=np.int64)
+    return records.stamps_ns, records.times_ns
 
 
 def _topic_rows(source: LogSource, inputs: Inputs) -> list[TopicRow]:
@@ -235,11 +241,11 @@ def _of_the_pile(pile: PileReport | None) -> Sequence[str]:
 
 def _witness(pipeline: MappingPipeline) -> str:
     """Return which sensors told of the motion beside the scans; empty where none did."""
-    told, steps = pipeline.wheel_sources, sum(pipeline.wheel_sources.values())
+    told, steps = pipeline.front_end.wheel_sources, sum(pipeline.front_end.wheel_sources.values())
     if pipeline.odometry is not None:
         wheels = pipeline.odometry.wheels
         steps = 0 if wheels.trust.warning() else steps - wheels.stale.steps
-    if steps <= _FEWEST_TOLD * len(pipeline.records.stamps_ns):
+    if steps <= _FEWEST_TOLD * pipeline.records.scans:
         return ""
     return " and ".join(dict.fromkeys(_WITNESSES[source] for source in sorted(told)))
 

@@ -10,6 +10,7 @@ from lhdmap.messages import FloatArray
 from lhdmap.pile.moved import moved_report
 from lhdmap.pile.result import PileReport
 from lhdmap.pipeline.track import Rows, Track
+from lhdmap.smoothing.moves import Moves
 from lhdmap.smoothing.realign import AlignedScan, Realigner
 from lhdmap.smoothing.settings import SmoothingSettings
 from lhdmap.smoothing.smoother import Correction, corrected
@@ -32,7 +33,7 @@ class FinalPath:
         if self._realigner is not None:
             self._realigner.update(scan)
             if len(self._realigner.moves) > self._moves:
-                self._advance(self._realigner.moves, self._realigner.moves[-1][0])
+                self._advance(self._realigner.moves, self._realigner.moves.last_ns)
 
     def finish(self) -> None:
         """Make the whole path final."""
@@ -42,20 +43,20 @@ class FinalPath:
 
     def correction(self) -> Correction | None:
         """Return how the final path moves the odometry's, None where it does not."""
-        if self._realigner is None or not self._realigner.moves:
+        if self._realigner is None or not len(self._realigner.moves):
             return None
-        return _correction(self._realigner.moves)
+        return Correction(*self._realigner.moves.since(0), 0)
 
     def moved(self, report: PileReport) -> PileReport:
         """Return a pile that was measured on the odometry's path as it lies on the final one."""
         correction = self.correction()
         return report if correction is None else moved_report(report, partial(_motion_at, correction))
 
-    def _advance(self, moves: list[tuple[int, FloatArray]], until_ns: int) -> None:
+    def _advance(self, moves: Moves, until_ns: int) -> None:
         """Take over the odometry's poses up to a time, moved as the final nodes around them are."""
         rows = self.track.rows_after(self._used, until_ns)
-        if moves and len(rows.times_ns):
-            recent = _correction(moves[max(self._moves - 1, 0) :])
+        if len(moves) and len(rows.times_ns):
+            recent = Correction(*moves.since(max(self._moves - 1, 0)), 0)
             self.final.extend(Rows(rows.times_ns, corrected(rows.poses, rows.times_ns, recent)))
         self._used, self._moves = self._used + len(rows.times_ns), len(moves)
 
@@ -64,8 +65,3 @@ def _motion_at(correction: Correction, time_ns: int) -> FloatArray:
     at = int(np.searchsorted(correction.times_ns, time_ns))
     motion: FloatArray = correction.T_map_odom[min(at, len(correction.T_map_odom) - 1)]
     return motion
-
-
-def _correction(moves: list[tuple[int, FloatArray]]) -> Correction:
-    times, T_map_odom = zip(*moves, strict=True)
-    return Correction(np.array(times, dtype=np.int64), np.array(T_map_odom), 0)

@@ -1,8 +1,12 @@
-"""What the pipeline keeps of each scan for tables and curves: a few numbers, never the scan."""
+"""What the pipeline keeps of each scan for tables and curves: a few numbers, never the scan.
+
+They are packed: as Python objects they would take five times the memory, more than a gibibyte in a shift.
+"""
 
 from __future__ import annotations
 
 import math
+from array import array
 
 import numpy as np
 import numpy.typing as npt
@@ -11,23 +15,22 @@ from lhdmap.mapfolder import Diagnostics
 from lhdmap.messages import FloatArray
 from lhdmap.report.data import AngleSeries, SpeedSeries
 
+_MATCH, _MOTION = 6, 3  # numbers a row: residual, support, information (3), slip; both speeds, articulation
+
 
 class ScanRecords:
     """One row a scan of the front scanner (stamp, time) and one row a processed scan (diagnostics)."""
 
     def __init__(self) -> None:
-        self.stamps_ns: list[int] = []
-        self.times_ns: list[int] = []
-        self._rows: list[tuple[float, ...]] = []
-        self._processed_ns: list[int] = []
-        self._substitutes: list[str] = []
-        self._lost: list[bool] = []
-        self._curves: list[tuple[int, float, float, float]] = []
+        self._stamps_ns, self._times_ns, self._processed_ns, self._moved_ns = (array("q") for _ in range(4))
+        self._matches, self._motions = array("d"), array("d")
+        self._degenerate, self._lost = array("b"), array("b")
+        self._substitutes, self._wheels = _Words(), _Words()
 
     def add_scan(self, stamp_ns: int, time_ns: int) -> None:
         """Count a scan; `time_ns` is its stamp made rising."""
-        self.stamps_ns.append(stamp_ns)
-        self.times_ns.append(time_ns)
+        self._stamps_ns.append(stamp_ns)
+        self._times_ns.append(time_ns)
 
     def add_processed(
         self,
@@ -36,37 +39,48 @@ class ScanRecords:
         information: FloatArray,
         substitute: str,
         flags: tuple[bool, bool],
-        slip: float,
+        wheels: tuple[str, float],
     ) -> None:
-        """Add a processed scan: match as (residual m, support), information (3,), flags as (degenerate, lost), slip."""
+        """Add a processed scan: match (residual m, support), information (3,), flags (degenerate, lost), wheels (use, slip)."""
         self._processed_ns.append(stamp_ns)
-        self._rows.append((*match, *(float(v) for v in information), float(flags[0]), slip))
+        self._matches.extend((*match, *information.tolist(), wheels[1]))
         self._substitutes.append(substitute)
-        self._lost.append(flags[1])
+        self._wheels.append(wheels[0])
+        self._degenerate.append(bool(flags[0]))
+        self._lost.append(bool(flags[1]))
 
     def add_motion(
         self, time_ns: int, speed_mps: float, wheel_mps: float | None, articulation_rad: float | None
     ) -> None:
         """Add speed, wheel speed and articulation of a processed scan."""
-        nan = math.nan
-        self._curves.append(
-            (
-                time_ns,
-                speed_mps,
-                nan if wheel_mps is None else wheel_mps,
-                nan if articulation_rad is None else articulation_rad,
-            )
-        )
+        known = (speed_mps, wheel_mps, articulation_rad)
+        self._moved_ns.append(time_ns)
+        self._motions.extend(math.nan if value is None else value for value in known)
+
+    @property
+    def scans(self) -> int:
+        """Number of scans."""
+        return len(self._stamps_ns)
+
+    @property
+    def stamps_ns(self) -> npt.NDArray[np.int64]:
+        """Stamps of the scans, shape (N,); a copy."""
+        return _integers(self._stamps_ns)
+
+    @property
+    def times_ns(self) -> npt.NDArray[np.int64]:
+        """The same made rising, shape (N,); a copy."""
+        return _integers(self._times_ns)
 
     @property
     def processed(self) -> int:
         """Number of processed scans."""
-        return len(self._rows)
+        return len(self._processed_ns)
 
     @property
     def lost_stretches(self) -> int:
         """Number of runs of scans that could not be placed."""
-        lost = np.array([False, *self._lost])
+        lost = np.concatenate([[False], _flags(self._lost)])
         return int(np.count_nonzero(lost[1:] & ~lost[:-1]))
 
     @property
@@ -77,35 +91,35 @@ class ScanRecords:
     @property
     def degenerate_share(self) -> float:
         """Share of processed scans with an unobserved direction."""
-        return float(np.mean([row[5] for row in self._rows])) if self._rows else 0.0
+        return float(_flags(self._degenerate).mean()) if self.processed else 0.0
 
     def diagnostics(self) -> Diagnostics:
         """Return the table of the map folder."""
-        table = np.array(self._rows, dtype=float).reshape(-1, 7)
-        stamps = np.array(self._processed_ns, dtype=np.int64)
+        residual, support, along, across, heading, slip = _rows(self._matches, _MATCH).T
         return Diagnostics(
-            stamps,
-            table[:, 0],
-            table[:, 1],
-            table[:, 2],
-            table[:, 3],
-            table[:, 4],
-            table[:, 5] > 0.5,
-            self._substitutes,
-            table[:, 6],
+            _integers(self._processed_ns),
+            residual,
+            support,
+            along,
+            across,
+            heading,
+            _flags(self._degenerate),
+            self._substitutes.all(),
+            slip,
+            self._wheels.all(),
         )
 
     def speed(self) -> SpeedSeries | None:
         """Return the odometry's speed."""
-        return self._speed(1)
+        return self._speed(0)
 
     def tachometer(self) -> SpeedSeries | None:
         """Return the wheels' speed, or None where the log has none."""
-        return self._speed(2)
+        return self._speed(1)
 
     def articulation(self) -> AngleSeries | None:
         """Return the articulation angle, or None where the log has none."""
-        times, values = self._series(3)
+        times, values = self._series(2)
         return AngleSeries(times, values) if len(times) else None
 
     def _speed(self, column: int) -> SpeedSeries | None:
@@ -113,7 +127,34 @@ class ScanRecords:
         return SpeedSeries(times, values) if len(times) else None
 
     def _series(self, column: int) -> tuple[npt.NDArray[np.int64], FloatArray]:
-        times = np.array([row[0] for row in self._curves], dtype=np.int64)
-        values = np.array([row[column] for row in self._curves], dtype=float)
+        values = _rows(self._motions, _MOTION)[:, column]
         known = np.isfinite(values)
-        return times[known], values[known]
+        return _integers(self._moved_ns)[known], values[known]
+
+
+class _Words:
+    """Words of a small vocabulary, a byte each."""
+
+    def __init__(self) -> None:
+        self._numbers: dict[str, int] = {}
+        self._rows = array("B")
+
+    def append(self, word: str) -> None:
+        self._rows.append(self._numbers.setdefault(str(word), len(self._numbers)))
+
+    def all(self) -> list[str]:
+        words = list(self._numbers)
+        return [words[number] for number in self._rows]
+
+
+def _integers(packed: array[int]) -> npt.NDArray[np.int64]:
+    """Return a copy (N,): while an array is looked at, it cannot grow."""
+    return np.array(packed, dtype=np.int64)
+
+
+def _flags(packed: array[int]) -> npt.NDArray[np.bool_]:
+    return np.array(packed, dtype=np.int8).astype(np.bool_)
+
+
+def _rows(packed: array[float], width: int) -> FloatArray:
+    return np.array(packed, dtype=np.float64).reshape(-1, width)

@@ -28,7 +28,7 @@ def require_a_map(path: Path, records: ScanRecords, rows: Rows) -> None:
 
 def key_scans_remark(records: ScanRecords) -> list[str]:
     """Return a warning about scans that are too far apart for odometry."""
-    apart_s = float(np.median(np.diff(records.stamps_ns))) * 1e-9 if len(records.stamps_ns) > 1 else 0.0
+    apart_s = float(np.median(np.diff(records.stamps_ns))) * 1e-9 if records.scans > 1 else 0.0
     if apart_s < _KEY_SCANS_S or records.degenerate_share < _MOSTLY:
         return []
     text = f"odometry: scans come each {apart_s:.1f} s and hardly fit to each other: key scans are too far apart for odometry"
@@ -36,7 +36,7 @@ def key_scans_remark(records: ScanRecords) -> list[str]:
 
 
 def _no_map(records: ScanRecords, rows: Rows) -> str:
-    stamps = np.array(records.stamps_ns, dtype=np.int64)
+    stamps = records.stamps_ns
     if len(stamps) < 2:
         return "one scan only: no drive, no map"
     if stamps.max() - stamps.min() < len(stamps) * 1000:

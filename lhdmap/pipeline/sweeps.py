@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import Counter, deque
 from collections.abc import Callable
-from concurrent.futures import Future, ThreadPoolExecutor
+from concurrent.futures import Executor, Future, ThreadPoolExecutor
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -40,7 +40,15 @@ class _Sweep(NamedTuple):
 class SweepIntegration:
     """Holds sweeps of all scanners; `advance` integrates those that the track covers, in order."""
 
-    def __init__(self, settings: Settings, machine: Machine | None, mounts: Mounts, on_sweep: ScanSink | None) -> None:
+    def __init__(
+        self,
+        settings: Settings,
+        machine: Machine | None,
+        mounts: Mounts,
+        on_sweep: ScanSink | None,
+        worker: Executor | None = None,
+    ) -> None:
+        """Args: `worker`: what integrates, in order; a thread of its own by default."""
         bodies = machine if machine is not None else replace(Machine(), bodies={})
         self.integrator = Integrator(settings.integration, (), bodies)
         self._mounts = mounts
@@ -50,7 +58,8 @@ class SweepIntegration:
         self._points = 0
         self._without_pose: Counter[str] = Counter()
         self._without_angle = 0
-        self._worker = ThreadPoolExecutor(max_workers=1, thread_name_prefix="integration")
+        self._worker = worker or ThreadPoolExecutor(max_workers=1, thread_name_prefix="integration")
+        self._owned = worker is None
         self._pending: deque[Future[None]] = deque()
 
     def hold(self, role: str, time_ns: int, message: LaserScan | PointCloud) -> None:
@@ -94,7 +103,14 @@ class SweepIntegration:
         self._hand_over(track, wheels)
         while self._pending:
             self._pending.popleft().result()
-        self._worker.shutdown()
+        self.close()
+
+    def close(self) -> None:
+        """Let go of the worker; what it has not begun is given up. Sweeps that come after that are refused."""
+        for waiting in self._pending:
+            waiting.cancel()
+        if self._owned:
+            self._worker.shutdown()
 
     @property
     def warnings(self) -> list[str]:
@@ -120,6 +136,10 @@ class SweepIntegration:
     def cloud(self) -> Cloud:
         """Return the cloud with normals and curvature; after `finish`."""
         return self.integrator.cloud()
+
+    def forget(self) -> None:
+        """Give the memory of the map back, once it is no longer asked for."""
+        self.integrator.forget()
 
     def _add(self, sweep: _Sweep, track: Track | FinalTrack, wheels: WheelOdometry) -> None:
         frame = sweep.message.frame_id

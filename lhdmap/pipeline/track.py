@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from array import array
 from bisect import bisect_left, bisect_right
 from typing import NamedTuple
 
@@ -16,6 +17,7 @@ from lhdmap.trajectory import Trajectory
 
 Stamps = npt.NDArray[np.int64]
 _CARRY_ON_NS = 2e8
+_POSE = 6  # numbers of a pose
 _MOST_CARRIED = 3.0  # a growing track's last step goes on for up to two of its lengths
 
 
@@ -30,13 +32,12 @@ class Track:
     """Appends planar odometry and attitude to a path in space; height integrates along the attitude.
 
     A planar step is horizontal; with the machine on the floor it rises by -tan(pitch) forward and tan(roll) to the left
-    (REP 103: positive pitch points down, positive roll lifts the left side).
+    (REP 103: positive pitch points down, positive roll lifts the left side). Poses are packed: a shift has a million of them.
     """
 
     def __init__(self, height_lever_m: float = 0.0) -> None:
         self._lever_m = height_lever_m
-        self._times: list[int] = []
-        self._poses: list[tuple[float, ...]] = []
+        self._times, self._poses = array("q"), array("d")
 
     def __len__(self) -> int:
         return len(self._times)
@@ -49,14 +50,25 @@ class Track:
     @property
     def height_m(self) -> float:
         """Height of the newest pose, 0 at the start."""
-        return self._poses[-1][2] if self._poses else 0.0
+        return self.newest[2] if self._poses else 0.0
+
+    @property
+    def newest(self) -> tuple[float, ...]:
+        """The newest pose: x, y, z (m), roll, pitch, heading (rad)."""
+        return tuple(self._poses[-_POSE:])
 
     def append(self, time_ns: int, T_odom_base: FloatArray, roll_rad: float, pitch_rad: float) -> None:
         """Add a planar pose (3,) with its attitude; `time_ns` must rise."""
+        pose = self.ahead(T_odom_base, roll_rad, pitch_rad)
+        self._times.append(time_ns)
+        self._poses.extend(pose)
+
+    def ahead(self, T_odom_base: FloatArray, roll_rad: float, pitch_rad: float) -> tuple[float, ...]:
+        """Return the pose (x, y, z, roll, pitch, heading) that a planar pose (3,) with its attitude would add."""
         x, y, heading = (float(value) for value in T_odom_base)
         z = 0.0
         if self._poses:
-            x0, y0, z, roll0, pitch0, heading0 = self._poses[-1]
+            x0, y0, z, roll0, pitch0, heading0 = self.newest
             heading = heading0 + math.remainder(heading - heading0, 2.0 * math.pi)
             middle = 0.5 * (heading + heading0)
             forward = math.cos(middle) * (x - x0) + math.sin(middle) * (y - y0)
@@ -65,37 +77,39 @@ class Track:
             z += -forward * math.tan(pitch) + left * math.tan(roll) / math.cos(pitch)
             # The slope is that of the floor between the axles: base_link, at the front, is already further up or down it.
             z -= self._lever_m * (math.tan(pitch_rad) - math.tan(pitch0))
-        self._times.append(time_ns)
-        self._poses.append((x, y, z, roll_rad, pitch_rad, heading))
+        return x, y, z, roll_rad, pitch_rad, heading
 
     def extend(self, rows: Rows) -> None:
         """Add rows that are complete, height included; their times must rise."""
         self._times.extend(rows.times_ns.tolist())
-        self._poses.extend(tuple(row) for row in rows.poses.tolist())
+        self._poses.extend(rows.poses.ravel().tolist())
 
     def rows_after(self, first: int, until_ns: int) -> Rows:
         """Return the poses from row `first` on that are not later than a time."""
-        last = bisect_right(self._times, until_ns)
-        times = np.array(self._times[first:last], dtype=np.int64)
-        return Rows(times, np.array(self._poses[first:last], dtype=float).reshape(-1, 6))
+        return self._between(first, bisect_right(self._times, until_ns))
 
     def append_space(self, time_ns: int, T_odom_base: FloatArray) -> None:
         """Add a pose in space (4, 4), as a 3D odometry gives it."""
         roll, pitch, heading = se3.to_rpy(T_odom_base)
         if self._poses:
-            heading = self._poses[-1][5] + math.remainder(heading - self._poses[-1][5], 2.0 * math.pi)
+            before = self.newest[5]
+            heading = before + math.remainder(heading - before, 2.0 * math.pi)
         self._times.append(time_ns)
-        self._poses.append((*(float(v) for v in T_odom_base[:3, 3]), roll, pitch, heading))
+        self._poses.extend((*T_odom_base[:3, 3].tolist(), roll, pitch, heading))
 
     def matrices_at(self, times_ns: Stamps) -> FloatArray:
         """Return poses (N, 4, 4) near the end of the track, linear between poses and carried on after the last."""
         first = max(bisect_left(self._times, int(times_ns.min(initial=self._times[-1]))) - 1, 0)
-        times = np.array(self._times[first:], dtype=np.int64)
-        return _matrices(times, np.array(self._poses[first:], dtype=float), times_ns, _MOST_CARRIED)
+        return _matrices(*self._between(first, len(self)), times_ns, _MOST_CARRIED)
 
     def rows(self) -> Rows:
         """Return all poses as columns."""
-        return Rows(np.array(self._times, dtype=np.int64), np.array(self._poses, dtype=float).reshape(-1, 6))
+        return self._between(0, len(self))
+
+    def _between(self, first: int, last: int) -> Rows:
+        """Return the rows [first, last), copied: while an array is looked at, it cannot grow."""
+        times = np.array(self._times[first:last], dtype=np.int64)
+        return Rows(times, np.array(self._poses[_POSE * first : _POSE * last], dtype=float).reshape(-1, _POSE))
 
 
 class FinalTrack:

@@ -24,6 +24,7 @@ from lhdmap.settings import setting
 
 _SILENT_S = 1.0  # not worth a word below
 LARGEST_TILT_RAD = math.radians(60.0)
+_BEST_STD_RAD = math.radians(0.03)  # no attitude claims to be better
 JUMP_RUN = 10  # so many samples in a row at a new level are no outliers but the level
 THIRD_DIFFERENCE = math.sqrt(20.0)  # its standard deviation for white noise of one
 NOISE_EVERY = 50
@@ -51,7 +52,6 @@ class AttitudeSettings:
     jump_deg: float = setting(
         4.0, unit="deg", minimum=0.1, doc="A sample this far from the last one is an outlier, unless it lasts."
     )
-    std_floor_deg: float = setting(0.03, unit="deg", minimum=0.0, doc="No attitude claims to be better than this.")
     frozen_s: float = setting(
         5.0, unit="s", minimum=0.1, doc="A sensor that repeats one value for this long is reported."
     )
@@ -88,7 +88,7 @@ class AttitudeFilter:
         self._jump_rad = math.radians(settings.jump_deg)
         self._outliers = 0
         self._same_since_ns: int | None = None
-        self._noise_rad = math.radians(settings.std_floor_deg)
+        self._noise_rad = _BEST_STD_RAD
         self._taken = 0
         self._finished = False
         self._asked: tuple[int, int] = (0, -1)
@@ -145,6 +145,17 @@ class AttitudeFilter:
             self._silent_s = max(self._silent_s, (stamp_ns - self._held_ns) * 1e-9)
         return self._held
 
+    def causal_at(self, now_ns: int) -> Attitude | None:
+        """Return the latest attitude that the samples so far tell of, at `now_ns` or before it; None where there is none.
+
+        Not what `attitude_at` will say later: the samples lie on one side only, and the lag is not waited for.
+        """
+        newest_ns = self._samples.latest_ns
+        if newest_ns is None:
+            return None
+        delay_s = self.settings.lag_s if self.settings.lag_kind == "delay" else 0.0
+        return self._attitude(min(now_ns, newest_ns - round(delay_s * 1e9)))
+
     def texts(self) -> list[str]:
         """Return what was odd, in words."""
         silent = f"inclinometer: silent for {self._silent_s:.1f} s and more; the attitude before was kept there"
@@ -155,13 +166,13 @@ class AttitudeFilter:
         noise = float(factor[0])
         if not math.isfinite(noise):
             return None
-        std_rad = math.hypot(self._noise_rad * noise, math.radians(self.settings.std_floor_deg))
+        std_rad = math.hypot(self._noise_rad * noise, _BEST_STD_RAD)
         return Attitude(float(values[0, 0]), float(values[0, 1]), std_rad)
 
     def attitudes_at(self, stamps_ns: npt.NDArray[np.int64]) -> Attitudes:
         """Return the attitudes of `base_link` at many times, shape (N,), in any order."""
         values, factor = self._fit(np.asarray(stamps_ns, dtype=np.int64))
-        std = np.hypot(self._noise_rad * factor, math.radians(self.settings.std_floor_deg))
+        std = np.hypot(self._noise_rad * factor, _BEST_STD_RAD)
         return Attitudes(values[:, 0], values[:, 1], std, np.isfinite(factor))
 
     def _fit(self, stamps_ns: npt.NDArray[np.int64]) -> tuple[FloatArray, FloatArray]:

@@ -28,9 +28,7 @@ Source = Literal["articulated", "wheel_pose", "tachometer"]
 class WheelSettings:
     """Wheel odometry: what is believed of tachometer, articulation and dead reckoning."""
 
-    scale_std: float = setting(
-        0.02, minimum=0.0, maximum=1.0, doc="Scale error of the tachometer before it is calibrated, standard deviation."
-    )
+    scale_std: float = setting(0.02, minimum=0.0, maximum=1.0, doc="Scale error of the tachometer, standard deviation.")
     speed_std_mps: float = setting(0.03, unit="m/s", minimum=0.0, doc="Noise of the tachometer.")
     side_slip_std: float = setting(0.01, unit="m/m", minimum=0.0, doc="Sideways slip for each metre driven.")
     articulation_std_deg: float = setting(
@@ -82,7 +80,6 @@ class WheelOdometry:
     def __init__(self, settings: WheelSettings, machine: Machine) -> None:
         self.settings = settings
         self.warnings = Warnings()
-        self.scale, self.scale_std = 1.0, settings.scale_std
         size = machine.dimensions
         self._lengths = (size.joint_to_front_axle_m, size.joint_to_rear_axle_m)
         self._max_articulation_rad = math.radians(size.max_articulation_deg) + 0.2
@@ -105,10 +102,6 @@ class WheelOdometry:
         else:
             self._poses.update(message)
 
-    def calibrate(self, scale: float, scale_std: float) -> None:
-        """Set the factor from the tachometer's speed to the machine's, as `SlipEstimator` learns it."""
-        self.scale, self.scale_std = scale, scale_std
-
     def ready_until_ns(self, now_ns: int, judged_ns: int | None = None) -> int:
         """Return the latest time up to which later messages will not change a motion any more.
 
@@ -119,6 +112,12 @@ class WheelOdometry:
         limits = ((self._speeds, self._gap_ns), (self._angles, self._gap_ns), (self._poses.samples, self._pose_gap_ns))
         newest = ((samples.latest_ns, limit_ns) for samples, limit_ns in limits)
         return min((ns for ns, limit_ns in newest if ns is not None and judged_ns - ns <= limit_ns), default=now_ns)
+
+    @property
+    def heard_until_ns(self) -> int | None:
+        """Time of the newest sample, of the slower of the sensors that tell the motion; None where there are none."""
+        driven = [samples.latest_ns for samples in (self._speeds, self._angles) if samples.latest_ns is not None]
+        return min(driven) if driven else self._poses.samples.latest_ns
 
     def speed_at(self, stamp_ns: int) -> float | None:
         """Return the tachometer's speed as it was measured (m/s, not calibrated), or None where there is none."""
@@ -168,7 +167,7 @@ class WheelOdometry:
         s, (L_f, L_r) = self.settings, self._lengths
         noise_rad = math.sqrt(2.0) * math.radians(s.articulation_noise_deg) * L_r / (L_f + L_r)
         known = DriveErrors(
-            math.radians(s.articulation_std_deg), noise_rad, self.scale_std, s.speed_std_mps, s.side_slip_std
+            math.radians(s.articulation_std_deg), noise_rad, s.scale_std, s.speed_std_mps, s.side_slip_std
         )
         return known, known._replace(articulation_rad=math.radians(s.unknown_articulation_deg))
 
@@ -186,9 +185,8 @@ class WheelOdometry:
             articulation, errors = (angles.stamps_ns, angles.rows[:, 0]), self._bending
         else:
             articulation, errors = _STRAIGHT, self._straight
-        errors = errors._replace(scale=self.scale_std)
         speed = speeds.stamps_ns, speeds.rows[:, 0]
-        return Motion(*drive(speed, articulation, (start_ns, end_ns), self._lengths, self.scale, errors), source)
+        return Motion(*drive(speed, articulation, (start_ns, end_ns), self._lengths, 1.0, errors), source)
 
     def _reckoned(self, start_ns: int, end_ns: int) -> Motion | None:
         settings, step = self.settings, self._poses.step_between(start_ns, end_ns)

@@ -17,11 +17,13 @@ from typing import Any, NamedTuple, Self
 import numpy as np
 import numpy.typing as npt
 
+from lhdmap.errors import InputError
 from lhdmap.integration.cloud import Cloud
 from lhdmap.machine import Machine
 from lhdmap.mapfolder import Diagnostics
 from lhdmap.messages import Float32Array, FloatArray
 from lhdmap.names import in_utf8, shown
+from lhdmap.report.recording_end import load_quietly, write_out
 from lhdmap.report.recording_layout import RUN_CURVES, blueprint, whole_of
 from lhdmap.settings import setting
 from lhdmap.trajectory import Trajectory
@@ -81,6 +83,7 @@ class RecordingWriter:
     def __init__(self, path: Path, title: str, start_ns: int, settings: RecordingSettings | None = None) -> None:
         """Open the file in the background; `start_ns` is the stamp that counts as time zero."""
         self._settings = settings or RecordingSettings()
+        self._path, self._failed = path, False
         self._start_ns = self._end_ns = start_ns
         self._thinning = Thinning(self._settings.scan_interval_s)
         self._floor: tuple[Stamps, FloatArray] | None = None
@@ -215,7 +218,13 @@ class RecordingWriter:
         self.add_curve("scan_match/residual", stamps, 1e3 * found.residual, 0x999999FF, "residual, mm")
 
     def close(self) -> None:
-        """Add the legend and the layout of the viewer and close the file."""
+        """Add the legend and the layout of the viewer and close the file.
+
+        Raises:
+            InputError: it could not be written.
+        """
+        if self._failed:
+            return
         self._log_scans()
         if self._legend:
             words = "\n".join(["| drawn | what it is |", "| --- | --- |", *self._legend])
@@ -224,7 +233,11 @@ class RecordingWriter:
         self._stream.send_blueprint(
             blueprint(self._bounds, self._end_ns - self._start_ns, used, legend=bool(self._legend))
         )
-        self._stream.disconnect()
+        try:
+            write_out(self._stream, self._path)
+        except InputError:
+            self._failed = True
+            raise
 
     def _has(self, pattern: str) -> bool:
         """Return whether a curve of this entity, or below it (`…/**`), was recorded."""
@@ -263,9 +276,8 @@ class RecordingWriter:
 
 
 def _open(path: Path, title: str, start_ns: int) -> tuple[Any, Any]:
-    """Return the module of Rerun, and a stream into the file."""
-    import rerun as rr
-
+    """Return the module of Rerun, and a stream into the file; what goes wrong is told by `close`, in our words."""
+    rr = load_quietly()
     title = shown(title)
     stream = rr.RecordingStream(APPLICATION, recording_id=f"{title} {start_ns}")
     with in_utf8(path) as written:  # it is open from here on

@@ -101,8 +101,8 @@ def violated(machine: Rockbreaker, theta: FloatArray, sigma: float) -> Refusal:
     joint = int(np.argmax(_excess(machine, theta)))
     low, high = np.degrees(machine.theta_limits[:, joint])
     value = math.degrees(float(theta[joint]))
-    side = f"at most {high:.3f}" if value > high else f"at least {low:.3f}"
-    return Refusal(f"theta{joint + 1}", f"{value:.3f} deg, {side} deg is possible", sigma)
+    side = f"at most {high:.1f}" if value > high else f"at least {low:.1f}"
+    return Refusal(f"theta{joint + 1}", f"{value:.1f} deg, {side} deg is possible", sigma)
 
 
 def _excess(machine: Rockbreaker, theta: FloatArray) -> FloatArray:

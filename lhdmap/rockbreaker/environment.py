@@ -2,28 +2,38 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
-from lhdmap.errors import ConfigError, InputError
+from lhdmap.errors import InputError
 from lhdmap.geometry import se3
 from lhdmap.integration.cloud_io import read_cloud
 from lhdmap.messages import FloatArray
 from lhdmap.rockbreaker.collision import Obstacles
-from lhdmap.rockbreaker.machine import Rockbreaker, sub_table
-from lhdmap.settings import load_section, nearest, read_toml, setting
+from lhdmap.rockbreaker.machine import Rockbreaker
+from lhdmap.settings import REQUIRED, check_corners, setting
+from lhdmap.settings_tree import load_tree, part
 
 
 @dataclass(frozen=True, slots=True)
 class ObstacleBox:
     """A box in the base's frame."""
 
-    min_m: tuple[float, float, float] = setting((0.0, 0.0, 0.0), unit="m", doc="Lower corner (x, y, z).")
-    max_m: tuple[float, float, float] = setting((0.0, 0.0, 0.0), unit="m", doc="Upper corner (x, y, z).")
+    min_m: tuple[float, float, float] = setting(REQUIRED, unit="m", doc="Lower corner (x, y, z).")
+    max_m: tuple[float, float, float] = setting(REQUIRED, unit="m", doc="Upper corner (x, y, z).")
+
+    def __post_init__(self) -> None:
+        """Raise ConfigError where it has no inside."""
+        check_corners(self.min_m, self.max_m)
+
+
+@dataclass(frozen=True, slots=True)
+class ObstacleFile:
+    """A file of boxes."""
+
+    boxes: dict[str, ObstacleBox] = part(dict, key="box")
 
 
 def read_boxes(path: Path) -> Obstacles:
@@ -33,29 +43,13 @@ def read_boxes(path: Path) -> Obstacles:
         InputError: the file cannot be read, or holds no box.
         ConfigError: a key or value is wrong.
     """
-    table = read_toml(path, "file of boxes")
-    try:
-        boxes = _boxes(table)
-    except ConfigError as error:
-        raise ConfigError(f"{path}: {error}") from error
+    boxes = load_tree(ObstacleFile, path, "file of boxes").boxes
     if not boxes:
         raise InputError(
             f"{path}: the file holds no box: a section [box.NAME] with min_m and max_m for each was wanted"
         )
     corners = np.array([[box.min_m, box.max_m] for box in boxes.values()], dtype=float).reshape(-1, 2, 3)
     return Obstacles(corners, tuple(boxes))
-
-
-def _boxes(table: Mapping[str, Any]) -> dict[str, ObstacleBox]:
-    for key in table:
-        if key != "box":
-            raise ConfigError(f"unknown section '{key}'{nearest(key, ['box'])}")
-    given = sub_table(table, "box")
-    boxes = {name: load_section(ObstacleBox, f"box.{name}", sub_table(given, name, "box.")) for name in given}
-    for name, box in boxes.items():
-        if any(low >= high for low, high in zip(box.min_m, box.max_m, strict=True)):
-            raise ConfigError(f"box.{name}: each value of min_m must be below that of max_m")
-    return boxes
 
 
 def cloud_in_base(path: Path, machine: Rockbreaker) -> FloatArray:

@@ -6,24 +6,22 @@ Joints 1 to 4 are swing, inner boom, outer boom and breaker; cylinders 0 and 1 b
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from lhdmap.errors import ConfigError
 from lhdmap.messages import FloatArray
-from lhdmap.settings import load_section, nearest, read_toml, section_toml, setting
+from lhdmap.settings import check_corners, setting
+from lhdmap.settings_tree import load_tree, part, tree_toml
 
 PAPER = "rockbreaker_trajectories, Table 1"
 TEXT = "rockbreaker_trajectories, section 4"
 TABLE2 = "rockbreaker_trajectories, Table 2: corners of the work plane"
 ASSUMED = "assumed, typical of stationary breaker booms"
 JOINTS = ("swing", "inner_boom", "outer_boom", "breaker")
-SECTIONS = ("name", "base", "joint", "grizzly")
 _LPM = 1.0 / 60_000.0  # litres a minute in m³/s
 _SINGULAR = math.radians(1.0)  # how near to in line the two booms may come: there the arm is singular
 
@@ -114,6 +112,10 @@ class Grizzly:
         doc="Side of an opening: what does not pass is oversize.",
     )
 
+    def __post_init__(self) -> None:
+        """Raise ConfigError where it has no inside."""
+        check_corners(self.min_m, self.max_m)
+
 
 def _table1() -> tuple[Joint, ...]:
     swing = {"shortest_m": 1.07, "longest_m": 1.5, "blind_area_m2": 1.03e-2, "rod_area_m2": 7.16e-3}
@@ -129,10 +131,10 @@ def _table1() -> tuple[Joint, ...]:
 class Rockbreaker:
     """A machine: its base and its four joints; the arrays in SI units follow from them."""
 
-    name: str = "rockbreaker_table1"
-    base: Base = field(default_factory=Base)
-    joints: tuple[Joint, ...] = field(default_factory=_table1)
-    grizzly: Grizzly = field(default_factory=Grizzly)
+    name: str = setting("rockbreaker_table1", doc="Name of the machine.")
+    base: Base = part(Base)
+    joints: tuple[Joint, ...] = part(_table1, key="joint", names=JOINTS)
+    grizzly: Grizzly = part(Grizzly)
 
     def per_joint(self, name: str) -> FloatArray:
         """Return one setting of the four joints, shape (4,)."""
@@ -202,49 +204,21 @@ def load_rockbreaker(path: Path | None = None) -> Rockbreaker:
     """
     if path is None:
         return Rockbreaker()
-    table = read_toml(path, "machine file")
+    machine = load_tree(Rockbreaker, path, "machine file", Rockbreaker(path.stem))
     try:
-        return _machine(table, path.stem)
+        _check(machine)
     except ConfigError as error:
         raise ConfigError(f"{path}: {error}") from error
-
-
-def _machine(table: Mapping[str, Any], default_name: str) -> Rockbreaker:
-    for key in table:
-        if key not in SECTIONS:
-            raise ConfigError(f"unknown section '{key}'{nearest(key, SECTIONS)}")
-    given = sub_table(table, "joint")
-    for key in given:
-        if key not in JOINTS:
-            raise ConfigError(f"unknown joint '{key}'{nearest(key, JOINTS)}")
-    joints = []
-    for name, default in zip(JOINTS, _table1(), strict=True):
-        values = {one.name: getattr(default, one.name) for one in fields(Joint)} | dict(
-            sub_table(given, name, "joint.")
-        )
-        joints.append(load_section(Joint, f"joint.{name}", values))
-        _check_joint(f"joint.{name}", joints[-1])
-    machine = Rockbreaker(
-        str(table.get("name", default_name)),
-        load_section(Base, "base", sub_table(table, "base")),
-        tuple(joints),
-        load_section(Grizzly, "grizzly", sub_table(table, "grizzly")),
-    )
-    if any(low >= high for low, high in zip(machine.grizzly.min_m, machine.grizzly.max_m, strict=True)):
-        raise ConfigError("grizzly: each value of min_m must be below that of max_m")
-    low, high = machine.theta_limits
-    for name, *limits in zip(JOINTS, low, high, strict=True):
-        if limits[0] >= limits[1]:
-            raise ConfigError(f"joint.{name}: its cylinder leaves it no angle to move in")
     return machine
 
 
-def sub_table(table: Mapping[str, Any], key: str, parent: str = "") -> Mapping[str, Any]:
-    """Return the section `key` of a table, empty where it is not there; ConfigError where it is no section."""
-    values = table.get(key, {})
-    if not isinstance(values, Mapping):
-        raise ConfigError(f"{parent}{key} = {values!r}: a section [{parent}{key}] was wanted")
-    return values
+def _check(machine: Rockbreaker) -> None:
+    """Raise ConfigError where a joint cannot be mounted as stated, or cannot move."""
+    for name, joint in zip(JOINTS, machine.joints, strict=True):
+        _check_joint(f"joint.{name}", joint)
+    for name, low, high in zip(JOINTS, *machine.theta_limits, strict=True):
+        if low >= high:
+            raise ConfigError(f"joint.{name}: its cylinder leaves it no angle to move in")
 
 
 def _check_joint(name: str, joint: Joint) -> None:
@@ -253,13 +227,10 @@ def _check_joint(name: str, joint: Joint) -> None:
     if not nearest_m <= joint.shortest_m < joint.longest_m <= farthest_m + 1e-9:
         raise ConfigError(
             f"{name}: the cylinder's range {joint.shortest_m:g} to {joint.longest_m:g} m must lie between "
-            f"{nearest_m:g} and {farthest_m:g} m, what its pins allow"
+            f"{nearest_m:.3f} and {farthest_m:.3f} m, what its pins allow"
         )
 
 
 def rockbreaker_toml(machine: Rockbreaker) -> str:
     """Print `machine` as a TOML file that `load_rockbreaker` reads back, each value with meaning, unit and source."""
-    parts = [f'name = "{machine.name}"\n', section_toml("base", machine.base)]
-    parts.append(section_toml("grizzly", machine.grizzly))
-    parts += [section_toml(f"joint.{name}", joint) for name, joint in zip(JOINTS, machine.joints, strict=True)]
-    return "\n".join(parts)
+    return tree_toml(machine)

@@ -142,7 +142,8 @@ def side_drift(
     if not planar:
         floor_m = line.z_m[np.abs(line.s_m - at_m) < _FLOOR_M]
     if not len(floor_m):
-        raise UsageError(f"cross drift at {figure(at_m)} m: the drift is only {figure(float(line.s_m[-1]))} m long")
+        beyond_m = at_m - float(line.s_m[-1])
+        raise UsageError(f"a cross drift lies {figure(beyond_m)} m beyond the end of the drift; name a place on it")
     z = float(floor_m.max()) + _SILL_M
     start = Start(float(x), float(y), float(z), float(heading) + math.radians(angle_deg))
     pieces = ((length_m + 1.0, 0.0, 0.0),)

@@ -15,6 +15,7 @@ from lhdmap.errors import UsageError
 from lhdmap.geometry import se3
 from lhdmap.messages import Float32Array, FloatArray, GroundTruth, LaserScan, Mount, Record
 from lhdmap.outputs import OutputFiles
+from lhdmap.roles import recorded
 from lhdmap.simulation import sensors
 from lhdmap.simulation.pile_facts import PileTruth
 from lhdmap.simulation.pile_files import write_pile_truth
@@ -49,7 +50,7 @@ class SimulatedDrive:
 class ScannerStream(NamedTuple):
     """One scanner of the simulated machine: topic, frame, beams, rig, stamps and its own sources of chance."""
 
-    topic: str
+    role: str
     frame_id: str
     beams: Beams
     rig: Rig
@@ -143,7 +144,7 @@ def mounts(world: DriftWorld) -> Iterator[Record]:
     stamp = world.clock.start_ns
     for name, mount in world.machine.mounts.items():
         if name in used:
-            yield Record("/tf_static", stamp, Mount(stamp, mount.parent, name, mount.T_parent_sensor))
+            yield recorded("tf_static", stamp, Mount(stamp, mount.parent, name, mount.T_parent_sensor))
 
 
 def front_stamps(world: DriftWorld) -> npt.NDArray[np.int64]:
@@ -157,9 +158,7 @@ def scanner_stream(world: DriftWorld, side: str) -> ScannerStream:
     offset_s = _REAR_PHASE / settings.rate_hz if rear else 0.0
     stamps_ns = world.clock.stamps_ns(world.motion.duration_s, settings.rate_hz, offset_s)
     name = f"lidar_{side}"
-    return ScannerStream(
-        f"/lidar/{side}/scan", name, world.beams, world.rig(name), stamps_ns, (world.scenario.seed, 100 + rear)
-    )
+    return ScannerStream(side, name, world.beams, world.rig(name), stamps_ns, (world.scenario.seed, 100 + rear))
 
 
 def scans(world: DriftWorld, stream: ScannerStream) -> Iterator[Record]:
@@ -172,8 +171,8 @@ def scans(world: DriftWorld, stream: ScannerStream) -> Iterator[Record]:
         exact = obstructed(exact_ranges(world, stream, stamps_ns), world.clock.seconds(stamps_ns), settings)
         ranges = measured(exact, settings, world.dust(stamps_ns), rng)
         for stamp, row in zip(stamps_ns.tolist(), ranges, strict=True):
-            yield Record(
-                stream.topic, stamp + duration_ns, _scan(stream, settings.min_range_m, settings.max_range_m, stamp, row)
+            yield recorded(
+                stream.role, stamp + duration_ns, _scan(stream, settings.min_range_m, settings.max_range_m, stamp, row)
             )
 
 
@@ -210,4 +209,4 @@ def truth_messages(truth: Trajectory) -> Iterator[Record]:
     for stamp, position, quaternion in zip(
         truth.stamps_ns.tolist(), truth.positions_m, truth.quaternions_xyzw, strict=True
     ):
-        yield Record("/ground_truth/odometry", stamp, GroundTruth(stamp, position, quaternion))
+        yield recorded("ground_truth", stamp, GroundTruth(stamp, position, quaternion))

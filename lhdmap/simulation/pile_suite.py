@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+import multiprocessing
 import signal
-from collections.abc import Callable, Iterator
+import threading
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 from typing import NamedTuple
 
 from lhdmap.errors import ConfigError
-from lhdmap.outputs import OutputFolder
-from lhdmap.settings import load_section, nearest, read_toml, setting
+from lhdmap.runfolder import RunFolderWriter, RunInfo
+from lhdmap.settings import setting
+from lhdmap.settings_tree import load_tree, part
 from lhdmap.simulation.pile_files import row_of, write_table
 from lhdmap.simulation.pile_scenes import scene
 from lhdmap.simulation.pile_sections import VARIANTS
@@ -29,6 +32,13 @@ class SuitePart:
     first_seed: int = setting(0, minimum=0, doc="First of the seeds.")
     count: int = setting(1, minimum=1, maximum=100_000, doc="How many seeds, one after the other.")
     flat_floor: bool = setting(False, doc="Whether the floor has no waves.")
+
+
+@dataclass(frozen=True, slots=True)
+class Suite:
+    """A suite file."""
+
+    scenes: tuple[SuitePart, ...] = part(tuple)
 
 
 class SuiteScene(NamedTuple):
@@ -55,47 +65,42 @@ def load_suite(path: Path) -> list[SuiteScene]:
         InputError: the file cannot be read or is not TOML.
         ConfigError: a key or a value in it is wrong, or a scene is in it twice.
     """
-    table = read_toml(path, "suite file")
-    for key in table:
-        if key != "scenes":
-            raise ConfigError(f"{path}: unknown key '{key}'{nearest(key, ['scenes'])}")
-    parts = table.get("scenes", [])
-    if not isinstance(parts, list) or not parts:
+    parts = load_tree(Suite, path, "suite file").scenes
+    if not parts:
         raise ConfigError(f"{path}: at least one [[scenes]] was wanted")
-    try:
-        sections = [load_section(SuitePart, "scenes", part) for part in parts]
-    except ConfigError as error:
-        raise ConfigError(f"{path}: {error}") from error
-    found = [
-        SuiteScene(part.variant, part.first_seed + k, part.flat_floor) for part in sections for k in range(part.count)
-    ]
+    found = [SuiteScene(one.variant, one.first_seed + k, one.flat_floor) for one in parts for k in range(one.count)]
     if len(set(found)) < len(found):
         raise ConfigError(f"{path}: a scene is in it twice; give each [[scenes]] its own first_seed")
     return found
 
 
 def write_suite(
-    scenes: list[SuiteScene], folder: Path, *, jobs: int = 1, told: Told | None = None, force: bool = False
+    scenes: list[SuiteScene],
+    folder: Path,
+    *,
+    jobs: int = 1,
+    told: Told | None = None,
+    force: bool = False,
+    sources: Sequence[Path] = (),
 ) -> Path:
     """Write the logs of all scenes into `folder`, with their truth and the table `truth.csv`; return the table.
 
     What is in the partial folder already (from a run that was interrupted) stays. `told(name, done, of)` hears of each
-    finished scene.
+    finished scene; `sources` are the files that say which scenes.
 
     Raises:
         UsageError: the folder is there already, without `force`.
         OSError: a file cannot be written.
     """
-    with OutputFolder(folder, force=force, resumed=True) as growing:
+    with RunFolderWriter("suite", folder, force=force, inputs=sources, resumed=True) as growing:
         wanted = [one for one in scenes if not _finished(one, growing.path)]
         for done, name in enumerate(_written(wanted, growing.path, jobs), start=1):
-            growing.finished.append(name)
+            growing.finished(growing.path / f"{name}.mcap")
             if told is not None:
                 told(name, done, len(wanted))
         rows = (row_of(growing.path / f"{one.name}.pile.json", growing.path) for one in scenes)
         write_table(growing.path / TABLE, rows)
-        growing.describe("suite", {"scenes": [one.name for one in scenes]})
-        return growing.complete() / TABLE
+        return growing.complete(RunInfo(sources, more={"scenes": [one.name for one in scenes]})) / TABLE
 
 
 def _finished(one: SuiteScene, folder: Path) -> bool:
@@ -107,11 +112,24 @@ def _written(scenes: list[SuiteScene], folder: Path, jobs: int) -> Iterator[str]
         for one in scenes:
             yield _write(one, folder)
         return
-    with ProcessPoolExecutor(jobs, initializer=signal.signal, initargs=(signal.SIGINT, signal.SIG_IGN)) as pool:
+    with ProcessPoolExecutor(jobs, initializer=_obey) as pool:
         try:
             yield from pool.map(_write, scenes, [folder] * len(scenes))
         finally:
             pool.shutdown(wait=False, cancel_futures=True)
+
+
+def _obey() -> None:
+    """Leave Ctrl-C to the process that gives the orders, and end with it: nothing else would tell this one that it is gone."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    threading.Thread(target=_end_with_parent, name="parent", daemon=True).start()
+
+
+def _end_with_parent() -> None:
+    parent = multiprocessing.parent_process()
+    if parent is not None:
+        parent.join()
+        signal.raise_signal(signal.SIGKILL)
 
 
 def _write(one: SuiteScene, folder: Path) -> str:

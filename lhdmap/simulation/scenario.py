@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 from lhdmap.errors import ConfigError
-from lhdmap.settings import load_section, nearest, read_toml, section_toml
+from lhdmap.settings import figure, read_toml, setting
+from lhdmap.settings_tree import part, tree_from, tree_toml
 from lhdmap.simulation.pile_sections import MountingSettings, PileSettings
 from lhdmap.simulation.sections import (
     DriftSettings,
@@ -32,15 +33,15 @@ class DriftScenario:
     scenario of the kind 'pile': the drift ends in a pile, and the front scanner hangs as its mounting says.
     """
 
-    seed: int = 0
-    planar: bool = False
-    truth: bool = True
-    machine: str = ""
-    drift: DriftSettings = field(default_factory=DriftSettings)
-    drive: DriveSettings = field(default_factory=DriveSettings)
-    scanner: ScannerSettings = field(default_factory=ScannerSettings)
-    inclinometer: InclinometerSettings = field(default_factory=InclinometerSettings)
-    wheels: WheelSettings = field(default_factory=WheelSettings)
+    seed: int = setting(0, doc="Seed of all that is random.")
+    planar: bool = setting(False, doc="A 2D world: level scanners, a flat floor, walls alike at all heights.")
+    truth: bool = setting(True, doc="Whether the topic /ground_truth/odometry is written.")
+    machine: str = setting("", doc="Machine file; empty for the default.")
+    drift: DriftSettings = part(DriftSettings)
+    drive: DriveSettings = part(DriveSettings)
+    scanner: ScannerSettings = part(ScannerSettings)
+    inclinometer: InclinometerSettings = part(InclinometerSettings)
+    wheels: WheelSettings = part(WheelSettings)
     pile: PileSettings | None = None
     mounting: MountingSettings | None = None
 
@@ -59,8 +60,8 @@ class DriftScenario:
             raise ConfigError("planar = true: a pile needs a world with heights")
         if self.drive.distance_m > self.pile.toe_m - NEAREST_M:
             raise ConfigError(
-                f"drive.distance_m = {self.drive.distance_m:g}: the pile begins at {self.pile.toe_m:g} m, and the machine "
-                f"must stop {NEAREST_M:g} m before it"
+                f"drive.distance_m = {figure(self.drive.distance_m)}: the pile begins at {figure(self.pile.toe_m)} m, and the "
+                f"machine must stop {NEAREST_M:g} m before it"
             )
 
 
@@ -71,7 +72,7 @@ SECTIONS: dict[str, type[Any]] = {
     "inclinometer": InclinometerSettings,
     "wheels": WheelSettings,
 }
-PILE_SECTIONS: dict[str, type[Any]] = {**SECTIONS, "pile": PileSettings, "mounting": MountingSettings}
+_OF_A_PILE = ("pile", "mounting")
 
 
 def load_scenario(path: Path) -> DriftScenario:
@@ -94,39 +95,18 @@ def scenario_from(table: Mapping[str, Any]) -> DriftScenario:
     Raises:
         ConfigError: a key or a value is wrong.
     """
-    plain: dict[str, type[Any]] = {"seed": int, "planar": bool, "truth": bool, "machine": str}
     kind = table.get("scenario", "drift")
     if kind not in ("drift", "pile"):
         raise ConfigError(f"scenario = {kind!r}: 'drift' or 'pile' was wanted")
-    sections = SECTIONS if kind == "drift" else PILE_SECTIONS
-    known = ("scenario", *plain, *sections)
-    for key in table:
-        if key not in known:
-            raise ConfigError(f"unknown key '{key}'{nearest(key, known)}")
-    values: dict[str, Any] = {}
-    for key, wanted in plain.items():
-        if key in table:
-            if type(table[key]) is not wanted:
-                raise ConfigError(f"{key} = {table[key]!r}: a value of type {wanted.__name__} was wanted")
-            values[key] = table[key]
-    for key, section in sections.items():
-        values[key] = load_section(section, key, table.get(key, {}))
-    return DriftScenario(**values)
+    given = {key: value for key, value in table.items() if key != "scenario"}
+    if kind == "drift":
+        return tree_from(DriftScenario, given, without=_OF_A_PILE)
+    return tree_from(DriftScenario, {key: {} for key in _OF_A_PILE} | given)
 
 
 def scenario_toml(scenario: DriftScenario) -> str:
     """Print a scenario as a TOML file that `load_scenario` reads back, each value with meaning, unit and source."""
-    head = [
-        f'scenario = "{scenario.kind}"',
-        f"seed = {scenario.seed}",
-        f"planar = {str(scenario.planar).lower()}",
-        f"truth = {str(scenario.truth).lower()}",
-        f'machine = "{scenario.machine}"',
-    ]
-    sections = [(name, getattr(scenario, name)) for name in PILE_SECTIONS]
-    return "\n".join(
-        ["\n".join(head) + "\n", *(section_toml(name, part) for name, part in sections if part is not None)]
-    )
+    return f'scenario = "{scenario.kind}"\n{tree_toml(scenario)}'
 
 
 def flattened(scenario: DriftScenario) -> DriftScenario:

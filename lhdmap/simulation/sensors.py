@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from lhdmap.messages import FloatArray, Inclination, Joints, Pressure, Record, Tachometer, Text
+from lhdmap.roles import recorded
 from lhdmap.simulation.driving import TABLE_RATE_HZ, Motion, interpolated
 from lhdmap.simulation.sections import InclinometerSettings, WheelSettings
 
@@ -44,7 +45,7 @@ def inclinations(
     angles += np.radians([settings.bias_roll_deg, settings.bias_pitch_deg])
     angles += math.radians(settings.noise_deg) * rng.standard_normal(angles.shape)
     for stamp, (roll, pitch) in zip(stamps_ns.tolist(), angles.tolist(), strict=True):
-        yield Record("/inclinometer", stamp, Inclination(stamp, "inclinometer", roll, pitch, None, None))
+        yield recorded("inclinometer", stamp, Inclination(stamp, "inclinometer", roll, pitch, None, None))
 
 
 def lagging(angles_rad: FloatArray, settings: InclinometerSettings, time_s: FloatArray) -> FloatArray:
@@ -72,7 +73,7 @@ def joint_readings(settings: WheelSettings, motion: Motion, clock: Clock, rng: n
     ):
         positions = {"articulation": angle, "boom_lift": boom, "bucket_tilt": bucket}
         speeds = {"articulation": speed, "boom_lift": 0.0, "bucket_tilt": 0.0}
-        yield Record("/machine/joints", stamp, Joints(stamp, positions, speeds))
+        yield recorded("joints", stamp, Joints(stamp, positions, speeds))
 
 
 def tachometer_readings(
@@ -88,7 +89,7 @@ def tachometer_readings(
     moving = np.abs(speed) > 0.0
     speed = speed + settings.noise_mps * rng.standard_normal(len(time_s)) * moving
     for stamp, value in zip(stamps_ns.tolist(), speed.tolist(), strict=True):
-        yield Record("/machine/tachometer", stamp, Tachometer(stamp, value))
+        yield recorded("tachometer", stamp, Tachometer(stamp, value))
 
 
 def slip_bursts(settings: WheelSettings, duration_s: float, rng: np.random.Generator) -> list[float]:
@@ -112,10 +113,10 @@ def pressure_readings(motion: Motion, clock: Clock, rng: np.random.Generator) ->
     demand = np.maximum(direction * (acceleration + climb) + _ROLLING_RESISTANCE_MPS2 * np.abs(direction), 0.0)
     pressure = _IDLE_PA + _PER_ACCELERATION_PA * demand + 2.0e5 * rng.standard_normal(len(time_s))
     for stamp, value in zip(stamps_ns.tolist(), pressure.tolist(), strict=True):
-        yield Record("/machine/pressure/transmission", stamp, Pressure(stamp, value))
+        yield recorded("transmission_pressure", stamp, Pressure(stamp, value))
 
 
 def mode_messages(motion: Motion, clock: Clock) -> Iterator[Record]:
     """Yield the operation mode once a second: a person drives."""
     for stamp in clock.stamps_ns(motion.duration_s, 1.0).tolist():
-        yield Record("/operation/mode", stamp, Text(stamp, "manual"))
+        yield recorded("mode", stamp, Text(stamp, "manual"))

@@ -20,9 +20,11 @@ from lhdmap.scan_matching.matching import Hits, Match
 from lhdmap.scan_matching.scan_points import flattened
 from lhdmap.scan_matching.search import SearchGrid
 from lhdmap.scan_matching.submap import Submap, unsure
+from lhdmap.smoothing.places import Nearby
 from lhdmap.smoothing.settings import SmoothingSettings
 
 _SUBMAP_KEYS = 5  # keys on either side of the earlier one that make up its surroundings
+_SUBMAP_M = 20.0  # ... of travel: keys may be far apart where a place has been seen often
 _LEVEL_M, _CLIMB_DRIFT = 1.0, 0.02  # a degree of bias in pitch: levels of a mine are farther apart than that
 _CELL_M, _WINDOW_CELLS = 0.04, 512
 # One start for each heading: with more, niches that look alike cost a closure here and there (Intel: 396, not 397).
@@ -40,32 +42,41 @@ class Closure(NamedTuple):
 
 
 def find_closures(keys: list[KeyScan], settings: SmoothingSettings) -> list[Closure]:
-    """Return the closures that neighbours confirm. The cost grows with the revisits, not with the square of the drive."""
+    """Return the closures that neighbours confirm. The cost grows with the keys, not with their square."""
     places = np.array([(*key.pose, float(key.points[:, 2].mean())) for key in keys]).reshape(-1, 4)
     travelled = np.array([key.travelled_m for key in keys])
     found: list[Closure] = []
+    nearby = Nearby(places[:, :2], settings.reach_limit_m)
     for current in range(len(keys)):
-        closure = _close(keys, places, travelled, current, settings)
+        closure = _close(keys, places, travelled, nearby, current, settings)
         if closure is not None:
             found.append(closure)
     return _confirmed(found, keys, settings)
 
 
 def _close(
-    keys: list[KeyScan], places: FloatArray, travelled: FloatArray, current: int, settings: SmoothingSettings
+    keys: list[KeyScan],
+    places: FloatArray,
+    travelled: FloatArray,
+    nearby: Nearby,
+    current: int,
+    settings: SmoothingSettings,
 ) -> Closure | None:
     """Try the earlier key nearest to this one on its level; `places` (N, 4): poses and heights of the keys' hits."""
     early = int(np.searchsorted(travelled, travelled[current] - settings.apart_m))
-    if early == 0:
+    nearby.add_until(early)
+    near = nearby.around(current)
+    if not len(near):
         return None
-    distances = np.hypot(*(places[:early, :2] - places[current, :2]).T)
-    above_m = np.abs(places[:early, 3] - places[current, 3])
-    distances[above_m > _LEVEL_M + _CLIMB_DRIFT * (travelled[current] - travelled[:early])] = np.inf
-    candidate = int(distances.argmin())
+    distances = np.hypot(*(places[near, :2] - places[current, :2]).T)
+    above_m = np.abs(places[near, 3] - places[current, 3])
+    distances[above_m > _LEVEL_M + _CLIMB_DRIFT * (travelled[current] - travelled[near])] = np.inf
+    nearest = int(distances.argmin())
+    candidate = int(near[nearest])
     reach_m = min(
         settings.reach_m + settings.drift * (travelled[current] - travelled[candidate]), settings.reach_limit_m
     )
-    if distances[candidate] > reach_m:
+    if distances[nearest] > reach_m:
         return None
     predicted = se2.between(places[candidate, :3], places[current, :3])
     result = _found(keys[current], _surroundings(keys, candidate, early), predicted, reach_m)
@@ -84,7 +95,8 @@ def _surroundings(keys: list[KeyScan], centre: int, before: int) -> Submap:
     first, last = max(centre - _SUBMAP_KEYS, 0), min(centre + _SUBMAP_KEYS + 1, before)
     submap = Submap(_CELL_M, grid=_GRID, window_cells=_WINDOW_CELLS)
     for key in keys[first:last]:
-        submap.insert(flattened(key.points), se2.between(keys[centre].pose, key.pose))
+        if abs(key.travelled_m - keys[centre].travelled_m) <= _SUBMAP_M:
+            submap.insert(flattened(key.points), se2.between(keys[centre].pose, key.pose))
     return submap
 
 

@@ -1,4 +1,4 @@
-"""Key scans: what the smoother keeps of the drive, one each metre."""
+"""Key scans: what the smoother keeps of the drive, one each metre, and fewer where it has seen the place often (`places`)."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ import numpy as np
 from lhdmap.geometry import se2
 from lhdmap.messages import FloatArray
 from lhdmap.scan_matching.key_scan import NO_STEP, KeyScan
+from lhdmap.smoothing.places import Places
 from lhdmap.smoothing.settings import SmoothingSettings
 
 _SHORTEST_M, _PER_TURN = 0.1, 0.002
@@ -23,6 +24,7 @@ class KeyScans:
         self._travelled_m = 0.0
         self._last: FloatArray | None = None
         self._weak = False
+        self._places = Places(settings.key_m)
 
     def update(self, time_ns: int, pose: FloatArray, points: FloatArray, *, weak: bool) -> None:
         """Take a processed scan: pose (3,) in `odom`, hits (N, 3) in the level base frame."""
@@ -30,7 +32,7 @@ class KeyScans:
             self._travelled_m += math.hypot(pose[0] - self._last[0], pose[1] - self._last[1])
         self._last = pose.copy()
         self._weak |= weak
-        if self._due(pose) and len(points) > 0:
+        if self._due(pose) and len(points) > 0 and self._places.wants(pose, points[:, 2].mean(), self._travelled_m):
             key = KeyScan(time_ns, pose.copy(), self._travelled_m, points.astype(np.float32), self._weak, NO_STEP)
             if self.keys:
                 key = key._replace(step_covariance=walked(self.keys[-1], key, self._settings))

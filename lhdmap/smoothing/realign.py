@@ -19,6 +19,7 @@ import numpy as np
 from lhdmap.geometry import se2
 from lhdmap.messages import FloatArray
 from lhdmap.smoothing.height_pairs import Joint, wall_lines
+from lhdmap.smoothing.moves import Moves
 from lhdmap.smoothing.settings import SmoothingSettings
 from lhdmap.smoothing.window import Node, Window, solved
 
@@ -61,7 +62,7 @@ class Realigner:
         self._weak = False
         self._travelled_m = self._solved_m = 0.0
         self._last: FloatArray | None = None
-        self.moves: list[tuple[int, FloatArray]] = []
+        self.moves = Moves()
 
     def update(self, scan: AlignedScan) -> None:
         """Take a processed scan, in time order."""
@@ -126,7 +127,7 @@ class Realigner:
     def _make_final(self) -> None:
         node = self._nodes[self._final]
         T_map_odom = se2.compose(self._poses[self._final], se2.inverse(node.pose))
-        self.moves.append((node.time_ns, T_map_odom))
+        self.moves.append(node.time_ns, T_map_odom)
         self._final += 1
         while self._final > 1 and (
             node.travelled_m - self._nodes[0].travelled_m > _ANCHOR_M or self._final > _MOST_FINAL

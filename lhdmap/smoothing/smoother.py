@@ -15,6 +15,9 @@ from lhdmap.smoothing.graph import smoothed
 from lhdmap.smoothing.keys import KeyScans
 from lhdmap.smoothing.settings import SmoothingSettings
 
+_PLANAR = [0, 1, 5]  # of a pose: x, y, heading
+_BLOCK = 50_000  # poses moved at a time: what is needed on the way is ten times the poses
+
 
 class Correction(NamedTuple):
     """Planar corrections of the odometry: `T_map_odom` (N, 3) at `times_ns` (N,), and the number of closures behind them."""
@@ -51,17 +54,23 @@ def corrected(poses: FloatArray, times_ns: npt.NDArray[np.int64], correction: Co
 
     Blending the keys' moves about the origin would swing far poses: each pose is moved by both neighbours and the results mixed.
     """
+    out = poses.copy()
+    for first in range(0, len(poses), _BLOCK):
+        rows = slice(first, first + _BLOCK)
+        out[rows][:, _PLANAR] = _planar(poses[rows], times_ns[rows], correction)
+    return out
+
+
+def _planar(poses: FloatArray, times_ns: npt.NDArray[np.int64], correction: Correction) -> FloatArray:
+    """Return x, y, heading (N, 3) of the moved poses."""
     at = np.clip(np.searchsorted(correction.times_ns, times_ns, side="right") - 1, 0, len(correction.times_ns) - 1)
     after = np.minimum(at + 1, len(correction.times_ns) - 1)
     span = np.maximum((correction.times_ns[after] - correction.times_ns[at]).astype(float), 1.0)
     share = np.clip((times_ns - correction.times_ns[at]).astype(float) / span, 0.0, 1.0)[:, None]
-    planar = poses[:, [0, 1, 5]]
-    mixed = (1.0 - share) * _moved(correction.T_map_odom[at], planar) + share * _moved(
+    planar = poses[:, _PLANAR]
+    return (1.0 - share) * _moved(correction.T_map_odom[at], planar) + share * _moved(
         correction.T_map_odom[after], planar
     )
-    out = poses.copy()
-    out[:, [0, 1, 5]] = mixed
-    return out
 
 
 def _moved_keys(keys: list[KeyScan], correction: Correction) -> list[KeyScan]:

@@ -39,7 +39,7 @@ def test_the_log_alone_gives_the_pile(
     assert values["identified"]
     assert 0.0 < values["distance_at_decision_m"] < 45.0
     folder = Path(values["folder"])
-    assert {path.name for path in folder.iterdir()} == {"map.json", "pile.json", "pile.rrd", "report.html"}
+    assert {path.name for path in folder.iterdir()} == {"run.json", "pile.json", "pile.rrd", "report.html"}
     written = json.loads((folder / "pile.json").read_text(encoding="utf-8"))
     assert written == {key: value for key, value in values.items() if key != "folder"}
 

@@ -8,7 +8,8 @@ from typing import NamedTuple
 
 import pytest
 from lhdmap.cli.main import COMMANDS, main
-from lhdmap.mapfolder import MapFolderWriter, MapInfo
+from lhdmap.mapfolder import MapFolderWriter
+from lhdmap.runfolder import RunInfo
 
 from tests.cli.logs import write_room_log
 
@@ -132,7 +133,7 @@ def files(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     with MapFolderWriter(found["map"]) as folder:
         (folder.path / "inner.mcap").write_bytes(found["log"].read_bytes())
         (folder.path / "trajectory.tum").touch()
-        folder.complete(MapInfo([Path("drive.mcap")]), {Path("drive.mcap"): {"path": "drive.mcap"}})
+        folder.complete(RunInfo([Path("drive.mcap")]), {Path("drive.mcap"): {"path": "drive.mcap"}})
     found["tum"] = root / "path.tum"
     found["tum"].write_text("".join(f"{i}.0 {i}.0 0 0 0 0 0 1\n" for i in range(9)), encoding="utf-8")
     return found

@@ -72,7 +72,7 @@ def test_quiet_says_nothing_on_standard_error(log: Path, tmp_path: Path, capsys:
 @pytest.fixture
 def interrupted(tmp_path: Path) -> tuple[int, str, Path]:
     """Exit code, standard error and output folder of a long `build-map` that gets the signal of Ctrl-C."""
-    long_log = write_room_log(tmp_path / "long.mcap", 6000)
+    long_log = write_room_log(tmp_path / "long.mcap", 25000)
     command = [sys.executable, "-m", "lhdmap", "build-map", str(long_log), "-o", str(tmp_path / "map")]
     with subprocess.Popen(command, stderr=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as process:
         partial = tmp_path / "map.partial" / "recording.rrd"

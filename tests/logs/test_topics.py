@@ -5,7 +5,8 @@ from __future__ import annotations
 import pytest
 from lhdmap.errors import InputError, UsageError
 from lhdmap.logs.base import TopicInfo
-from lhdmap.logs.topics import ROLES, assign_topics, is_ground_truth, missing_scanner, roles_and_doubt
+from lhdmap.logs.topics import assign_topics, is_ground_truth, missing_scanner, roles_and_doubt
+from lhdmap.roles import ROLES
 
 SCAN, ODOMETRY, IMU = "sensor_msgs/msg/LaserScan", "nav_msgs/msg/Odometry", "sensor_msgs/msg/Imu"
 
@@ -15,8 +16,8 @@ def _log(**types: str) -> dict[str, TopicInfo]:
 
 
 def test_the_names_of_the_contract() -> None:
-    topics = {name: TopicInfo(name, kind, 5) for name, kind in ROLES.values()}
-    assert assign_topics(topics) == {role: name for role, (name, _) in ROLES.items()}
+    topics = {role.topic: TopicInfo(role.topic, role.type_name, 5) for role in ROLES.values()}
+    assert assign_topics(topics) == {name: role.topic for name, role in ROLES.items()}
 
 
 def test_a_contract_name_with_another_type_is_not_taken() -> None:

@@ -11,6 +11,7 @@ from lhdmap.messages import FloatArray
 from lhdmap.odometry.jump import jump
 from lhdmap.odometry.motion import FORWARD, TURNING, Motion
 from lhdmap.odometry.settings import OdometrySettings, SearchSettings
+from lhdmap.odometry.wheel_model import WheelModel
 from lhdmap.scan_matching.matching import Hits, Match, MatchModel, Prior
 from lhdmap.scan_matching.search import SearchGrid
 from lhdmap.scan_matching.submap import Submap
@@ -47,7 +48,7 @@ def found_from(walls: Submap, predicted: FloatArray, motion: Motion) -> tuple[Ma
     """Return the match near a prediction, and the jump from there."""
     hits, prior = Hits(room(TRUE), len(room(TRUE)), layered=False), Prior(predicted, SURE)
     near = walls.align(hits, prior)
-    return near, jump(walls, hits, near, prior, motion, SearchSettings())
+    return near, jump(walls, hits, near, prior, motion, WheelModel(OdometrySettings(), motion), SearchSettings())
 
 
 def test_a_kidnapped_machine_is_found(walls: Submap) -> None:
@@ -64,14 +65,20 @@ def test_a_pose_that_fits_is_left_alone(walls: Submap) -> None:
     assert found is None
 
 
-def wheeled(gap_s: float = 0.02) -> Motion:
-    """Return a motion whose last step wheels have measured."""
-    motion = Motion(OdometrySettings(), np.zeros(3))
+def wheeled(gap_s: float = 0.02) -> tuple[Motion, WheelModel]:
+    """Return a motion whose last step wheels have measured, and the wheels."""
+    motion, wheels = unwheeled()
     motion.predict(gap_s)
-    motion.fuse_speed(FORWARD, 0.0, 0.01, scaled=False)
-    motion.fuse_speed(TURNING, 0.0, 0.01, scaled=False)
+    wheels.gate.fuse(FORWARD, 0.0, 0.01, scaled=False)
+    wheels.gate.fuse(TURNING, 0.0, 0.01, scaled=False)
     assert motion.measured
-    return motion
+    return motion, wheels
+
+
+def unwheeled() -> tuple[Motion, WheelModel]:
+    """Return a motion of a machine without wheels."""
+    motion = Motion(OdometrySettings(), np.zeros(3))
+    return motion, WheelModel(OdometrySettings(), motion)
 
 
 def test_wheels_that_disagree_want_more_support(walls: Submap) -> None:
@@ -79,12 +86,12 @@ def test_wheels_that_disagree_want_more_support(walls: Submap) -> None:
     predicted = TRUE + np.array([0.25, -0.2, math.radians(15.0)])
     hits, prior = Hits(room(TRUE), len(room(TRUE)), layered=False), Prior(predicted, SURE)
     away, wide = walls.align(hits, prior), SearchSettings()
-    assert jump(walls, hits, away, prior, wheeled(), wide) is not None
+    assert jump(walls, hits, away, prior, *wheeled(), wide) is not None
     close = away._replace(support=0.75)  # as if a crowd hid what is wrong there
-    free = jump(walls, hits, close, prior, Motion(OdometrySettings()), wide)
+    free = jump(walls, hits, close, prior, *unwheeled(), wide)
     assert free is not None
     assert free.support > close.support
-    assert jump(walls, hits, close, prior, wheeled(), wide) is None
+    assert jump(walls, hits, close, prior, *wheeled(), wide) is None
 
 
 def test_a_jump_back_to_where_the_wheels_lead_is_cheap(walls: Submap) -> None:
@@ -93,8 +100,8 @@ def test_a_jump_back_to_where_the_wheels_lead_is_cheap(walls: Submap) -> None:
     hits, prior = Hits(room(TRUE), len(room(TRUE)), layered=False), Prior(predicted, SURE)
     close = walls.align(hits, prior)._replace(pose=predicted, support=0.82)
     wide, back = SearchSettings(), TRUE - predicted
-    assert jump(walls, hits, close, prior, wheeled(), wide) is None
-    found = jump(walls, hits, close, prior, wheeled(), wide, owed=-back)
+    assert jump(walls, hits, close, prior, *wheeled(), wide) is None
+    found = jump(walls, hits, close, prior, *wheeled(), wide, owed=-back)
     assert found is not None
     assert np.hypot(*(found.pose - TRUE)[:2]) < 0.01
 
@@ -112,7 +119,7 @@ def test_after_a_gap_all_that_the_settings_allow_is_searched(walls: Submap, gap_
 
 def test_a_velocity_that_is_distrusted_is_hardly_known() -> None:
     """Else the speed that a jump gives would carry the next pose away, and the scans could not take it back."""
-    motion = wheeled()
+    motion, _ = wheeled()
     motion.distrust_velocity(np.array([1.5, 0.0, 0.2]))
     assert motion.velocity.tolist() == [1.5, 0.0, 0.2]
     motion.predict(0.1)

@@ -12,6 +12,7 @@ from lhdmap.messages import FloatArray
 from lhdmap.odometry import motion_filter
 from lhdmap.odometry.motion import FORWARD, TURNING, Motion
 from lhdmap.odometry.settings import OdometrySettings
+from lhdmap.odometry.wheel_gate import WheelGate
 
 ACCELERATION = np.array([0.7, 0.1, 1.0])
 
@@ -96,9 +97,11 @@ def test_a_measured_way_is_kalmans(scaled: bool) -> None:
 def test_wheels_tell_where_the_machine_has_come_to_however_long_it_took(dt_s: float) -> None:
     """Their mean speed was taken for the speed at the start of the step: after 0.6 s the heading was known to 20 deg only."""
     motion = Motion(OdometrySettings())
+    gate = WheelGate(motion)
     motion.predict(dt_s)
-    assert motion.fuse_speed(FORWARD, 0.5 / dt_s, 0.01 / dt_s, scaled=True)
-    assert motion.fuse_speed(TURNING, 0.4 / dt_s, 0.02 / dt_s, scaled=False)
+    gate.waited(dt_s)
+    assert gate.fuse(FORWARD, 0.5 / dt_s, 0.01 / dt_s, scaled=True)
+    assert gate.fuse(TURNING, 0.4 / dt_s, 0.02 / dt_s, scaled=False)
     assert motion.measured
     assert np.hypot(motion.pose[0], motion.pose[1]) == pytest.approx(0.5, abs=0.03)
     assert motion.pose[2] == pytest.approx(0.4, abs=0.02)
@@ -109,14 +112,16 @@ def test_wheels_tell_where_the_machine_has_come_to_however_long_it_took(dt_s: fl
 def test_one_axis_does_not_undo_what_the_other_did() -> None:
     """Wheels that disagree for long are believed: the turn that is fused after them took the old covariance back."""
     motion = Motion(OdometrySettings(), np.array([3.0, 0.0, 0.0]))
+    gate = WheelGate(motion)
     for _ in range(40):
         motion.predict(0.04)
+        gate.waited(0.04)
         motion.correct(motion.pose, np.diag([1e6, 1e6, 1e8]))
-        if motion.fuse_speed(FORWARD, 1.0, 0.03, scaled=True):
+        if gate.fuse(FORWARD, 1.0, 0.03, scaled=True):
             break
         motion.correct(motion.pose, np.diag([1e6, 1e6, 1e8]))
     speed, variance = motion.velocity[0], motion.P[FORWARD, FORWARD]
-    motion.fuse_speed(TURNING, 0.0, 0.05, scaled=False)
+    gate.fuse(TURNING, 0.0, 0.05, scaled=False)
     assert speed == pytest.approx(1.0, abs=0.2)
     assert motion.P[FORWARD, FORWARD] == pytest.approx(variance, rel=0.05)
 
@@ -124,11 +129,13 @@ def test_one_axis_does_not_undo_what_the_other_did() -> None:
 def test_wheels_that_are_believed_against_the_motion_set_the_way_too() -> None:
     """Stamps 20 ms apart for scans of 0.6 s made 8 m/s; the wheels' word set the speed right and left the pose 5 m ahead."""
     motion = Motion(OdometrySettings(), np.array([0.3, 0.0, 0.0]))
+    gate = WheelGate(motion)
     motion.distrust_velocity(np.array([8.0, 0.0, 0.0]))
     motion.P[3:6, 3:6] = np.diag([0.3**2, 0.01, 0.01])
     motion.predict(0.64)
+    gate.waited(0.64)
     assert motion.pose[0] == pytest.approx(5.1, abs=0.1)
-    assert motion.fuse_speed(FORWARD, 0.27, 0.04, scaled=True)
+    assert gate.fuse(FORWARD, 0.27, 0.04, scaled=True)
     assert motion.pose[0] == pytest.approx(0.17, abs=0.05)
     assert motion.velocity[0] == pytest.approx(0.27, abs=0.05)
     assert motion.P[0, 0] < 0.1**2
@@ -138,32 +145,40 @@ def test_wheels_that_are_believed_against_the_motion_set_the_way_too() -> None:
 def test_wheels_that_slipped_must_agree_well_to_be_believed_again() -> None:
     """Without them the speed becomes uncertain, and wheels that still slip come within four deviations."""
     motion = Motion(OdometrySettings(), np.array([2.5, 0.0, 0.0]))
+    gate = WheelGate(motion)
     motion.P[3:6, 3:6] = np.diag([0.05**2, 0.01, 0.01])
     taken = []
     for _ in range(100):  # two seconds
         motion.predict(0.02)
-        taken.append(motion.fuse_speed(FORWARD, 3.75, 0.03, scaled=True))
+        gate.waited(0.02)
+        taken.append(gate.fuse(FORWARD, 3.75, 0.03, scaled=True))
     assert not any(taken)
     motion.predict(0.02)
-    assert motion.fuse_speed(FORWARD, 2.5, 0.03, scaled=True)
+    gate.waited(0.02)
+    assert gate.fuse(FORWARD, 2.5, 0.03, scaled=True)
     assert motion.velocity[0] == pytest.approx(2.5, abs=0.05)
 
 
 def test_wheels_with_a_scale_of_their_own_come_back_after_a_spike() -> None:
     """Compared with the speed itself, not with what such wheels show at it, they would never have agreed again."""
     motion = Motion(OdometrySettings(), np.array([3.0, 0.0, 0.0]))
+    gate = WheelGate(motion)
     motion.P[3:6, 3:6] = np.diag([0.02**2, 0.01, 0.01])
     motion.state[6], motion.P[6, 6] = 0.9, 1e-6
     motion.predict(0.02)
-    assert not motion.fuse_speed(FORWARD, 3.2, 0.03, scaled=True)
+    gate.waited(0.02)
+    assert not gate.fuse(FORWARD, 3.2, 0.03, scaled=True)
     motion.predict(0.02)
-    assert motion.fuse_speed(FORWARD, 2.7, 0.03, scaled=True)
+    gate.waited(0.02)
+    assert gate.fuse(FORWARD, 2.7, 0.03, scaled=True)
 
 
 def test_after_a_gap_what_was_not_measured_is_uncertain() -> None:
     motion = Motion(OdometrySettings(), np.array([1.0, 0.0, 0.0]))
+    gate = WheelGate(motion)
     motion.predict(5.0)
-    assert motion.fuse_speed(FORWARD, 1.0, 0.03, scaled=True)
+    gate.waited(5.0)
+    assert gate.fuse(FORWARD, 1.0, 0.03, scaled=True)
     assert motion.P[4, 4] >= 0.1
     assert motion.P[TURNING, TURNING] >= 0.5
 
@@ -211,13 +226,16 @@ def test_a_pose_update_is_bayes() -> None:
 )
 def test_the_covariance_stays_symmetric_and_positive(steps: list[tuple[str, float, float]]) -> None:
     motion = Motion(OdometrySettings())
+    gate = WheelGate(motion)
     for kind, size, value in steps:
         if kind == "p":
             motion.predict(size)
+            gate.waited(size)
         elif kind == "s":
             motion.predict(size)
-            motion.fuse_speed(FORWARD, 5.0 * value, 0.03, scaled=True)
-            motion.fuse_speed(TURNING, value, 0.03, scaled=False)
+            gate.waited(size)
+            gate.fuse(FORWARD, 5.0 * value, 0.03, scaled=True)
+            gate.fuse(TURNING, value, 0.03, scaled=False)
         else:
             motion.correct(motion.pose + 0.1 * value, 1e4 * size * np.eye(3))
             motion.forget(min(size, 1.0) * 0.9)

@@ -19,6 +19,26 @@ def test_the_first_ctrl_c_asks_and_the_second_raises() -> None:
     assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
 
 
+def test_the_program_ends_by_itself_where_it_takes_too_long(monkeypatch: pytest.MonkeyPatch) -> None:
+    heard = threading.Event()
+
+    def program(*_: object) -> None:
+        heard.set()
+
+    monkeypatch.setattr("lhdmap.pipeline.interruption._LEAST_S", 0.2)
+    monkeypatch.setattr("lhdmap.pipeline.interruption.GIVE_WAY", [program])
+    alarm, before = signal.getsignal(signal.SIGALRM), signal.signal(signal.SIGINT, program)
+    try:
+        with Interruption():
+            signal.raise_signal(signal.SIGINT)
+            assert not heard.is_set()
+            assert heard.wait(20.0)
+    finally:
+        signal.setitimer(signal.ITIMER_REAL, 0.0)
+        signal.signal(signal.SIGALRM, alarm)
+        signal.signal(signal.SIGINT, before)
+
+
 def test_a_handler_of_the_caller_stays() -> None:
     heard: list[int] = []
     before = signal.signal(signal.SIGINT, lambda number, _: heard.append(number))

@@ -89,7 +89,7 @@ def test_the_inclinometer_s_mount_may_come_after_its_first_messages(first: bool)
         pipeline.update("inclinometer", Inclination(k * 10_000_000, "imu", 0.02, 0.05, None, None))
         if not first and k == 5:
             pipeline.update("tf_static", backwards)
-    assert pipeline.attitude.roll_pitch_at(10**9) == pytest.approx((-0.02, -0.05), abs=1e-9)
+    assert pipeline.front_end.attitude.roll_pitch_at(10**9) == pytest.approx((-0.02, -0.05), abs=1e-9)
 
 
 @pytest.mark.parametrize(("joint", "is_loader"), [("articulation", True), ("wheel_left_joint", False)])
@@ -121,7 +121,7 @@ def test_a_mount_that_comes_during_the_drive_of_a_3d_scanner_leaves_the_attitude
         pipeline.update("inclinometer", Inclination(k * 10_000_000, "imu", 0.0, 0.001 * k, None, None))
         if k % 10 == 0:
             pipeline.update("points", PointCloud(k * 10_000_000, "lidar", walls, np.empty(0, np.float32)))
-    before = pipeline.attitude.roll_pitch_at(3_500_000_000)
+    before = pipeline.front_end.attitude.roll_pitch_at(3_500_000_000)
     pipeline.update("tf_static", Mount(0, "base_link", "other", np.eye(4)))
-    assert pipeline.attitude.roll_pitch_at(3_500_000_001) == pytest.approx(before, abs=1e-6)
+    assert pipeline.front_end.attitude.roll_pitch_at(3_500_000_001) == pytest.approx(before, abs=1e-6)
     assert before[1] == pytest.approx(0.35, abs=0.02)

@@ -145,17 +145,6 @@ def test_a_noisy_encoder_shows_in_the_covariance() -> None:
     assert told == pytest.approx(np.std(errors), rel=0.15)
 
 
-def test_calibration_scales_the_distance_and_its_error() -> None:
-    wheels = odometry(lambda _: 2.0, lambda _: 0.0)
-    before = wheels.motion_between(ns(1.0), ns(6.0))
-    wheels.calibrate(0.99, 0.001)
-    after = wheels.motion_between(ns(1.0), ns(6.0))
-    assert before is not None
-    assert after is not None
-    assert after.delta[0] == pytest.approx(9.9, abs=1e-6)
-    assert after.covariance[0, 0] < before.covariance[0, 0]
-
-
 def test_nothing_is_said_across_gaps_and_outside() -> None:
     wheels = WheelOdometry(WheelSettings(), MACHINE)
     for t in [*np.arange(0.0, 2.0, 0.02), *np.arange(5.0, 7.0, 0.02)]:

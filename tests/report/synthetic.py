@@ -55,7 +55,7 @@ def diagnostics(path: Trajectory, seed: int = 0) -> Diagnostics:
     slip = np.where((share > 0.3) & (share < 0.33), 0.35, 0.01) + rng.normal(0, 0.01, m)
     return Diagnostics(
         stamps, 0.01 * noise[0], np.full(m, 0.9), np.where(weak, 2e2, 4e5) * noise[0], 1e6 * noise[1], 5e6 * noise[2],
-        weak, ["wheels" if flag else "" for flag in weak], slip,
+        weak, ["wheels" if flag else "" for flag in weak], slip, ["used"] * m,
     )  # fmt: skip
 
 

@@ -9,8 +9,9 @@ import numpy as np
 import pytest
 from lhdmap import __version__
 from lhdmap.errors import InputError, LhdmapWarning
-from lhdmap.mapfolder import MapFolder, MapFolderWriter, MapInfo
+from lhdmap.mapfolder import MapFolder, MapFolderWriter
 from lhdmap.provenance import source_entry
+from lhdmap.runfolder import RunInfo
 
 from tests.report.synthetic import diagnostics, drive
 
@@ -30,7 +31,7 @@ def write(target: Path, log: Path) -> Path:
         folder.write_odometry(drive(40, scale=1.01))
         folder.write_diagnostics(diagnostics(drive(40)))
         counts = {"scans": np.int64(40), "share": float("nan")}
-        return folder.complete(MapInfo([log], {"spacing_m": 0.5}, counts, ["late scans"]))
+        return folder.complete(RunInfo([log], {"spacing_m": 0.5}, counts, ["late scans"]))
 
 
 def test_complete_folder_reads_back(tmp_path: Path, log: Path) -> None:

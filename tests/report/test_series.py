@@ -23,7 +23,7 @@ def _diagnostics(weak: slice = slice(100, 120)) -> Diagnostics:
     one, zero = np.ones(N), np.zeros(N)
     heading = np.full(N, np.degrees(1.0) ** 2)
     stamps = START_NS + 100_000_000 * np.arange(N, dtype=np.int64)
-    return Diagnostics(stamps, zero, one, along, 1e6 * one, heading, degenerate, [""] * N, 0.02 * one)
+    return Diagnostics(stamps, zero, one, along, 1e6 * one, heading, degenerate, [""] * N, 0.02 * one, ["used"] * N)
 
 
 def _data(found: Diagnostics, wheel_mps: float = 2.0) -> ReportData:

@@ -14,9 +14,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 from lhdmap.cli.main import main
+from lhdmap.cli.view import recording_of
+from lhdmap.cli.viewer import check_recording
 from lhdmap.logs.writer import LogWriter
 from lhdmap.messages import LaserScan
 from lhdmap.report.recording import RecordingWriter
+from lhdmap.runfolder import RunFolderWriter, RunInfo
 
 from tests.report.synthetic import START_NS
 
@@ -80,6 +83,74 @@ def test_a_recording_is_not_overwritten(tmp_path: Path, log: Path, capsys: pytes
     assert "exists already" in capsys.readouterr().err
 
 
+def written(path: Path) -> Path:
+    """Write a recording."""
+    with RecordingWriter(path, "r", START_NS) as writer:
+        for number in range(50):
+            writer.add_scan(START_NS + number * 1_000_000_000, np.random.default_rng(number).normal(size=(500, 3)))
+        writer.add_text("hello")
+    return path
+
+
+def broken(path: Path, how: str) -> Path:
+    """Break a recording: a share of its bytes is cut off, its start is another file's, or bytes in the middle are others."""
+    data = bytearray(written(path).read_bytes())
+    middle = len(data) // 2
+    match how:
+        case "text":
+            data = bytearray(b"hello\n")
+        case "nothing":
+            data = bytearray()
+        case "magic":
+            data = data[:4]
+        case "inside":  # not only what is drawn, but where its parts begin
+            data[64:middle] = bytes(middle - 64)
+        case "start":
+            data[:4] = b"PK12"
+        case share:
+            data = data[: int(float(share) * len(data))]
+    path.write_bytes(data)
+    return path
+
+
+@pytest.mark.parametrize("how", ["text", "nothing", "magic", "start", "inside", "0.1", "0.5", "0.9", "0.999"])
+def test_a_broken_recording_is_refused_before_a_viewer_opens(
+    how: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = broken(tmp_path / "b.rrd", how)
+    started = time.monotonic()
+    for words in (["--web"], ["--screenshot", str(tmp_path / "s.png")]):
+        assert main(["view", str(path), *words]) == 3
+        assert "b.rrd" in capsys.readouterr().err
+    assert time.monotonic() - started < 10.0
+    assert not (tmp_path / "s.png").exists()
+
+
+def test_a_whole_recording_is_not_refused(tmp_path: Path) -> None:
+    check_recording(written(tmp_path / "whole.rrd"))
+
+
+@pytest.mark.parametrize("name", ["recording.rrd", "pile.rrd", "other.rrd"])
+def test_the_recording_of_any_run_is_found(name: str, tmp_path: Path) -> None:
+    with RunFolderWriter("replay", tmp_path / "run") as folder:
+        written(folder.path / name)
+        run = folder.complete(RunInfo())
+    assert recording_of(run) == run / name
+    with RunFolderWriter("demo", tmp_path / "demo") as folder:
+        run.rename(folder.path / "inner")
+        demo = folder.complete(RunInfo(more={"map": "inner"}))
+    assert recording_of(demo) == demo / "inner" / name
+
+
+def test_a_port_that_is_taken_is_told(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    with socket.socket() as taken:
+        taken.bind(("127.0.0.1", 0))
+        taken.listen()
+        port = taken.getsockname()[1]
+        assert main(["view", str(written(tmp_path / "r.rrd")), "--web", "--port", str(port)]) == 2
+    assert f"port {port} is in use" in capsys.readouterr().err
+
+
 def test_web_serves_this_machine_only_until_interrupted(tmp_path: Path) -> None:
     with RecordingWriter(tmp_path / "r.rrd", "r", START_NS) as writer:
         writer.add_text("hello")
@@ -89,10 +160,11 @@ def test_web_serves_this_machine_only_until_interrupted(tmp_path: Path) -> None:
     with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
         assert process.stdout is not None
         line = process.stdout.readline()
-        assert f"http://127.0.0.1:{port}/?url=rerun%2Bhttp://127.0.0.1:{port + 1}/proxy" in line
+        assert line == f"http://127.0.0.1:{port}/?url=rerun%2Bhttp://127.0.0.1:{port + 1}/proxy\n"
         assert b"<!doctype html>" in page_of(port).lower()
         process.send_signal(signal.SIGINT)
         assert process.wait(timeout=20) == 4
+        assert process.stdout.read() == "", "the address is the last line"
     with pytest.raises(OSError, match="refused"):
         socket.create_connection(("127.0.0.1", port), timeout=1)
 

@@ -14,7 +14,7 @@ from lhdmap.config import Settings
 from lhdmap.geometry.se3 import from_rpy
 from lhdmap.logs.source import LogSource
 from lhdmap.messages import FloatArray
-from lhdmap.pipeline.mapping import MappingPipeline
+from lhdmap.pipeline.mapping import MappingPipeline, feed
 from lhdmap.pipeline.outcome import ROLES_READ
 from lhdmap.pipeline.track import resample
 from lhdmap.scan_matching.slant import rise_of, slants
@@ -83,9 +83,7 @@ def longer_pct(seed: int, folder: Path) -> float:
     pipeline = MappingPipeline(replace(Settings(), pile=replace(Settings().pile, method="off")), cloud=False)
     with LogSource([drive.log]) as source:
         roles = [role for role in ROLES_READ if role in source.roles and role not in ("rear", "tachometer", "joints")]
-        for role, message in source.messages(roles):
-            pipeline.update(role, message)
-    pipeline.finish()
+        feed(pipeline, source.messages(roles))
     found = resample(pipeline.track.rows(), drive.truth.stamps_ns).poses[:, :2]
     true = drive.truth.positions_m[:, :2]
     return 100.0 * (math.dist(found[0], found[-1]) / math.dist(true[0], true[-1]) - 1.0)

@@ -15,6 +15,7 @@ from lhdmap.errors import ConfigError, InputError
 from lhdmap.logs.formats import open_log
 from lhdmap.messages import LaserScan
 from lhdmap.resources import resource
+from lhdmap.runfolder import RunFolder
 from lhdmap.simulation.pile_sections import VARIANTS
 from lhdmap.simulation.pile_suite import SuiteScene, load_suite
 from lhdmap.trajectory import read_tum
@@ -91,6 +92,13 @@ def test_a_suite_goes_on_where_it_was_interrupted(
     assert "is gone on with" in told.err
     assert (tmp_path / "out" / "wall_4.mcap").stat().st_ino == before
     assert (tmp_path / "out" / "truth.csv").read_bytes() == (folder / "truth.csv").read_bytes()
+
+
+def test_the_folder_says_which_file_it_was_made_of(folder: Path) -> None:
+    run = RunFolder.open(folder, ["suite"])
+    assert [one["path"] for one in run.info["sources"]] == [str(folder.parent / "two.toml")]
+    assert {"truth.csv", "wall_4.mcap", "wall_4.pile.json"} <= set(run.info["files"])
+    assert (run.info["scenes"], run.changed_files()) == (["wall_4", "post_0"], [])
 
 
 def test_a_suite_that_is_there_is_refused(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -64,8 +64,8 @@ def test_the_command_writes_log_truth_scenario_and_mesh(
     assert result["distance_m"] == pytest.approx(2.0, abs=0.01)
     for name in ("log", "truth", "scenario", "mesh"):
         assert (tmp_path / result[name]).stat().st_size > 0
-    assert main(["simulate", "drift", "--seed", "3", "--json", *QUICK]) == 0
-    assert json.loads(capsys.readouterr().out)["log"] == "drift_seed3_2.mcap"
+    assert main(["simulate", "drift", "--seed", "3", "--json", *QUICK]) == 2
+    assert "drift_seed3.mcap: exists already" in json.loads(capsys.readouterr().out)["error"]["message"]
 
 
 def test_options_go_over_the_scenario_file(tmp_path: Path) -> None:

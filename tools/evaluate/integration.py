@@ -21,7 +21,7 @@ from lhdmap.geometry import se3
 from lhdmap.logs.source import LogSource
 from lhdmap.machine import Machine
 from lhdmap.messages import FloatArray
-from lhdmap.pipeline.mapping import MappingPipeline
+from lhdmap.pipeline.mapping import MappingPipeline, feed
 from lhdmap.pipeline.outcome import ROLES_READ, Inputs, integrate_again
 from lhdmap.pipeline.track import Rows, resample, trajectory_of
 from lhdmap.simulation.drive import SimulatedDrive, simulate_drift
@@ -62,7 +62,7 @@ def measure(seed: int, distance_m: float) -> dict[str, FloatArray]:
         )
         assert drive.mesh_file is not None
         pipeline = mapped(drive.log)
-        times = np.array(pipeline.records.times_ns, dtype=np.int64)
+        times = pipeline.records.times_ns
         own = trajectory_of(resample(pipeline.path.final.rows(), times), times)
         cloud = pipeline.sweeps.cloud()
         inputs = Inputs([drive.log], Settings(), {}, "", poses="ground-truth")
@@ -79,10 +79,7 @@ def mapped(log: Path) -> MappingPipeline:
     """Run the pipeline over a log."""
     pipeline = MappingPipeline(Settings(), Machine())
     with LogSource([log]) as source:
-        for role, message in source.messages([role for role in ROLES_READ if role in source.roles]):
-            pipeline.update(role, message)
-    pipeline.finish()
-    return pipeline
+        return feed(pipeline, source.messages([role for role in ROLES_READ if role in source.roles]))
 
 
 def rows_of(trajectory: Trajectory) -> Rows:

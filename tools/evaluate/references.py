@@ -14,7 +14,7 @@ from lhdmap.evaluation.sources import read_corrected_carmen
 from lhdmap.geometry import se2, se3
 from lhdmap.logs.source import LogSource
 from lhdmap.messages import FloatArray, LaserScan, WheelPose
-from lhdmap.pipeline.mapping import MappingPipeline
+from lhdmap.pipeline.mapping import MappingPipeline, feed
 from lhdmap.pipeline.track import Rows, resample, trajectory_of
 from lhdmap.trajectory import Trajectory
 
@@ -68,12 +68,11 @@ def scans_alone(log: Path) -> Trajectory:
     """Return the trajectory of the pipeline that is not shown the wheels; nothing is integrated."""
     pipeline = MappingPipeline(load_settings())
     with LogSource([log]) as source:
-        for role, message in source.messages([r for r in ("front", "inclinometer", "tf_static") if r in source.roles]):
-            pipeline.update(role, message)
-        pipeline.finish()
+        wanted = [role for role in ("front", "inclinometer", "tf_static") if role in source.roles]
+        feed(pipeline, source.messages(wanted))
     records = pipeline.records
-    rows = resample(pipeline.track.rows(), np.array(records.times_ns, dtype=np.int64))
-    return trajectory_of(rows, np.array(records.stamps_ns, dtype=np.int64))
+    rows = resample(pipeline.track.rows(), records.times_ns)
+    return trajectory_of(rows, records.stamps_ns)
 
 
 def wheels_alone(log: Path) -> Trajectory | None:

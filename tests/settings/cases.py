@@ -1,0 +1,172 @@
+"""For each setting: the scenario in which it acts, and a changed value where half as much again would not do."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+from lhdmap.config import Settings
+
+
+@dataclass(frozen=True, slots=True)
+class Case:
+    """Where a setting acts: the probe, settings that must be so for it to act, and the value that it is changed to."""
+
+    probe: str
+    value: Any = None
+    base: Mapping[str, Any] = field(default_factory=dict)
+
+
+_FLOW = {"odometry.method": "range_flow"}
+_KISS = {"cloud_odometry.method": "kiss_icp"}
+_FOUND = {  # with which Fig. 9 finds the pile
+    "figure9.curvature_min": 0.0,
+    "figure9.axes": "drift",
+    "figure9.roughness": "steepness",
+    "figure9.neighbours_in": "cloud",
+    "figure9.neighbours_min": 40,
+    "figure9.waits": True,
+    "pile.method": "figure9",
+}
+_SECTIONS = {
+    "odometry": Case("tilted"),
+    "anchor": Case("tilted"),
+    "search": Case("jump"),
+    "range_flow": Case("level", base=_FLOW),
+    "cloud_odometry": Case("clouds"),
+    "attitude": Case("tilted"),
+    "wheels": Case("tilted"),
+    "slip": Case("tilted"),
+    "integration": Case("tilted"),
+    "smoothing": Case("lap"),
+    "pile": Case("pile"),
+    "figure9": Case("pile", base=_FOUND),
+    "figure9_repaired": Case("pile", base={"pile.method": "figure9_repaired"}),
+    "recording": Case("recording"),
+    "rockbreaker": Case("plan"),
+}
+
+
+_WITH_FLOOR = {"neighbours_min": 0, "slope_from": "normals", "cluster_gap_m": 0.0}
+
+
+def _figure9(section: str, found: Mapping[str, Any]) -> dict[str, Case]:
+    """Return the cases of the constants of Fig. 9, which are in two sections."""
+    rough = {**found, f"{section}.roughness": "curvature", f"{section}.curvature_min": 0.0}
+    with_floor = {**rough, **{f"{section}.{key}": value for key, value in _WITH_FLOOR.items()}}
+    steep = {**found, f"{section}.steep_deg": 20.0}
+    values = {
+        "view_height_m": Case("pile", 0.0, with_floor),
+        "curvature_min": Case("pile", 1e-4, rough),
+        "curvature_max": Case("pile", 1e-4, rough),
+        "cluster_gap_m": Case("pile", 0.15, found),
+        "bound_share": Case("pile", 0.1, found),
+        "points_min": Case("pile", 1000, found),
+        "slope_radius_m": Case("pile", 0.5, {**found, f"{section}.slope_from": "normals"}),
+        "shallow_deg": Case("pile", 40.0, found),
+        "steep_deg": Case("pile", 20.0, found),
+        "wall_deg": Case("pile", 25.0, steep),
+        "overhang_deg": Case("pile", 26.0, {**steep, f"{section}.wall_deg": 25.0}),
+    }
+    return {f"{section}.{key}": case for key, case in values.items()}
+
+
+_WAITS = {"cloud_odometry.step_m": 5.0, "cloud_odometry.step_deg": 50.0, "cloud_odometry.step_s": 60.0}
+_SETTINGS = {
+    "odometry.max_beams": Case("tilted", 100),
+    "odometry.max_rear_beams": Case("tilted", 65),
+    "odometry.step_deg": Case("tilted", 0.05),
+    "odometry.weak_sigma_m": Case("smooth"),
+    "odometry.weak_ratio": Case("smooth"),
+    "odometry.blind_sigma_m": Case("smooth", 0.001),
+    "odometry.weak_inflation": Case("smooth"),
+    "odometry.weak_sigma_deg": Case("tilted", 0.05),
+    "anchor.insert_deg": Case("tilted", 0.1, {"anchor.insert_m": 5.0}),
+    "anchor.hit_limit": Case("tilted", 5.0),
+    "anchor.rounds": Case("tilted", 1),
+    "anchor.min_support": Case("jump", 0.9),
+    "search.reach_m": Case("jump", 0.1),
+    "search.turn_deg": Case("jump", 5.0),
+    "range_flow.spacing_deg": Case("level", 2.0, _FLOW),
+    "range_flow.min_support": Case("jump", 0.9, _FLOW),
+    "range_flow.levels": Case("jump", 2, _FLOW),
+    "range_flow.iterations": Case("level", 1, _FLOW),
+    "cloud_odometry.kiss_voxel_m": Case("clouds", base=_KISS),
+    "cloud_odometry.min_range_m": Case("clouds", 3.0),
+    "cloud_odometry.max_range_m": Case("clouds", 8.0),
+    "cloud_odometry.insert_deg": Case("clouds", 0.1, {"cloud_odometry.insert_m": 5.0}),
+    "cloud_odometry.window_m": Case(
+        "returning", 5.0, {"cloud_odometry.max_range_m": 4.0, "cloud_odometry.insert_m": 0.5}
+    ),
+    "cloud_odometry.step_m": Case("clouds", 1.0),
+    "cloud_odometry.step_deg": Case("clouds", 0.05, _WAITS),
+    "cloud_odometry.step_s": Case("clouds", 0.2, _WAITS),
+    "cloud_odometry.weak_sigma_m": Case("clouds", 0.005),
+    "cloud_odometry.weak_sigma_deg": Case("clouds", 0.001),
+    "cloud_odometry.min_support": Case("clouds", 0.95),
+    "cloud_odometry.max_speed_mps": Case("clouds", 0.5),
+    "cloud_odometry.reach_m": Case("cut", 0.0, {"cloud_odometry.voxel_m": 0.2}),
+    "attitude.max_gap_s": Case("faulty"),
+    "attitude.jump_deg": Case("faulty"),
+    "attitude.frozen_s": Case("faulty", 0.3),
+    "attitude.keep_s": Case("rare", 1.0),
+    "wheels.unknown_articulation_deg": Case("clouds"),
+    "wheels.pose_distance_std": Case("poses"),
+    "wheels.pose_turn_std": Case("poses"),
+    "wheels.pose_drift_deg": Case("poses"),
+    "wheels.pose_time_std_s": Case("poses"),
+    "wheels.max_gap_s": Case("faulty"),
+    "wheels.max_hold_s": Case("faulty"),
+    "wheels.max_speed_mps": Case("faulty"),
+    "wheels.max_jump_m": Case("poses", 3.0),
+    "wheels.max_pose_gap_s": Case("poses", 1.0),
+    "wheels.keep_s": Case("rare", 1.0),
+    "slip.window_s": Case("tilted", 1.0),
+    "integration.range_min_m": Case("tilted", 3.0),
+    "integration.range_max_m": Case("tilted", 5.0),
+    "integration.min_hits": Case("tilted", 8),
+    "smoothing.realign": Case("tilted"),
+    "smoothing.node_m": Case("tilted"),
+    "smoothing.lag_m": Case("tilted", 2.0),
+    "smoothing.lag_s": Case("tilted", 1.0),
+    "smoothing.key_deg": Case("lap", 100.0, {"smoothing.key_m": 3.0}),
+    "smoothing.apart_m": Case("lap", 70.0),
+    "smoothing.reach_limit_m": Case("lap", 0.5),
+    "smoothing.max_sigma_m": Case("lap", 0.001),
+    "smoothing.agree_m": Case("lap", 0.01),
+    "smoothing.agree_deg": Case("lap", 0.1),
+    "pile.reach_m": Case("pile", 15.0),
+    "pile.deadline_m": Case("pile", 20.0),
+    "pile.sure": Case("pile", 0.9),
+    "pile.likely": Case("pile", 0.99),
+    "rockbreaker.clearance_m": Case("rock"),
+    **_figure9("figure9", _FOUND),
+    **_figure9("figure9_repaired", {"pile.method": "figure9_repaired"}),
+}
+
+
+def case_of(name: str) -> Case:
+    """Return the case of a setting, with the value that it is changed to."""
+    case = _SETTINGS.get(name, _SECTIONS[name.partition(".")[0]])
+    if case.value is None:
+        return dataclasses.replace(case, value=_changed(name, case.base))
+    return case
+
+
+def _changed(name: str, base: Mapping[str, Any]) -> Any:
+    """Return another value within the bounds of a setting: half as much again, the other choice, or not so."""
+    section, _, key = name.partition(".")
+    kind = type(getattr(Settings(), section))
+    found = next(one for one in dataclasses.fields(kind) if one.name == key)
+    value, meta = base.get(name, found.default), found.metadata
+    if isinstance(value, bool):
+        return not value
+    if isinstance(value, str):
+        return next(choice for choice in meta["choices"] if choice != value)
+    if isinstance(value, tuple):
+        return tuple(1.5 * one for one in value)
+    most = meta["maximum"]
+    more = value + max(value // 2, 1) if isinstance(value, int) else 1.5 * value
+    return more if most is None or more <= most else type(value)(0.5 * value)

@@ -1,0 +1,196 @@
+"""What a user gets out of a short run, as one digest: a probe for each part of the settings.
+
+A probe takes settings and runs the same small scenario with them. Two runs with the same settings give the same digest.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import tempfile
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, fields, is_dataclass
+from functools import partial
+from pathlib import Path
+from typing import Any, Literal, cast
+
+import numpy as np
+from lhdmap.cli.main import main
+from lhdmap.config import Settings, settings_toml
+from lhdmap.integration.cloud import Cloud
+from lhdmap.integration.cloud_io import write_cloud
+from lhdmap.machine import Machine
+from lhdmap.messages import FloatArray
+from lhdmap.odometry.cloud_odometry import CloudStep
+from lhdmap.odometry.steps import OdometryStep
+from lhdmap.pile.stage import ScanHits
+from lhdmap.pipeline.inspection import Inspection
+from lhdmap.pipeline.mapping import MappingPipeline
+from lhdmap.pipeline.pile import PileWatch, PlacedScan
+from lhdmap.rockbreaker.machine import Rockbreaker
+from lhdmap.simulation.grizzly import simulate_grizzly
+
+from tests.report.synthetic import START_NS, report_data
+from tests.report.test_recording import read
+from tests.settings import streams
+from tests.settings.streams import Stream
+
+Probe = Callable[[Settings], str]
+
+
+def digest(*parts: Any) -> str:
+    """Return a digest of arrays, texts, numbers and whatever is made of them."""
+    into = hashlib.sha256()
+    _feed(into, parts)
+    return into.hexdigest()
+
+
+def _feed(into: Any, part: Any) -> None:
+    if isinstance(part, np.ndarray):
+        into.update(f"{part.dtype}{part.shape}".encode())
+        into.update(np.ascontiguousarray(part).tobytes())
+    elif is_dataclass(part) and not isinstance(part, type):
+        _feed(into, [getattr(part, field.name) for field in fields(part)])
+    elif isinstance(part, dict):
+        _feed(into, list(part.items()))
+    elif isinstance(part, Iterable) and not isinstance(part, str):
+        for one in part:
+            _feed(into, one)
+    else:
+        into.update(repr(part).encode())
+
+
+class _Watched(MappingPipeline):
+    """The pipeline, with the covariances that a program on the machine gets with each step."""
+
+    def __init__(self, settings: Settings, primary: Literal["front", "points"], machine: Machine | None) -> None:
+        super().__init__(settings, machine, primary=primary)
+        self.covariances: list[FloatArray] = []
+
+    def _record(self, stamp_ns: int, time_ns: int, step: OdometryStep | CloudStep) -> None:
+        self.covariances.append(step.covariance)
+        super()._record(stamp_ns, time_ns, step)
+
+
+def run(settings: Settings, stream: Stream, primary: Literal["front", "points"] = "front", *, own: bool = False) -> str:
+    """Return the digest of a map: paths, diagnostics, curves, cloud, warnings; `own`: hits on the machine's bodies occur."""
+    pipeline = _Watched(settings, primary, Machine() if own else None)
+    for role, message in stream:
+        pipeline.update(role, message)
+    pipeline.finish()
+    records = pipeline.records
+    return digest(
+        pipeline.track.rows(),
+        pipeline.path.final.rows(),
+        records.diagnostics(),
+        records.stamps_ns,
+        records.speed(),
+        records.tachometer(),
+        records.articulation(),
+        pipeline.covariances,
+        pipeline.sweeps.cloud(),
+        pipeline.warnings,
+        pipeline.sweeps.warnings,
+    )
+
+
+def lap(settings: Settings) -> str:
+    """Return the digest of the smoother's corrections after a lap and a quarter around a pillar, scans each half metre."""
+    stage = MappingPipeline(settings).smoother
+    for key in streams.lap_scans():
+        stage.keys.update(key.time_ns, key.pose, key.points.astype(np.float64), weak=key.weak)
+    return digest(stage.correction())
+
+
+def pile(settings: Settings) -> str:
+    """Return the digest of `pile.json`, and of the distances of all estimates, after a drive towards a pile."""
+    watch = PileWatch(settings)
+    for scan in streams.towards_a_pile():
+        watch.update(cast("PlacedScan", _Hits(scan)))
+    report = watch.report()
+    return digest(report.to_json(), [one.distance_m for one in report.history])
+
+
+@dataclass(frozen=True, slots=True)
+class _Hits:
+    """A placed scan whose hits are known."""
+
+    known: ScanHits
+
+    def hits(self) -> ScanHits:
+        return self.known
+
+
+def recording(settings: Settings) -> str:
+    """Return the digest of a Rerun recording, read back: what is drawn, and when."""
+    with tempfile.TemporaryDirectory() as folder:
+        inspection = Inspection(Path(folder), "drive", START_NS, settings)
+        for number in range(20):
+            inspection.record(START_NS + number * 200_000_000, np.ones((7, 3)), "front")
+        inspection.write(report_data(scans=60, points=400), Machine())
+        inspection.close()
+        return digest(*(_drawn(batches) for _, batches in sorted(read(Path(folder) / "recording.rrd").items())))
+
+
+def _drawn(batches: list[Any]) -> list[Any]:
+    """Return the columns of an entity, less those that tell when the file was made."""
+    names = [name for name in batches[0].schema.names if not name.startswith(("rerun.", "log_t", "RecordingInfo"))]
+    return [
+        [name, *(str(batch.column(name).to_pylist()) for batch in batches if name in batch.schema.names)]
+        for name in names
+    ]
+
+
+def plan(settings: Settings) -> str:
+    """Return the digest of the plan and table of a rockbreaker whose orientation has to be shifted on the way."""
+    ends = ["--from", "2.2,2.15,-1", "--to", "2.2,-2.15,-1", "--phi-from", "270", "--phi-to", "270", "--path", "cslm"]
+    return _planned(settings, ends)
+
+
+def rock(settings: Settings) -> str:
+    """Return the digest of the plan to the largest rock on a grizzly."""
+    with tempfile.TemporaryDirectory() as folder:
+        cloud = Path(folder) / "grizzly.ply"
+        write_cloud(cloud, Cloud(simulate_grizzly(Rockbreaker(), 3).points_m.astype(np.float32)))
+        return _planned(settings, ["--cloud", str(cloud)])
+
+
+def _planned(settings: Settings, words: list[str]) -> str:
+    with tempfile.TemporaryDirectory() as folder:
+        file, target = Path(folder) / "settings.toml", Path(folder) / "plan"
+        file.write_text(settings_toml(settings, ["rockbreaker"]), encoding="utf-8")
+        command = ["rockbreaker", "plan", *words, "--config", str(file), "--no-pictures", "--quiet", "-o", str(target)]
+        assert main(command) == 0
+        values = json.loads((target / "plan.json").read_text(encoding="utf-8"))
+        return digest(_untimed(values), (target / "trajectory.csv").read_text(encoding="utf-8"))
+
+
+def _untimed(values: Any) -> Any:
+    """Return values without how long the planning took."""
+    if isinstance(values, dict):
+        return {key: _untimed(value) for key, value in values.items() if key != "planning_ms"}
+    return [_untimed(value) for value in values] if isinstance(values, list) else values
+
+
+def _mapped(stream: Callable[[], Stream], primary: Literal["front", "points"] = "front", *, own: bool = False) -> Probe:
+    return lambda settings: run(settings, stream(), primary, own=own)
+
+
+PROBES: dict[str, Probe] = {
+    "tilted": _mapped(streams.tilted, own=True),
+    "faulty": _mapped(streams.faulty, own=True),
+    "rare": _mapped(streams.rare, own=True),
+    "level": _mapped(streams.planar),
+    "smooth": _mapped(partial(streams.planar, 0.005)),
+    "tachometer": _mapped(partial(streams.planar, wheels="tachometer")),
+    "poses": _mapped(partial(streams.planar, wheels="poses")),
+    "jump": _mapped(partial(streams.planar, wheels="none", jumps=True)),
+    "clouds": _mapped(streams.clouds, "points"),
+    "returning": _mapped(streams.returning, "points"),
+    "cut": _mapped(streams.cut, "points"),
+    "lap": lap,
+    "pile": pile,
+    "recording": recording,
+    "plan": plan,
+    "rock": rock,
+}
