@@ -58,6 +58,7 @@ def read_laz(path: Path) -> Cloud:
     data = path.read_bytes()
     if not data.startswith(b"LASF"):
         raise InputError(f"{path}: no LAS or LAZ file (it does not begin with 'LASF')")
+    _check_records(path, data)
     try:
         with laspy.open(io.BytesIO(data)) as reader:
             parts = _parts(path, reader, len(data))
@@ -72,6 +73,19 @@ def read_laz(path: Path) -> Cloud:
             f"{path}: the LAS or LAZ file is cut off or damaged: {error or type(error).__name__}"
         ) from None
     return _cloud(path, parts)
+
+
+def _check_records(path: Path, data: bytes) -> None:
+    """Refuse a header that promises more records than the file bears: laspy would read them one by one, without end.
+
+    LAS 1.4 R15, Table 3: the number of variable-length records at byte 100 (54 bytes each at least), that of extended ones at
+    byte 243 (60 bytes each at least).
+    """
+    is_14 = data[24:26] == b"\x01\x04"
+    for start, least_bytes in ((100, 54), *(((243, 60),) if is_14 else ())):
+        count = int.from_bytes(data[start : start + 4], "little")
+        if count * least_bytes > len(data):
+            raise InputError(f"{path}: damaged: the header promises {count} records, the file has {len(data)} bytes")
 
 
 def _parts(path: Path, reader: LasReader, room: int) -> list[dict[str, np.ndarray]]:

@@ -43,7 +43,7 @@ def jump(
         owed: by how much jumps a moment ago left the motion (3,): wheels speak against staying there, and for the way back.
     """
     best = near
-    for found in submap.locate(hits, prior, _reach(motion, s)):
+    for found in submap.candidates(hits, prior, _reach(motion, s)):
         dissent = _dissent(found, prior, wheels, owed) - _dissent(best, prior, wheels, owed)
         if found.support > best.support + _GAIN + dissent / _NATS_PER_SUPPORT:
             best = found

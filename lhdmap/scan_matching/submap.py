@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from typing import Self
 
 import numpy as np
@@ -19,8 +18,6 @@ _PLAIN_GRID = SearchGrid()
 _WINDOW_CELLS, _HIT_LIMIT = 2048, 50.0
 _HARDLY_HELD = np.diag([1e-2, 1e-2, 1e-1])  # 10 m and 3 rad
 _WEAKER = 0.01
-_SAME_M, _SAME_RAD = 0.01, math.radians(0.2)  # what settles at one place ends nearer than that
-_CLEARLY = 0.02  # more support: a match that ended better, not one that ended a hair away
 
 
 class Submap:
@@ -88,8 +85,8 @@ class Submap:
     def locate(self, hits: Hits, predicted: Prior, reach: FloatArray) -> list[Match]:
         """Return where a scan may be, best first, by the share of its hits that agree; none where nothing is like it.
 
-        Each match is at a place of its own; one that did not settle may stand centimetres beside one that did. Whether the first
-        is good enough, and better enough than the second, is the caller's to say.
+        Each match is at a place of its own. Whether the first is good enough, and better enough than the second, is the caller's
+        to say.
 
         Args:
             hits: the scan; the search uses the front scanner's hits.
@@ -97,14 +94,29 @@ class Submap:
                 matches start from, and holds a match where walls do not; it does not hold it back elsewhere.
             reach: how far from there matches start, metres and radians, shape (2,); one may end a little beyond.
         """
+        kept: list[Match] = []
+        for one in sorted(self.candidates(hits, predicted, reach), key=lambda one: one.support, reverse=True):
+            if one.support > 0.0 and not any(self._same(one, better) for better in kept):
+                kept.append(one)
+        return kept
+
+    def candidates(self, hits: Hits, predicted: Prior, reach: FloatArray) -> list[Match]:
+        """Return the matches from all starts that the search finds, the likeliest start first; several may end at one place.
+
+        For those who judge by more than support; arguments as for `locate`.
+        """
         points = hits.points[: hits.front]
         if not len(points) or not self._seen:
             return []
         thin = points[:: max(len(points) // self._grid.beams, 1)]
         starts = search(np.concatenate(self._seen), thin, predicted.pose, predicted.information, reach, self._grid)
         held = weakened(predicted)
-        found = _distinct([self.align(hits, held, start) for start in starts])
-        return sorted(found, key=lambda one: one.support, reverse=True)
+        return [self.align(hits, held, start) for start in starts]
+
+    def _same(self, a: Match, b: Match) -> bool:
+        """Return whether the search cannot tell two places apart."""
+        apart = se2.between(a.pose, b.pose)
+        return bool(np.hypot(apart[0], apart[1]) < self._grid.cell_m and abs(apart[2]) < self._grid.step_rad)
 
 
 def unsure(pose: FloatArray) -> Prior:
@@ -115,18 +127,3 @@ def unsure(pose: FloatArray) -> Prior:
 def weakened(prior: Prior) -> Prior:
     """Return a prior that holds a match back only where the scan says nothing."""
     return Prior(prior.pose, _WEAKER * prior.information)
-
-
-def _distinct(matches: list[Match]) -> list[Match]:
-    """Return one match for each place: that from the likeliest start, or a clearly better one; none without support."""
-    kept: list[Match] = []
-    for one in matches:
-        place = next((k for k, other in enumerate(kept) if _same(one, other)), len(kept))
-        if one.support > (kept[place].support + _CLEARLY if place < len(kept) else 0.0):
-            kept[place : place + 1] = [one]
-    return kept
-
-
-def _same(a: Match, b: Match) -> bool:
-    apart = se2.between(a.pose, b.pose)
-    return bool(np.hypot(apart[0], apart[1]) < _SAME_M and abs(apart[2]) < _SAME_RAD)

@@ -48,7 +48,7 @@ class SmoothingSettings:
         minimum=0.001,
     )
     agree_m: float = setting(0.3, unit="m", doc="Closures in a row must agree to this.", minimum=0.01)
-    agree_deg: float = setting(3.0, unit="deg", doc="... and to this.", minimum=0.1)
+    agree_deg: float = setting(3.0, unit="deg", doc="... and to this.", minimum=0.01)
     along_sigma: float = setting(
         0.002,
         unit="m/sqrt(m)",

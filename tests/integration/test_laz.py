@@ -84,6 +84,19 @@ def test_damage_ends_in_a_clear_error(suffix: str, tmp_path: Path, data: st.Data
 
 
 @pytest.mark.parametrize("suffix", [".las", ".laz"])
+@pytest.mark.parametrize("at", [103, 246])
+def test_records_that_are_only_promised_are_refused_at_once(suffix: str, at: int, tmp_path: Path) -> None:
+    """Billions of them were read one by one, until the memory was full."""
+    path = tmp_path / f"own{suffix}"
+    write_cloud(path, some_cloud(20))
+    content = bytearray(path.read_bytes())
+    content[at] = 0xAB  # the highest byte of a count
+    path.write_bytes(content)
+    with pytest.raises(InputError, match="the header promises"):
+        read_cloud(path)
+
+
+@pytest.mark.parametrize("suffix", [".las", ".laz"])
 @pytest.mark.parametrize("share", [0.3, 0.6, 0.95])
 def test_a_file_that_is_cut_off_is_refused(suffix: str, share: float, tmp_path: Path) -> None:
     path = tmp_path / f"cut{suffix}"

@@ -84,7 +84,16 @@ def test_matches_are_in_order_and_at_places_of_their_own(room: Submap) -> None:
     support = [one.support for one in found]
     assert support == sorted(support, reverse=True)
     for k, one in enumerate(found):
-        assert not any(near(other.pose, one.pose, 0.0099, 0.199) for other in found[:k])
+        assert not any(near(other.pose, one.pose, 0.1, 2.0) for other in found[:k])
+
+
+def test_the_best_of_all_candidates_is_the_first_that_is_located(room: Submap) -> None:
+    asked = seen(hall(), TRUE), unsure(TRUE + 0.2), np.array([4.0, math.radians(90.0)])
+    candidates, found = room.candidates(*asked), room.locate(*asked)
+    assert found[0].support == max(one.support for one in candidates)
+    for one in candidates:  # what was left out stands beside a better one, or fits nowhere
+        beside = [other for other in found if near(other.pose, one.pose, 0.1, 2.0)]
+        assert one.support == 0.0 or any(other.support >= one.support for other in beside)
 
 
 def test_a_corridor_that_repeats_has_a_place_at_each_niche() -> None:

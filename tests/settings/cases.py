@@ -138,7 +138,7 @@ _SETTINGS = {
     "smoothing.reach_limit_m": Case("lap", 0.5),
     "smoothing.max_sigma_m": Case("lap", 0.001),
     "smoothing.agree_m": Case("lap", 0.01),
-    "smoothing.agree_deg": Case("lap", 0.1),
+    "smoothing.agree_deg": Case("lap", 0.01),
     "pile.reach_m": Case("pile", 15.0),
     "pile.deadline_m": Case("pile", 20.0),
     "pile.sure": Case("pile", 0.9),
