@@ -190,7 +190,7 @@ class AnchoredMatcher:
         self._first = FlowReference(se2.compose(self._motion.pose, T_base_scanner), levels)
         self._origin = self._motion.pose
         self._insert(points)
-        return Matched(BY_DEFINITION, 0.0, 1.0, lost=False)
+        return Matched(BY_DEFINITION, 0.0, 1.0, lost=False, noise=np.zeros((3, 3)))
 
     def _young_heading(self, points: FloatArray, T_base_scanner: FloatArray) -> tuple[float, float]:
         """Return heading and its information by range flow against the first scan while near it; else no information.

@@ -156,6 +156,8 @@ def test_straight_smooth_drifts_are_measured() -> None:
     for kind, seed in itertools.product(STRAIGHT, (501, 502, 503)):
         driven = straight_drive(kind, seed)
         assert np.mean([step.degenerate for step in driven.steps if step.processed]) > 0.5
+        unseen = np.mean([step.unseen for step in driven.steps if step.processed])
+        assert unseen > 0.8 if kind.max_range_m < 80.0 else unseen < 0.6  # the end face tells the way, weakly
         if driven.distance_m[-1] > 0.01 * 60.0 or segment_errors_pct(driven).max() > 7.0:
             missed.append((kind, seed))
     assert len(missed) <= 1
@@ -165,6 +167,7 @@ def test_wheels_that_slip_are_not_believed_as_the_speed_becomes_uncertain() -> N
     """Each burst was let in after half a second: 4 % too far. Walls with long waves alone hardly tell the speed."""
     for seed in (511, 512):
         driven = straight_drive(Straight(20.0, False, 4, 0.5, 50.0), seed, slips=True)
+        assert np.mean([step.unseen for step in driven.steps if step.processed]) < 0.4  # a fifth slips
         assert driven.distance_m[-1] < 0.015 * 60.0
 
 
