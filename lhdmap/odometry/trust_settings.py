@@ -16,8 +16,8 @@ class TrustSettings:
     walk_per_m: float = setting(
         1.8,
         unit="1/m",
-        doc="Share of a scan's covariance against the local map that each metre makes lasting, times the share of noise in what the "
-        "scan tells along, and the square of that in all it tells.",
+        doc="Share of a scan's covariance against the local map that each metre makes lasting, times the share of noise in what "
+        "the scan tells along, and the square of that in all it tells.",
         minimum=0.0,
         source=_SOURCE,
     )
