@@ -69,7 +69,8 @@ def _worst(found: Diagnostics, most: int) -> Diagnostics:
     least = np.minimum(np.minimum(found.information_along, found.information_across), found.information_heading)
     kept = _first_where(np.where(flagged, least - 1e18, least), starts, np.minimum)
     slip, residual = (_largest(np.asarray(values), starts) for values in (found.slip, found.residual))
-    columns = {name: np.asarray(column)[kept] for name, column in found._asdict().items()}
+    known = {name: column for name, column in found._asdict().items() if column is not None}
+    columns = {name: np.asarray(column)[kept] for name, column in known.items()}
     words = {name: columns[name].tolist() for name in ("substitute", "wheels")}
     return Diagnostics(**columns | words | {"slip": slip, "residual": residual})
 
