@@ -17,6 +17,8 @@ from lhdmap.smoothing.settings import SmoothingSettings
 
 _CAUCHY = 1.0
 _SHORTEST_M, _PER_TURN = 0.1, 0.002
+# Deviations of a step beyond which it ties nothing: a heading of more turns round, and marginals would have no digits left.
+_LOOSEST = np.array([3.0, 3.0, 0.5])
 
 
 class Smoothed(NamedTuple):
@@ -52,7 +54,10 @@ def smoothed(keys: list[KeyScan], closures: list[Closure], settings: SmoothingSe
         graph.add(gtsam.BetweenFactorPose2(closure.earlier, closure.current, pose, robust))
     solved = gtsam.LevenbergMarquardtOptimizer(graph, values).optimize()
     found = [solved.atPose2(index) for index in range(len(keys))]
-    end = gtsam.Marginals(graph, solved).marginalCovariance(len(keys) - 1)
+    try:
+        end = gtsam.Marginals(graph, solved).marginalCovariance(len(keys) - 1)
+    except RuntimeError:  # numbers too far apart: what the odometry alone would say is never too sure
+        end = chained(keys).covariance
     return Smoothed(np.array([[pose.x(), pose.y(), pose.theta()] for pose in found]), end)
 
 
@@ -62,7 +67,10 @@ def _step_covariance(before: KeyScan, after: KeyScan, settings: SmoothingSetting
     turn = abs(float(se2.wrap(after.pose[2] - before.pose[2])))
     position = settings.along_sigma * math.sqrt(travel_m)
     heading = math.radians(settings.heading_sigma_deg) * math.sqrt(travel_m) + _PER_TURN * turn
-    return after.error.covariance + np.diag([position**2, position**2, heading**2])
+    covariance = after.error.covariance + np.diag([position**2, position**2, heading**2])
+    share = np.minimum(1.0, _LOOSEST / np.sqrt(np.diag(covariance)))
+    bounded: FloatArray = covariance * np.outer(share, share)
+    return bounded
 
 
 def chained(keys: list[KeyScan]) -> StepError:
