@@ -27,6 +27,7 @@ _ARM_M = 1.5  # what reaches this far beyond the other drift's wall is a branch
 _AT_M = 5.0  # [[junction]] at
 _RUN_M = 8.0  # places on one tube that are nearer than this to each other are one
 _STRAIGHT_RAD = math.radians(8.0)
+_SHARP_RAD = math.radians(100.0)
 _LEAST_WALL_M = 1.0  # a corner with a smaller wall radius is not cut
 _KEPT_M = 9.0  # of a dead-end branch stays straight: a machine's length
 _DRAW_POINT_DEG = 60.0
@@ -310,7 +311,7 @@ def _turns(network: Network) -> None:
 def _turn(network: Network, index: int, a: Branch, b: Branch) -> Turn | None:
     """Return the turn from one branch into another, with its tube; None where there is no room for one."""
     node, tubes = network.nodes[index], network.tubes
-    if node.corner_m == 0.0:
+    if node.corner_m == 0.0 or _left_as_it_is(tubes, a, b):
         return None
     half = min(tubes[branch.tube].half_width_m(branch.s_m) for branch in (a, b))
     angle = _angle(tubes, a, b)
@@ -333,6 +334,12 @@ def _turn(network: Network, index: int, a: Branch, b: Branch) -> Turn | None:
     radius_m, way_m, line = best
     tubes.append(_turn_tube(f"{node.name or 'turn'} {tubes[a.tube].name} {tubes[b.tube].name}", line, tubes, (a, b)))
     return Turn(index, a, b, len(tubes) - 1, way_m, way_m, radius_m)
+
+
+def _left_as_it_is(tubes: list[Tube], a: Branch, b: Branch) -> bool:
+    """Return whether the corner between two branches stays: between two places, and the sharp side of a slanting one."""
+    places = [branch for branch in (a, b) if tubes[branch.tube].kind == "place"]
+    return len(places) == 2 or (len(places) == 1 and _angle(tubes, a, b) > _SHARP_RAD)
 
 
 def _turn_line(tubes: list[Tube], a: Branch, b: Branch, way_m: float) -> CentreLine | None:

@@ -6,6 +6,7 @@ The surface is a function of (arc length s, position u on the profile) and is me
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -145,6 +146,19 @@ class Drift:
         back = 0.15 / settings.blast_round_m
         ramp = np.where(phase < 1.0 - back, phase / (1.0 - back), (1.0 - phase) / back)
         return settings.blast_flare_m * (ramp - 0.5)
+
+    def reversed(self) -> Drift:
+        """Return the same drift with its line the other way round; its nominal walls only, for what stands at its start."""
+        line = self.line
+        turned = CentreLine(
+            line.length_m - line.s_m[::-1], *(column[::-1] for column in (line.x_m, line.y_m, line.z_m)),
+            line.heading_rad[::-1] + np.pi, -line.curvature_pm[::-1],
+        )  # fmt: skip
+        settings = replace(
+            self.settings,
+            widenings=tuple((line.length_m - at, right, left, roof) for at, left, right, roof in self.settings.widenings[::-1]),
+        )
+        return Drift(settings, turned, np.random.default_rng(0), floor=self._floor)
 
     def ring_count(self) -> int:
         """Return the number of rings of the whole mesh."""
