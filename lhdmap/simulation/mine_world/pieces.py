@@ -10,7 +10,8 @@ from scipy.spatial import KDTree
 
 from lhdmap.messages import FloatArray
 from lhdmap.mine.network import Network
-from lhdmap.simulation.drift import Drift, FloorHeight
+from lhdmap.simulation.drift import Drift
+from lhdmap.simulation.mine_world.floor import Floor
 from lhdmap.simulation.mine_world.hollow import Skin, Volume, cut, skin_of, without_unused
 from lhdmap.simulation.mine_world.tubes import drift_of
 
@@ -33,9 +34,10 @@ class Piece(NamedTuple):
 class Pieces:
     """All pieces of a network's surface."""
 
-    def __init__(self, network: Network, floor: FloorHeight) -> None:
-        self._network, self._floor = network, floor
+    def __init__(self, network: Network) -> None:
+        self._network, self._floor = network, Floor(network, network.plan.floor, network.plan.seed)
         self.all = _pieces(network)
+        self.boxes_m = np.stack([piece.box_m for piece in self.all])
         self._drift = functools.lru_cache(maxsize=None)(self._make_drift)
         self._volume = functools.lru_cache(maxsize=64)(self._make_volume)
 
@@ -47,12 +49,16 @@ class Pieces:
         )
         return Skin(without_unused(skin.mesh), skin.floor)
 
+    def floor_height(self, points_m: FloatArray) -> FloatArray:
+        """Return the floor's height (N,) under points (N, 3); their z says which level."""
+        return self._floor.height(points_m)
+
     def drift(self, tube: int) -> Drift:
         """Return the drift of a tube."""
         return self._drift(tube)
 
     def _make_drift(self, tube: int) -> Drift:
-        return drift_of(self._network, tube, self._floor)
+        return drift_of(self._network, tube, self.floor_height)
 
     def _make_volume(self, tube: int, first: int, last: int) -> Volume:
         drift, mesh_m = self._drift(tube), self._network.plan.walls.mesh_m

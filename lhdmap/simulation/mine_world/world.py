@@ -5,21 +5,22 @@ from __future__ import annotations
 import functools
 from collections import OrderedDict
 from collections.abc import Iterator, Sequence
-from typing import NamedTuple, TypeVar
+from typing import NamedTuple, Protocol, TypeVar
 
 import numpy as np
 import numpy.typing as npt
 
+from lhdmap.errors import ConfigError
 from lhdmap.machine import Machine
 from lhdmap.messages import FloatArray
 from lhdmap.mine.network import Network
-from lhdmap.mine.plan import DustPlan, WetPlan
+from lhdmap.mine.plan import DustPlan, PlacePlan, WetPlan
 from lhdmap.mine.polyline import on_line
 from lhdmap.mine.stands import PIT_M, place_end
 from lhdmap.simulation.drift import FloorHeight, Mesh
-from lhdmap.simulation.mine_world.floor import Floor
 from lhdmap.simulation.mine_world.hollow import Skin
 from lhdmap.simulation.mine_world.pieces import Pieces
+from lhdmap.simulation.mine_world.survey import SurveyedSkins
 from lhdmap.simulation.mine_world.things import dump_of, equipment_of, pile_of
 from lhdmap.simulation.raycast import Layered, Surface
 from lhdmap.simulation.surroundings import Rays
@@ -36,15 +37,31 @@ class Thing(NamedTuple):
     box_m: FloatArray
 
 
+class Skins(Protocol):
+    """A surface in pieces."""
+
+    @property
+    def boxes_m(self) -> FloatArray:
+        """Boxes around the pieces, shape (N, 2, 3)."""
+        ...
+
+    def skin(self, index: int) -> Skin:
+        """Return the surface of a piece."""
+        ...
+
+    def floor_height(self, points_m: FloatArray) -> FloatArray:
+        """Return the floor's height (N,) under points (N, 3)."""
+        ...
+
+
 class MineWorld:
     """The world of a plan; all in it follows from the plan and its seed. `view_m` is how far scanners see."""
 
     def __init__(self, network: Network, machine: Machine, *, view_m: float = 85.0) -> None:
         self.network, self.machine, self.view_m = network, machine, view_m
-        plan = network.plan
-        self._floor = Floor(network, plan.floor, plan.seed)
-        self._pieces = Pieces(network, self._floor.height)
-        self._boxes = np.stack([piece.box_m for piece in self._pieces.all])
+        self._pieces = None if network.plan.surface.file else Pieces(network)
+        self._skins: Skins = SurveyedSkins(network) if self._pieces is None else self._pieces
+        self._boxes = self._skins.boxes_m
         self.piece = functools.lru_cache(maxsize=4096)(self._make_piece)
         self._scenes: OrderedDict[frozenset[int], Surface] = OrderedDict()
         self._things: dict[str, Thing] = {}
@@ -64,12 +81,12 @@ class MineWorld:
 
     def floor_height(self, points_m: FloatArray) -> FloatArray:
         """Return the floor's height (N,) under points (N, 3); their z says which level."""
-        return self._floor.height(points_m)
+        return self._skins.floor_height(points_m)
 
     @property
     def floor(self) -> FloorHeight:
         """The function behind `floor_height`."""
-        return self._floor.height
+        return self._skins.floor_height
 
     def friction(self, position_m: FloatArray) -> float:
         """Return the friction of tyres on the floor at a point (3,)."""
@@ -98,9 +115,7 @@ class MineWorld:
         """Take rock from a draw point's pile: its face moves back by a depth."""
         place = next(one for one in self.network.plan.places if one.name == draw_point)
         self._taken_m[draw_point] = self._taken_m.get(draw_point, 0.0) + depth_m
-        index, _, _ = place_end(self.network, place)
-        drift = self._pieces.drift(index)
-        self.stand(draw_point, pile_of(self.network, place, drift, self.machine, self._taken_m[draw_point]))
+        self.stand(draw_point, self._pile(place, self._taken_m[draw_point]))
 
     def stand(self, name: str, mesh: Mesh) -> None:
         """Put something into the mine that stays for long (scenes are made anew)."""
@@ -128,8 +143,8 @@ class MineWorld:
     # How it is made.
 
     def _make_piece(self, index: int) -> Skin:
-        skin = self._pieces.skin(index)
-        pit = self._pits.get(self._pieces.all[index].tube)
+        skin = self._skins.skin(index)
+        pit = None if self._pieces is None else self._pits.get(self._pieces.all[index].tube)
         return skin if pit is None else _opened(skin, *pit)
 
     def _scene(self, tile_m: FloatArray, z_m: float) -> Surface:
@@ -149,14 +164,19 @@ class MineWorld:
 
     def _furnish(self) -> None:
         network = self.network
-        for place in network.plan.places:
+        for place in () if self._pieces is None else network.plan.places:
             if place.kind == "draw_point":
-                index, _, _ = place_end(network, place)
-                self._things[place.name] = _thing(pile_of(network, place, self._pieces.drift(index), self.machine))
+                self._things[place.name] = _thing(self._pile(place, 0.0))
             elif place.kind == "dump":
                 self._things[place.name] = _thing(dump_of(network, place, self.floor))
         for number, thing in enumerate(network.plan.equipment, start=1):
             self._things[f"{thing.kind} {number}"] = _thing(equipment_of(network, thing, self.machine, self.floor))
+
+    def _pile(self, place: PlacePlan, taken_m: float) -> Mesh:
+        if self._pieces is None:
+            raise ConfigError(f"'{place.name}': a surveyed mine has no piles of its own")
+        index, _, _ = place_end(self.network, place)
+        return pile_of(self.network, place, self._pieces.drift(index), self.machine, taken_m)
 
     def _wet_at(self, position_m: FloatArray) -> WetPlan | None:
         return next(iter(self._zones_at(self.network.plan.wet, position_m)), None)
