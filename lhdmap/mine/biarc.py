@@ -9,6 +9,8 @@ import numpy as np
 from lhdmap.messages import FloatArray
 from lhdmap.mine.centre_line import STEP_M, CentreLine
 
+_DETOUR = 6.0  # times the distance
+
 
 def biarc(start: FloatArray, end: FloatArray) -> CentreLine:
     """Return the line from pose `start` to `end`, each x, y, z, heading, shape (4,): two arcs of equal tangent lengths.
@@ -16,7 +18,7 @@ def biarc(start: FloatArray, end: FloatArray) -> CentreLine:
     Where one arc fits both poses, both are parts of it. Heights go over without a step in grade where both ends are level.
 
     Raises:
-        ValueError: the poses are the same place, or `end` lies straight behind `start`.
+        ValueError: the poses are the same place, or only loops lead from one to the other, as where `end` lies behind `start`.
     """
     a, b = start[:2], end[:2]
     t_a, t_b = (np.array([math.cos(pose[3]), math.sin(pose[3])]) for pose in (start, end))
@@ -27,6 +29,8 @@ def biarc(start: FloatArray, end: FloatArray) -> CentreLine:
     lines[1] = _arc(middle, first_end, b)
     lengths = [abs(turn / curvature) if curvature else length for length, curvature, _, turn in lines]
     total = sum(lengths)
+    if total > _DETOUR * float(np.hypot(*(b - a))):
+        raise ValueError("the way would be a detour of loops")
     s = np.append(np.arange(0.0, total - 0.5 * STEP_M, STEP_M), total)
     on_second = s > lengths[0]
     x, y, heading, curvature_pm = (np.empty_like(s) for _ in range(4))

@@ -38,9 +38,7 @@ def drift_lines(drifts: Sequence[DriftPlan]) -> list[CentreLine]:
         ConfigError: a line has coinciding points or too sharp a corner.
     """
     points = [np.array(drift.line_m, dtype=float) for drift in drifts]
-    lines = [
-        rounded_line(one, drift.bend_radius_m, drift.name) for one, drift in zip(points, drifts, strict=True)
-    ]
+    lines = [rounded_line(one, drift.bend_radius_m, drift.name) for one, drift in zip(points, drifts, strict=True)]
     for k, drift in enumerate(drifts):
         moved = points[k].copy()
         for end in (0, -1):

@@ -31,7 +31,12 @@ _SHARP_RAD = math.radians(100.0)
 _LEAST_WALL_M = 1.0  # a corner with a smaller wall radius is not cut
 _KEPT_M = 9.0  # of a dead-end branch stays straight: a machine's length
 _DRAW_POINT_DEG = 60.0
-_REACHES = (1.0, 1.2, 1.45, 1.75)  # times the tangent length of the wanted radius: where the branches bend near the node
+_REACHES = (
+    1.0,
+    1.2,
+    1.45,
+    1.75,
+)  # times the tangent length of the wanted radius: where the branches bend near the node
 _TAPER_M = 0.35  # a turn is narrower by this than its branches, where it begins and ends: its walls stay behind theirs
 
 
@@ -127,9 +132,7 @@ def make_network(plan: MinePlan) -> Network:
     return network
 
 
-def _with_place(
-    tubes: list[Tube], found: list[Meeting], place: PlacePlan
-) -> tuple[list[Tube], list[Meeting]]:
+def _with_place(tubes: list[Tube], found: list[Meeting], place: PlacePlan) -> tuple[list[Tube], list[Meeting]]:
     """Return tubes and meetings with those of a place."""
     index = next(k for k, tube in enumerate(tubes) if tube.name == place.drift)
     drift = tubes[index]
@@ -273,7 +276,7 @@ def _edges(network: Network, joints: dict[Joint, int]) -> None:
 
 
 def _cut(network: Network, tube: int, stops: list[tuple[float, float, int]]) -> None:
-    """Add the edges of one tube, between its nodes `stops` (first m, last m, node) and to its ends, where it has branches there."""
+    """Add the edges of one tube, between its nodes `stops` (first m, last m, node), and to its ends where it has branches."""
     at_m, at = 0.0, None
     for first, last, node in stops:
         if Branch(tube, first, -1) in network.nodes[node].branches:
@@ -381,6 +384,11 @@ def _turn_tube(name: str, line: CentreLine, tubes: list[Tube], branches: tuple[B
     heights = [tubes[branch.tube].height_m(branch.s_m) for branch in branches]
     length = line.length_m
     taper = min(2.0, 0.3 * length)
-    rows = [[0.0, widths[0] - 2 * _TAPER_M], [taper, min(widths)], [length - taper, min(widths)], [length, widths[1] - 2 * _TAPER_M]]
+    rows = [
+        [0.0, widths[0] - 2 * _TAPER_M],
+        [taper, min(widths)],
+        [length - taper, min(widths)],
+        [length, widths[1] - 2 * _TAPER_M],
+    ]
     roughness = max(tubes[branch.tube].roughness_m for branch in branches)
     return Tube(name, "turn", line, np.array(rows), np.array([[0.0, min(heights) - 0.05]]), roughness)

@@ -68,7 +68,9 @@ class FloorPlan:
 class SurfacePlan:
     """A surveyed surface in place of the generated one; the drifts then say only where one drives."""
 
-    file: str = setting("", doc="Mesh (PLY, OBJ, DAE, STL) or survey cloud (PLY, PCD, LAS, LAZ), from the plan's folder.")
+    file: str = setting(
+        "", doc="Mesh (PLY, OBJ, DAE, STL) or survey cloud (PLY, PCD, LAS, LAZ), from the plan's folder."
+    )
     kind: str = setting("auto", choices=("auto", "mesh", "cloud"), doc="What the file is; auto: by what is in it.")
     up: str = setting("z", choices=("z", "y"), doc="Axis of the file that points up.")
     scale: float = setting(1.0, minimum=1e-4, maximum=1e4, doc="Metres a unit of the file.")
@@ -86,7 +88,12 @@ class DriftPlan:
     )
     bend_radius_m: float = setting(12.0, unit="m", minimum=1.0, maximum=1000.0, doc="Radius at the line's corners.")
     width_m: Profile = setting(
-        4.5, unit="m", source=ASSUMED, minimum=2.5, maximum=30.0, doc="Width: one, or [[at_m, width], …] along the drift."
+        4.5,
+        unit="m",
+        source=ASSUMED,
+        minimum=2.5,
+        maximum=30.0,
+        doc="Width: one, or [[at_m, width], …] along the drift.",
     )
     height_m: Profile = setting(
         4.0, unit="m", source=ASSUMED, minimum=2.5, maximum=30.0, doc="Height: one, or [[at_m, height], …]."
@@ -109,17 +116,31 @@ class PlacePlan:
     drift: str = setting(REQUIRED, doc="Name of the drift.")
     at_m: float | None = setting(None, unit="m", doc="Distance along the drift's centre line; of an `end` not needed.")
     kind: str = setting(REQUIRED, choices=KINDS, doc="What is there.")
-    side: str = setting("left", choices=("left", "right", "end"), doc="Where: beside the drift, or at the end of its line.")
+    side: str = setting(
+        "left", choices=("left", "right", "end"), doc="Where: beside the drift, or at the end of its line."
+    )
     name: str = setting(REQUIRED, doc="Name of the place.")
     pile: str = setting("normal", choices=PILES, doc="Of a draw point: the variant of its pile (lhdmap simulate pile).")
     angle_deg: float | None = setting(
-        None, unit="deg", minimum=20.0, maximum=160.0, doc="Between the drift's direction and the place's; default 90, draw points 60."
+        None,
+        unit="deg",
+        minimum=20.0,
+        maximum=160.0,
+        doc="Between the drift's direction and the place's; default 90, draw points 60.",
     )
     length_m: float | None = setting(
-        None, unit="m", minimum=1.0, maximum=200.0, doc="How far it reaches from the drift's wall (a passing bay: how long it is)."
+        None,
+        unit="m",
+        minimum=1.0,
+        maximum=200.0,
+        doc="How far it reaches from the drift's wall (a passing bay: how long it is).",
     )
     width_m: float | None = setting(
-        None, unit="m", minimum=1.5, maximum=30.0, doc="Its width (a passing bay: by how much it widens the drift); default: the drift's."
+        None,
+        unit="m",
+        minimum=1.5,
+        maximum=30.0,
+        doc="Its width (a passing bay: by how much it widens the drift); default: the drift's.",
     )
     height_m: float | None = setting(None, unit="m", minimum=1.5, maximum=30.0, doc="Its height; default: the drift's.")
 
@@ -199,7 +220,9 @@ class MinePlan:
         for key, things in parts:
             for thing in things:
                 if thing.drift not in names:
-                    raise ConfigError(f"[[{key}]]: drift = '{thing.drift}' is not in the plan{nearest(thing.drift, names)}")
+                    raise ConfigError(
+                        f"[[{key}]]: drift = '{thing.drift}' is not in the plan{nearest(thing.drift, names)}"
+                    )
 
     def drift(self, name: str) -> DriftPlan:
         """Return the drift of that name."""

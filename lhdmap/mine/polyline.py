@@ -68,9 +68,7 @@ def _pieces(points_m: FloatArray, radius_m: float, name: str) -> tuple[list[_Pie
             f"line_m of '{name}': it turns by {math.degrees(turns[k]):.0f}° at point {k + 2}; 150° at most were wanted"
         )
     tangents = np.zeros(len(points_m))
-    tangents[1:-1] = np.minimum(
-        radius_m * np.tan(0.5 * np.abs(turns)), _SHARE * np.minimum(lengths[:-1], lengths[1:])
-    )
+    tangents[1:-1] = np.minimum(radius_m * np.tan(0.5 * np.abs(turns)), _SHARE * np.minimum(lengths[:-1], lengths[1:]))
     pieces, knots, way = [], [0.0], 0.0
     for k, (length, heading) in enumerate(zip(lengths, headings, strict=True)):
         straight = float(length - tangents[k] - tangents[k + 1])

@@ -6,6 +6,7 @@ came. To invert it drives past a node until it has all of its length behind it, 
 
 from __future__ import annotations
 
+import functools
 import heapq
 import itertools
 from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -150,7 +151,7 @@ class Planner:
         runs, states = self._begin(start)
         left = {index for index, edge in enumerate(self.network.edges) if not self._blind(edge)}
         while left:
-            found = self._search(states, lambda step: any(self._covered(k, run) for k in left for run in step.runs))
+            found = self._search(states, functools.partial(self._covers_any, frozenset(left)))
             if found is None:
                 break
             state, driven = found
@@ -162,6 +163,9 @@ class Planner:
     def _blind(self, edge: Edge) -> bool:
         place = self.network.tubes[edge.tube].place
         return place is not None and place.kind in BLIND
+
+    def _covers_any(self, edges: frozenset[int], step: _Step) -> bool:
+        return any(self._covered(k, run) for k in edges for run in step.runs)
 
     def _covered(self, index: int, run: Run) -> bool:
         """Return whether a run goes through an edge, but for what is about its nodes, and what a machine keeps from the rock."""
@@ -215,7 +219,12 @@ class Planner:
         """Drive into an edge until the whole machine is past the node, and come back in the other gear."""
         node, begin = (edge.start, edge.start_m) if state.direction > 0 else (edge.end, edge.end_m)
         reach = max(
-            (turn.end_at_m for turns in self._turns.values() for turn in turns if turn.node == node and turn.end.tube == edge.tube),
+            (
+                turn.end_at_m
+                for turns in self._turns.values()
+                for turn in turns
+                if turn.node == node and turn.end.tube == edge.tube
+            ),
             default=0.0,
         )
         depth = reach + self._wheelbase_m + _BEHIND_M
@@ -237,7 +246,9 @@ class Planner:
         if self.network.nodes[node].degree == 1:
             back = self._end(edge, state.direction, state.gear) - state.direction * self._wheelbase_m
             begin = edge.start_m if state.direction > 0 else edge.end_m
-            other = self._end(edge, -state.direction, -state.gear) if self._is_dead_end(edge, -state.direction) else begin
+            other = (
+                self._end(edge, -state.direction, -state.gear) if self._is_dead_end(edge, -state.direction) else begin
+            )
             if (back - other) * state.direction > 0.0:
                 way = (back - other) * state.direction * (1.0 if state.gear < 0 else self._reverse)
                 yield _Step(
@@ -273,7 +284,9 @@ class Planner:
         if place.kind in (*BLIND, "passing_bay"):
             tube, at_m, _ = stand_at(network, place, self.machine)
             return lambda step: any(
-                run.tube == tube and run.gear == stop.gear and min(run.from_m, run.to_m) <= at_m <= max(run.from_m, run.to_m)
+                run.tube == tube
+                and run.gear == stop.gear
+                and min(run.from_m, run.to_m) <= at_m <= max(run.from_m, run.to_m)
                 for run in step.runs
             )
         tube, end_m, direction = place_end(network, place)
@@ -282,7 +295,11 @@ class Planner:
             and step.state.gear == stop.gear
             and step.state.direction == direction
             and network.edges[step.state.edge].tube == tube
-            and abs((network.edges[step.state.edge].end_m if direction > 0 else network.edges[step.state.edge].start_m) - end_m) < 0.01
+            and abs(
+                (network.edges[step.state.edge].end_m if direction > 0 else network.edges[step.state.edge].start_m)
+                - end_m
+            )
+            < 0.01
         )
 
     def _is_last(self, state: _State) -> bool:
@@ -354,13 +371,13 @@ def _trimmed(network: Network, runs: list[Run]) -> list[Run]:
         turn = network.tubes[run.tube]
         if turn.kind != "turn":
             continue
-        for near, end in ((k - 1, "to_m"), (k + 1, "from_m")):
+        for near in (k - 1, k + 1):
             other = trimmed[near] if 0 <= near < len(runs) else None
             if other is None or other.gear != run.gear or network.tubes[other.tube].kind == "turn":
                 continue
             line, sign = network.tubes[other.tube].line, 1.0 if other.to_m > other.from_m else -1.0
             cut_m = float(on_line(line, turn.pose(run.from_m if near < k else run.to_m)[:3])[0])
-            shorter = other._replace(**{end: cut_m})
+            shorter = other._replace(to_m=cut_m) if near < k else other._replace(from_m=cut_m)
             if (shorter.to_m - shorter.from_m) * sign > 0.0:
                 trimmed[near] = shorter
                 continue

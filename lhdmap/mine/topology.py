@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from typing import Any, NamedTuple
 
@@ -21,8 +22,10 @@ _ANGLE_RAD = math.radians(9.0)  # arms that are so nearly one line have no corne
 
 
 class Tunnel(NamedTuple):
-    """A way between two intersections or ends, maybe over several drifts: name, first drift, ends, length (m), where on their
-    drifts it begins and ends (m)."""
+    """A way between two intersections or ends, maybe over several drifts.
+
+    `drift` is the first of them, `span_m` where on their centre lines it begins and ends.
+    """
 
     name: str
     drift: str
@@ -46,7 +49,8 @@ def branch_reach_m(network: Network, node: int, branch: Branch) -> float:
     """
     tubes, one = network.tubes, network.nodes[node]
     reach = max(
-        (turn.start_at_m for turn in network.turns if turn.node == node and turn.start == branch and turn.tube >= 0), default=0.0
+        (turn.start_at_m for turn in network.turns if turn.node == node and turn.start == branch and turn.tube >= 0),
+        default=0.0,
     )
     own = tubes[branch.tube].half_width_m(branch.s_m)
     heading = tubes[branch.tube].pose(branch.s_m, branch.outward)[3]
@@ -166,7 +170,7 @@ def _access_point(network: Network, node: int, branch: Branch) -> dict[str, Any]
 def _levels(network: Network) -> dict[int, str | int]:
     """Return the level of each intersection: its drifts' name of it, else a number by height, the lowest 0."""
     heights = sorted(float(node.position_m[2]) for node in network.nodes if node.degree > 2)
-    bounds = [0.5 * (a + b) for a, b in zip(heights, heights[1:], strict=False) if b - a > _LEVELS_M]
+    bounds = [0.5 * (a + b) for a, b in itertools.pairwise(heights) if b - a > _LEVELS_M]
     found: dict[int, str | int] = {}
     for index, node in enumerate(network.nodes):
         names = [_level_name(network, branch) for branch in node.branches]

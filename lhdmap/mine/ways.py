@@ -83,9 +83,7 @@ def _points(network: Network, runs: list[Run]) -> FloatArray | None:
     return points[np.concatenate([[True], apart > 0.2 * STEP_M])] if len(points) > 1 else None
 
 
-def _leg(
-    points: FloatArray, gear: int, machine: Machine, stop: str, wander: FloatArray | None, driven_m: float
-) -> Leg:
+def _leg(points: FloatArray, gear: int, machine: Machine, stop: str, wander: FloatArray | None, driven_m: float) -> Leg:
     points = _smoothed(_resampled(points), _SMOOTH_M)
     heading, curvature = _direction(points)
     offset = _smooth_values(_swing_out(curvature, machine, gear), _OFFSET_OVER_M)
@@ -101,7 +99,7 @@ def _leg(
     front, rear = machine.dimensions.joint_to_front_axle_m, machine.dimensions.joint_to_rear_axle_m
     lead, trail = (front, rear) if gear > 0 else (rear, front)
     bend = articulation_along_path(curvature, STEP_M, lead, trail)
-    return Leg(gear, *points.T, heading, curvature, bend, stop)
+    return Leg(gear, points[:, 0], points[:, 1], points[:, 2], heading, curvature, bend, stop)
 
 
 def _swing_out(curvature_pm: FloatArray, machine: Machine, gear: int) -> FloatArray:

@@ -151,12 +151,14 @@ class Drift:
         """Return the same drift with its line the other way round; its nominal walls only, for what stands at its start."""
         line = self.line
         turned = CentreLine(
-            line.length_m - line.s_m[::-1], *(column[::-1] for column in (line.x_m, line.y_m, line.z_m)),
+            line.length_m - line.s_m[::-1], line.x_m[::-1], line.y_m[::-1], line.z_m[::-1],
             line.heading_rad[::-1] + np.pi, -line.curvature_pm[::-1],
         )  # fmt: skip
         settings = replace(
             self.settings,
-            widenings=tuple((line.length_m - at, right, left, roof) for at, left, right, roof in self.settings.widenings[::-1]),
+            widenings=tuple(
+                (line.length_m - at, right, left, roof) for at, left, right, roof in self.settings.widenings[::-1]
+            ),
         )
         return Drift(settings, turned, np.random.default_rng(0), floor=self._floor)
 

@@ -40,7 +40,9 @@ class OperatorSettings:
     joint_share: float = setting(0.6, minimum=0.1, maximum=1.0, doc="Share of the joint's rate that bends may ask for.")
     dwell_s: float = setting(1.5, unit="s", minimum=0.0, maximum=600.0, doc="Rest before a change of gear.")
     stop_s: float = setting(4.0, unit="s", minimum=0.0, maximum=3600.0, doc="Rest at a place of the route.")
-    wander_m: float = setting(0.0, unit="m", minimum=0.0, maximum=1.0, doc="Slow lateral wandering, standard deviation.")
+    wander_m: float = setting(
+        0.0, unit="m", minimum=0.0, maximum=1.0, doc="Slow lateral wandering, standard deviation."
+    )
     speed_variation: float = setting(0.03, minimum=0.0, maximum=0.3, doc="Slow changes of the speed, share of it.")
 
 
@@ -58,7 +60,13 @@ class Operator:
     """Drives legs one after the other; `command` is asked at a fixed period."""
 
     def __init__(
-        self, legs: Sequence[Leg], machine: Machine, settings: OperatorSettings, *, seed: int = 0, period_s: float = 0.05
+        self,
+        legs: Sequence[Leg],
+        machine: Machine,
+        settings: OperatorSettings,
+        *,
+        seed: int = 0,
+        period_s: float = 0.05,
     ) -> None:
         self._legs, self._machine, self._settings, self._period_s = legs, machine, settings, period_s
         size = machine.dimensions

@@ -20,6 +20,7 @@ _STATION_M = 0.25
 _CELL_M = 4.0
 _BEYOND_M = 1.0  # a drift's floor counts so far beyond its wall
 _OTHER_LEVEL_M = 2.6  # stations this far above or below a point are another level's
+_MOST = 12  # drifts that overlap at one place, at most
 _MEAN_SQUARE = 151.0 / 315.0  # of a sum of cubic B-splines with independent unit coefficients, per dimension
 
 # Knot spacing (m), as in the drift scenario: what a machine of 3.4 m wheelbase rides up and down, and stones.
@@ -67,7 +68,9 @@ class Floor:
 def _octaves(settings: FloorPlan) -> FloatArray:
     """Return knot spacing and amplitude of each scale, shape (6, 2)."""
     rows = []
-    for spacings, gain, rms_m in zip((_WAVES, _STONES), _GAINS, (settings.undulation_m, settings.roughness_m), strict=True):
+    for spacings, gain, rms_m in zip(
+        (_WAVES, _STONES), _GAINS, (settings.undulation_m, settings.roughness_m), strict=True
+    ):
         amplitudes = gain ** np.arange(len(spacings))
         amplitudes *= rms_m / math.sqrt(float(np.sum(amplitudes**2)))
         rows += list(zip(spacings, amplitudes / _MEAN_SQUARE, strict=True))
@@ -97,45 +100,19 @@ def _stations(network: Network) -> Stations:
 
 
 @nb.njit(cache=True, nogil=True)
-def _heights(points, stations, octaves, seed, out):  # type: ignore[no-untyped-def]  # noqa: ANN001, ANN202
+def _heights(points, stations, octaves, seed, out):  # type: ignore[no-untyped-def]
     for k in range(points.shape[0]):
         x, y, z = points[k]
         out[k] = _line_height(x, y, z, stations) + _noise(x, y, octaves, seed)
 
 
 @nb.njit(cache=True, nogil=True)
-def _line_height(x, y, z, stations):  # type: ignore[no-untyped-def]  # noqa: ANN001, ANN202
+def _line_height(x, y, z, stations):  # type: ignore[no-untyped-def]
     """Height of the centre lines at a place: those whose drift it is in, blended by how far it is inside."""
-    rows, corner, shape, starts, members, cell_m = stations
-    ci, cj = int(math.floor((x - corner[0]) / cell_m)), int(math.floor((y - corner[1]) / cell_m))
-    best_of = np.full(_MOST, np.inf)
-    found = np.full(_MOST, -1.0)
-    station = np.zeros(_MOST, dtype=np.int64)
-    count = 0
-    for i in range(max(ci - 1, 0), min(ci + 2, shape[0])):
-        for j in range(max(cj - 1, 0), min(cj + 2, shape[1])):
-            cell = i * shape[1] + j
-            for m in range(starts[cell], starts[cell + 1]):
-                row = members[m]
-                if abs(rows[row, 2] - z) > _OTHER_LEVEL_M:
-                    continue
-                d = (rows[row, 0] - x) ** 2 + (rows[row, 1] - y) ** 2
-                slot = -1
-                for q in range(count):
-                    if found[q] == rows[row, 6]:
-                        slot = q
-                        break
-                if slot < 0:
-                    if count == _MOST:
-                        continue
-                    slot = count
-                    count += 1
-                    found[slot] = rows[row, 6]
-                if d < best_of[slot]:
-                    best_of[slot] = d
-                    station[slot] = row
+    rows = stations[0]
+    best, station = np.full(_MOST, np.inf), np.zeros(_MOST, dtype=np.int64)
     total, weight, nearest, fallback = 0.0, 0.0, np.inf, z
-    for q in range(count):
+    for q in range(_nearest_of_each(x, y, z, stations, best, station)):
         here, apart = _on_line(x, y, station[q], rows)
         half = rows[station[q], 5]
         w = max(0.0, 1.0 - apart / (half + _BEYOND_M)) ** 2
@@ -147,7 +124,36 @@ def _line_height(x, y, z, stations):  # type: ignore[no-untyped-def]  # noqa: AN
 
 
 @nb.njit(cache=True, nogil=True)
-def _on_line(x, y, row, rows):  # type: ignore[no-untyped-def]  # noqa: ANN001, ANN202
+def _nearest_of_each(x, y, z, stations, best, station):  # type: ignore[no-untyped-def]
+    """Write the nearest station of each tube near a place, and its squared distance; return how many tubes there are."""
+    rows, corner, shape, starts, members, cell_m = stations
+    ci, cj = int(math.floor((x - corner[0]) / cell_m)), int(math.floor((y - corner[1]) / cell_m))
+    count = 0
+    for i in range(max(ci - 1, 0), min(ci + 2, shape[0])):
+        for j in range(max(cj - 1, 0), min(cj + 2, shape[1])):
+            for m in range(starts[i * shape[1] + j], starts[i * shape[1] + j + 1]):
+                row = members[m]
+                if abs(rows[row, 2] - z) <= _OTHER_LEVEL_M:
+                    count = _kept(row, (rows[row, 0] - x) ** 2 + (rows[row, 1] - y) ** 2, rows, best, station, count)
+    return count
+
+
+@nb.njit(cache=True, nogil=True)
+def _kept(row, square, rows, best, station, count):  # type: ignore[no-untyped-def]
+    """Keep a station if it is the nearest of its tube; return how many tubes there are now."""
+    for q in range(count):
+        if rows[station[q], 6] == rows[row, 6]:
+            if square < best[q]:
+                best[q], station[q] = square, row
+            return count
+    if count == _MOST:
+        return count
+    best[count], station[count] = square, row
+    return count + 1
+
+
+@nb.njit(cache=True, nogil=True)
+def _on_line(x, y, row, rows):  # type: ignore[no-untyped-def]
     """Height of one centre line beside a point, and how far it is from the line in plan."""
     along = (x - rows[row, 0]) * rows[row, 3] + (y - rows[row, 1]) * rows[row, 4]
     other = row + 1 if along > 0.0 else row - 1
@@ -160,11 +166,8 @@ def _on_line(x, y, row, rows):  # type: ignore[no-untyped-def]  # noqa: ANN001, 
     return rows[row, 2] + share * (rows[other, 2] - rows[row, 2]), apart
 
 
-_MOST = 12  # drifts that overlap at one place, at most
-
-
 @nb.njit(cache=True, nogil=True)
-def _noise(x, y, octaves, seed):  # type: ignore[no-untyped-def]  # noqa: ANN001, ANN202
+def _noise(x, y, octaves, seed):  # type: ignore[no-untyped-def]
     total = 0.0
     for k in range(octaves.shape[0]):
         spacing, amplitude = octaves[k]
@@ -184,7 +187,7 @@ def _noise(x, y, octaves, seed):  # type: ignore[no-untyped-def]  # noqa: ANN001
 
 
 @nb.njit(cache=True, nogil=True)
-def _weights(t):  # type: ignore[no-untyped-def]  # noqa: ANN001, ANN202
+def _weights(t):  # type: ignore[no-untyped-def]
     return (
         (1.0 - t) ** 3 / 6.0,
         (3.0 * t**3 - 6.0 * t**2 + 4.0) / 6.0,
@@ -194,7 +197,7 @@ def _weights(t):  # type: ignore[no-untyped-def]  # noqa: ANN001, ANN202
 
 
 @nb.njit(cache=True, nogil=True)
-def _chance(i, j, k, seed):  # type: ignore[no-untyped-def]  # noqa: ANN001, ANN202
+def _chance(i, j, k, seed):  # type: ignore[no-untyped-def]
     """A number of mean 0 and variance 1 that belongs to a knot (splitmix64 of its indices)."""
     h = np.uint64(i) * np.uint64(0x9E3779B97F4A7C15) + np.uint64(j) * np.uint64(0xC2B2AE3D27D4EB4F)
     h += np.uint64(k) * np.uint64(0x165667B19E3779F9) + seed * np.uint64(0xD6E8FEB86659FD93)

@@ -99,7 +99,7 @@ def _read_mesh(path: Path) -> Mesh:
     import open3d as o3d
 
     with o3d.utility.VerbosityContextManager(o3d.utility.VerbosityLevel.Error):
-        found = o3d.io.read_triangle_mesh(str(path))
+        found = o3d.io.read_triangle_mesh(path)
     return Mesh(np.asarray(found.vertices, dtype=float), np.asarray(found.triangles).astype(np.uint32))
 
 

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import functools
 import math
 import zlib
 from dataclasses import replace
 
 import numpy as np
 
+from lhdmap.errors import ConfigError
 from lhdmap.machine import Machine
 from lhdmap.messages import FloatArray
 from lhdmap.mine.network import Network
@@ -30,18 +32,15 @@ def pile_of(network: Network, place: PlacePlan, drift: Drift, machine: Machine, 
     index, end_m, direction = place_end(network, place)
     seed = zlib.crc32(f"{network.plan.seed} {place.name}".encode())
     settings = scene(place.pile, seed % 10_000).pile
-    assert settings is not None
+    if settings is None:
+        raise ConfigError(f"'{place.name}': a scene without a pile")
     back_m = max(toe_back_m(network.tubes[index].length_m) - taken_m, 0.5)
     if direction < 0:
         drift = drift.reversed()
         end_m = drift.line.length_m
     settings = replace(settings, toe_m=max(end_m - back_m, 0.0), back_m=back_m)
     pile = make_pile(settings, drift, end_m - back_m, machine, np.random.default_rng([seed, 7]))
-    meshes = pile.meshes()
-    whole = meshes[0]
-    for mesh in meshes[1:]:
-        whole = joined(whole, mesh)
-    return whole
+    return functools.reduce(joined, pile.meshes())
 
 
 def dump_of(network: Network, place: PlacePlan, floor: FloorHeight) -> Mesh:
@@ -57,11 +56,9 @@ def dump_of(network: Network, place: PlacePlan, floor: FloorHeight) -> Mesh:
     upright = np.array([[x, y, h] for h in (0.05, -_DEEP_M) for x, y in corners])
     sides = [[k, (k + 1) % 4, 4 + k] for k in range(4)] + [[(k + 1) % 4, 4 + (k + 1) % 4, 4 + k] for k in range(4)]
     parts.append(Mesh(upright, np.array([*sides, [4, 5, 6], [4, 6, 7]], dtype=np.uint32)))
-    for y in np.arange(-half, half, _OPENING_M + _BAR_M):
-        parts.append(box(np.array([0.0, y, -0.15]), np.array([PIT_M, y + _BAR_M, 0.0])))
-    mesh = parts[0]
-    for part in parts[1:]:
-        mesh = joined(mesh, part)
+    bars = np.arange(-half, half, _OPENING_M + _BAR_M)
+    parts += [box(np.array([0.0, y, -0.15]), np.array([PIT_M, y + _BAR_M, 0.0])) for y in bars]
+    mesh = functools.reduce(joined, parts)
     return placed(mesh, np.array([pose[0], pose[1], z, pose[3]]))
 
 
@@ -83,9 +80,7 @@ def shape_of(kind: str, size_m: tuple[float, float, float], machine: Machine) ->
         return cylinder(np.array([0.0, 0.0, 2.0]), np.array([0.0, 0.0, 5.0]), 0.2)
     if kind == "machine":
         parts = standing_machine(machine)
-        mesh = parts[0]
-        for part in parts[1:]:
-            mesh = joined(mesh, part)
+        mesh = functools.reduce(joined, parts)
         return Mesh(mesh.vertices_m + np.array([0.5 * machine.dimensions.wheelbase_m, 0.0, 0.0]), mesh.triangles)
     half = 0.5 * np.array([size_m[0], size_m[1], 0.0])
     return box(-half - np.array([0.0, 0.0, 0.1]), half + np.array([0.0, 0.0, size_m[2]]))

@@ -104,7 +104,8 @@ class MineWorld:
         """
         for index in np.flatnonzero(_overlap(self._boxes, box_m)).tolist():
             skin = self.piece(index)
-            yield index, Mesh(skin.mesh.vertices_m, skin.mesh.triangles[~skin.floor])
+            if not skin.floor.all():
+                yield index, Mesh(skin.mesh.vertices_m, skin.mesh.triangles[~skin.floor])
         for name, thing in {**self._things, **{k: v for k, (v, _) in self._passing.items()}}.items():
             if _overlap(thing.box_m[None], box_m)[0]:
                 yield f"{name} {self._version}", thing.mesh
