@@ -15,6 +15,8 @@ PILE_SHARE = 0.45
 PIT_M = 3.0
 """Length of the open end of a dump."""
 _CLEAR_M = 1.2  # between the machine and what it stands before
+_CLEAR_OF_PILE_M = {"spill": 4.2}
+_CLEAR_OF_A_PILE_M = 2.2  # its face is uneven
 _STOP_LOG_M = 0.4
 
 
@@ -39,7 +41,7 @@ def kept_free_m(network: Network, tube: int, end_m: float) -> float:
         if place.kind in BLIND or place.kind == "passing_bay" or place_end(network, place)[:2] != (tube, end_m):
             continue
         if place.kind == "draw_point":
-            return toe_back_m(network.tubes[tube].length_m) + _CLEAR_M
+            return toe_back_m(network.tubes[tube].length_m) + _CLEAR_OF_PILE_M.get(place.pile, _CLEAR_OF_A_PILE_M)
         if place.kind == "dump":
             return PIT_M + _STOP_LOG_M + 0.5 * _CLEAR_M
     return _CLEAR_M

@@ -69,7 +69,7 @@ def test_a_machine_at_a_draw_point_faces_the_pile() -> None:
     (place,) = told["places"]
     x, y, z, yaw = place["pose"]
     assert (x, z, yaw) == pytest.approx((40.0, 0.0, math.pi / 2), abs=1e-4)
-    assert y == pytest.approx(50.0 - 8.0 - 1.2 - 3.2)
+    assert y == pytest.approx(50.0 - 8.0 - 2.2 - 3.2)
 
 
 @pytest.mark.parametrize(

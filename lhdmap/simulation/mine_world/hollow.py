@@ -9,10 +9,10 @@ import numpy as np
 import numpy.typing as npt
 
 from lhdmap.messages import FloatArray
-from lhdmap.simulation.drift import Drift, Mesh, Triangles
+from lhdmap.simulation.drift import Drift, FloorHeight, Mesh, Triangles
 from lhdmap.simulation.raycast import Surface
 
-_OVER_FLOOR_M = 0.06  # corners at the floor are judged this far above it: the floor is the same in all tubes
+_OVER_FLOOR_M = 0.06
 _OVERLAP_M = 0.01  # a cut leaves this much beyond the other surface: seams have no gaps
 _UPWARDS = (0.013, 0.007, 1.0)
 
@@ -27,18 +27,24 @@ class Skin(NamedTuple):
 class Volume:
     """The inside of a stretch of a tube."""
 
-    def __init__(self, drift: Drift, first: int, last: int) -> None:
+    def __init__(self, drift: Drift, first: int, last: int, floor: FloorHeight) -> None:
+        self._floor = floor
         mesh = drift.mesh(first, last, closed=(True, True))
         self._surface = Surface(mesh)
         self.low_m, self.high_m = mesh.vertices_m.min(axis=0), mesh.vertices_m.max(axis=0)
 
     def holds(self, points_m: FloatArray) -> npt.NDArray[np.bool_]:
-        """Return which points (N, 3) lie inside: a ray upwards crosses the surface an odd number of times."""
+        """Return which points (N, 3) lie inside: a ray upwards crosses the surface an odd number of times.
+
+        What lies on the floor is judged a little above it: the floor is the same in all tubes.
+        """
         result = np.zeros(len(points_m), dtype=bool)
-        near = np.flatnonzero(((points_m > self.low_m) & (points_m < self.high_m)).all(axis=1))
+        near = np.flatnonzero(((points_m > self.low_m - _OVER_FLOOR_M) & (points_m < self.high_m)).all(axis=1))
         if near.size:
+            points = points_m[near]
+            points[:, 2] = np.maximum(points[:, 2], self._floor(points) + _OVER_FLOOR_M)
             directions = np.broadcast_to(np.array(_UPWARDS), (len(near), 3))
-            rays = np.hstack([points_m[near] - self._surface.origin_m, directions]).astype(np.float32)
+            rays = np.hstack([points - self._surface.origin_m, directions]).astype(np.float32)
             result[near] = self._surface.crossings(rays) % 2 == 1
         return result
 
@@ -75,10 +81,7 @@ def cut(skin: Skin, volumes: Sequence[Volume]) -> Skin:
 
 def _cut(skin: Skin, volume: Volume) -> Skin:
     vertices, triangles = skin.mesh.vertices_m, skin.mesh.triangles
-    judged = vertices.copy()
-    on_floor = np.unique(triangles[skin.floor])
-    judged[on_floor, 2] += _OVER_FLOOR_M
-    inside = volume.holds(judged)
+    inside = volume.holds(vertices)
     if not inside.any():
         return skin
     count = inside[triangles].sum(axis=1)

@@ -62,7 +62,7 @@ class Pieces:
 
     def _make_volume(self, tube: int, first: int, last: int) -> Volume:
         drift, mesh_m = self._drift(tube), self._network.plan.walls.mesh_m
-        return Volume(drift, int(first * _BLOCK_M / mesh_m), int(last * _BLOCK_M / mesh_m) + 1)
+        return Volume(drift, int(first * _BLOCK_M / mesh_m), int(last * _BLOCK_M / mesh_m) + 1, self.floor_height)
 
 
 def _pieces(network: Network) -> list[Piece]:
