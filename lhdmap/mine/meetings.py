@@ -20,6 +20,7 @@ PASS_M = 3.0
 _EVERY = 10  # samples of a line, 0.1 m
 _APART_M = 8.0  # two meetings of the same lines are at least this far from each other
 _NEAR_M = 0.15
+_FLAT = 0.2
 
 
 class Meeting(NamedTuple):
@@ -78,14 +79,21 @@ def _closes(line: CentreLine) -> bool:
 
 
 def _tree(line: CentreLine) -> KDTree:
-    return KDTree(np.stack([line.x_m, line.y_m], axis=1)[::_EVERY])
+    return KDTree(_flattened(line)[::_EVERY])
+
+
+def _flattened(line: CentreLine) -> FloatArray:
+    """Return a line's samples (N, 3), with heights so small that what can neither join nor pass is near, too."""
+    return np.stack([line.x_m, line.y_m, _FLAT * line.z_m], axis=1)
 
 
 def _of_two(i: int, a: CentreLine, j: int, b: CentreLine, tree: KDTree) -> list[Meeting]:
-    """Return the meetings of two lines in plan."""
+    """Return where two lines meet in plan, and are at most `PASS_M` above each other."""
     at = np.unique(np.append(np.arange(0, len(a.s_m), _EVERY), len(a.s_m) - 1))
-    distance, index = tree.query(np.stack([a.x_m, a.y_m], axis=1)[at], distance_upper_bound=JOIN_M + _NEAR_M)
-    near = np.flatnonzero(np.isfinite(distance))
+    distance, index = tree.query(_flattened(a)[at], distance_upper_bound=JOIN_M + _NEAR_M + _FLAT * PASS_M)
+    other = np.minimum(index * _EVERY, len(b.s_m) - 1)
+    in_plan = np.hypot(a.x_m[at] - b.x_m[other], a.y_m[at] - b.y_m[other]) <= JOIN_M + _NEAR_M
+    near = np.flatnonzero(np.isfinite(distance) & in_plan & (np.abs(a.z_m[at] - b.z_m[other]) <= PASS_M))
     found = []
     while near.size:
         best = near[np.argmin(distance[near])]
@@ -94,7 +102,7 @@ def _of_two(i: int, a: CentreLine, j: int, b: CentreLine, tree: KDTree) -> list[
         places = a.s_m[at[near[here]]]
         if np.ptp(places) > 2.0 * _APART_M - 1.0:
             raise ConfigError(f"two drifts run along each other at ({a.x_m[at[best]]:.0f}, {a.y_m[at[best]]:.0f})")
-        found.append(_refined(Meeting(i, s, j, float(b.s_m[min(int(index[best]) * _EVERY, len(b.s_m) - 1)])), a, b))
+        found.append(_refined(Meeting(i, s, j, float(b.s_m[other[best]])), a, b))
         near = near[~here]
     return found
 

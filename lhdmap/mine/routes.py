@@ -175,7 +175,7 @@ class Planner:
         first = edge.start_m if direction > 0 else edge.end_m
         last = self._end(edge, direction, run.gear)
         begins = (run.from_m - first) * direction < _AT_NODE_M
-        return begins and (run.to_m - last) * direction > -min(_AT_NODE_M, 0.5 * abs(last - first))
+        return begins and (run.to_m - last) * direction > -min(_AT_NODE_M, 0.4 * abs(last - first))
 
     def _begin(self, start: Start) -> tuple[list[Run], dict[_State, tuple[Run, ...]]]:
         """Return where a machine that stands somewhere can go to first, in both gears."""
