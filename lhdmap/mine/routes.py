@@ -187,8 +187,9 @@ class Planner:
                 direction = start.facing * gear
                 lead = start.at_m if gear > 0 else start.at_m - start.facing * self._wheelbase_m
                 end = self._end(edge, direction, gear)
-                if (end - lead) * direction > 0.0:
-                    states[_State(index, direction, gear, False)] = (Run(edge.tube, lead, end, gear),)
+                if (end - lead) * direction > -self._wheelbase_m:
+                    run = Run(edge.tube, lead, end, gear)
+                    states[_State(index, direction, gear, False)] = (run,) if (end - lead) * direction > 0.0 else ()
             break
         return [], states
 
@@ -249,13 +250,11 @@ class Planner:
             other = (
                 self._end(edge, -state.direction, -state.gear) if self._is_dead_end(edge, -state.direction) else begin
             )
-            if (back - other) * state.direction > 0.0:
-                way = (back - other) * state.direction * (1.0 if state.gear < 0 else self._reverse)
-                yield _Step(
-                    way + _INVERSION_M,
-                    _State(state.edge, -state.direction, -state.gear, False),
-                    (Run(edge.tube, back, other, -state.gear),),
-                )
+            way = (back - other) * state.direction  # not positive: the rear axle is still in the turn
+            if way > 0.0 or not self._is_dead_end(edge, -state.direction):
+                cost = max(way, 0.0) * (1.0 if state.gear < 0 else self._reverse) + _INVERSION_M
+                runs = (Run(edge.tube, back, other, -state.gear),) if way > 0.0 else ()
+                yield _Step(cost, _State(state.edge, -state.direction, -state.gear, False), runs)
 
     def _is_dead_end(self, edge: Edge, direction: int) -> bool:
         return self.network.nodes[edge.end if direction > 0 else edge.start].degree == 1
