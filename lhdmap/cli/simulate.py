@@ -296,7 +296,7 @@ def _stem(arguments: argparse.Namespace, scenario: DriftScenario) -> str:
 
 def _shown(records: Iterator[Record], console: Console, total_s: float) -> Iterator[Record]:
     """Yield records with progress by their time in the log."""
-    from lhdmap.simulation.world import START_NS
+    from lhdmap.simulation.history import START_NS
 
     def position(record: Record) -> float:
         return (record.log_time_ns - START_NS) * 1e-9
