@@ -91,7 +91,9 @@ def rays_of(
     """Return rays (N, 6), origin less `origin_m` and unit direction in `map`, and ranges to the own body (N,)."""
     rays = np.empty((sweep.times_s.size, 6), dtype=np.float32)
     blocked = np.empty(len(rays), dtype=np.float32)
-    fill_rays(history.rows, history.split(stamp_ns), history.rate_hz, tuple(sweep), tuple(rig), origin_m, rays, blocked)
+    parts = (rig.T_parent_sensor, rig.on_rear, rig.joint_m, rig.front_boxes_m, rig.rear_boxes_m)
+    beams = (sweep.directions, sweep.times_s)
+    fill_rays(history.rows, history.split(stamp_ns), history.rate_hz, beams, parts, origin_m, rays, blocked)
     return rays, blocked
 
 
