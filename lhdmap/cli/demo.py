@@ -90,7 +90,7 @@ def _compiling(summary: dict[str, Any]) -> str:
 
 
 def _simulation_progress(console: Console) -> Any:
-    from lhdmap.simulation.world import START_NS
+    from lhdmap.simulation.history import START_NS
 
     def position(record: Record) -> float:
         return (record.log_time_ns - START_NS) * 1e-9

@@ -87,8 +87,11 @@ def _add_sensors(group: Any) -> None:
     group.add_argument("--dust", action="store_true", help="dust returns, mixed pixels at edges, drop-outs")
     group.add_argument("--rear", action=yes_or_no, help="rear scanner (default: on)")
     group.add_argument("--inclinometer", action=yes_or_no, help="inclinometer (default: on; off with --planar)")
-    group.add_argument("--wheels", action=yes_or_no, help="tachometer, joints, transmission pressure (default: on)")
+    group.add_argument("--wheels", action=yes_or_no, help="tachometer, joints, pressures (default: on)")
     group.add_argument("--slip", action="store_true", help="the wheels slip in bursts of 2 s")
+    group.add_argument(
+        "--faults", type=Path, metavar="TOML", help="faults of sensors, each a [[fault]] (docs/sensors.md)"
+    )
 
 
 def run(arguments: argparse.Namespace, console: Console) -> int:
@@ -190,6 +193,7 @@ def scenario_of(arguments: argparse.Namespace) -> DriftScenario:
     """
     from lhdmap.settings import load_section
     from lhdmap.simulation.scenario import SECTIONS, load_scenario
+    from lhdmap.simulation.sensing.faults import load_faults
 
     path = Path(arguments.scenario)
     if arguments.scenario not in BUILT_IN and not path.is_file():
@@ -203,6 +207,8 @@ def scenario_of(arguments: argparse.Namespace) -> DriftScenario:
         current = getattr(scenario, name)
         checked = load_section(SECTIONS[name], name, values)
         scenario = replace(scenario, **{name: replace(current, **{key: getattr(checked, key) for key in values})})
+    if arguments.faults is not None:
+        top["faults"] = load_faults(arguments.faults)
     return replace(scenario, **top)
 
 
@@ -296,7 +302,7 @@ def _stem(arguments: argparse.Namespace, scenario: DriftScenario) -> str:
 
 def _shown(records: Iterator[Record], console: Console, total_s: float) -> Iterator[Record]:
     """Yield records with progress by their time in the log."""
-    from lhdmap.simulation.world import START_NS
+    from lhdmap.simulation.history import START_NS
 
     def position(record: Record) -> float:
         return (record.log_time_ns - START_NS) * 1e-9

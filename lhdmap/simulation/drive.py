@@ -2,31 +2,28 @@
 
 from __future__ import annotations
 
-import heapq
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from lhdmap.errors import UsageError
 from lhdmap.geometry import se3
-from lhdmap.messages import Float32Array, FloatArray, GroundTruth, LaserScan, Mount, Record
+from lhdmap.messages import Record
 from lhdmap.outputs import OutputFiles
-from lhdmap.roles import recorded
-from lhdmap.simulation import sensors
+from lhdmap.simulation.history import Column
 from lhdmap.simulation.pile_facts import PileTruth
 from lhdmap.simulation.pile_files import write_pile_truth
 from lhdmap.simulation.pile_truth import pile_truth
-from lhdmap.simulation.scanner import Beams, Rig, measured, obstructed, rays_of
+from lhdmap.simulation.scanner import beams_of, sweep_ns
 from lhdmap.simulation.scenario import DriftScenario, scenario_toml
+from lhdmap.simulation.sensing.faults import with_faults
+from lhdmap.simulation.sensing.sensor import Beat, Sensor, read_all
+from lhdmap.simulation.sensing.suite import sensors_of
 from lhdmap.simulation.world import DriftWorld
 from lhdmap.trajectory import Trajectory, write_tum
 
-BATCH_SCANS = 25
-_REAR_PHASE = 0.37  # the rear scanner is not synchronised with the front one: share of a sweep that it is behind
 Progress = Callable[[Iterator[Record], float], Iterator[Record]]
 
 
@@ -45,17 +42,6 @@ class SimulatedDrive:
     distance_m: float
     pile_file: Path | None = None
     pile: PileTruth | None = None
-
-
-class ScannerStream(NamedTuple):
-    """One scanner of the simulated machine: topic, frame, beams, rig, stamps and its own sources of chance."""
-
-    role: str
-    frame_id: str
-    beams: Beams
-    rig: Rig
-    stamps_ns: npt.NDArray[np.int64]
-    seed: tuple[int, int]
 
 
 def simulate_drift(
@@ -84,7 +70,7 @@ def simulate_drift(
     with OutputFiles(truth_file, scenario_file, mesh_path, pile_file, path, force=force) as files:
         world = DriftWorld(scenario)
         files.at(scenario_file).write_text(scenario_toml(scenario), encoding="utf-8")
-        truth = truth_at(world, front_stamps(world))
+        truth = truth_of(world)
         write_tum(files.at(truth_file), truth)
         if mesh_path is not None:
             world.write_mesh(files.at(mesh_path))
@@ -101,8 +87,8 @@ def simulate_drift(
         truth,
         scans,
         messages,
-        world.motion.duration_s,
-        world.motion.distance_m,
+        world.history.last_s,
+        world.distance_m,
         pile_file,
         pile,
     )
@@ -114,7 +100,7 @@ def _write_log(world: DriftWorld, path: Path, progress: Progress | None) -> int:
 
     stream, messages = records(world), 0
     with LogWriter(path) as writer:
-        for record in progress(stream, world.motion.duration_s) if progress else stream:
+        for record in progress(stream, world.history.last_s) if progress else stream:
             writer.write(record.topic, record.message, record.log_time_ns)
             messages += 1
     return messages
@@ -122,91 +108,31 @@ def _write_log(world: DriftWorld, path: Path, progress: Progress | None) -> int:
 
 def records(world: DriftWorld) -> Iterator[Record]:
     """Yield all messages of the drive in the order of their log time."""
-    scenario, motion, clock = world.scenario, world.motion, world.clock
-    streams = [mounts(world), sensors.mode_messages(motion, clock), scans(world, scanner_stream(world, "front"))]
-    if scenario.scanner.rear:
-        streams.append(scans(world, scanner_stream(world, "rear")))
-    if scenario.inclinometer.enabled:
-        streams.append(sensors.inclinations(scenario.inclinometer, motion, clock, world.rng("inclinometer")))
-    if scenario.wheels.enabled:
-        streams.append(sensors.joint_readings(scenario.wheels, motion, clock, world.rng("joints")))
-        streams.append(sensors.tachometer_readings(scenario.wheels, motion, clock, world.rng("tachometer")))
-        streams.append(sensors.pressure_readings(motion, clock, world.rng("pressure")))
-    if scenario.truth:
-        streams.append(truth_messages(truth_at(world, front_stamps(world))))
-    return heapq.merge(*streams, key=lambda record: record.log_time_ns)
+    return read_all(drift_sensors(world), world.history, world)
 
 
-def mounts(world: DriftWorld) -> Iterator[Record]:
-    """Yield the static transforms of the sensors that the log has."""
-    used = {"lidar_front", *(("lidar_rear",) if world.scenario.scanner.rear else ())}
-    used |= {"inclinometer"} if world.scenario.inclinometer.enabled else set()
-    stamp = world.clock.start_ns
-    for name, mount in world.machine.mounts.items():
-        if name in used:
-            yield recorded("tf_static", stamp, Mount(stamp, mount.parent, name, mount.T_parent_sensor))
-
-
-def front_stamps(world: DriftWorld) -> npt.NDArray[np.int64]:
-    """Return the stamps of the front scans, shape (N,), ns."""
-    return world.clock.stamps_ns(world.motion.duration_s, world.scenario.scanner.rate_hz)
-
-
-def scanner_stream(world: DriftWorld, side: str) -> ScannerStream:
-    """Return the stream of the scanner on `side`, `front` or `rear`."""
-    settings, rear = world.scenario.scanner, side == "rear"
-    offset_s = _REAR_PHASE / settings.rate_hz if rear else 0.0
-    stamps_ns = world.clock.stamps_ns(world.motion.duration_s, settings.rate_hz, offset_s)
-    name = f"lidar_{side}"
-    return ScannerStream(side, name, world.beams, world.rig(name), stamps_ns, (world.scenario.seed, 100 + rear))
-
-
-def scans(world: DriftWorld, stream: ScannerStream) -> Iterator[Record]:
-    """Yield the scans of one scanner, cast in batches."""
-    settings = world.scenario.scanner
-    duration_ns = round(stream.beams.times_s[-1] * 1e9)
-    for first in range(0, len(stream.stamps_ns), BATCH_SCANS):
-        stamps_ns = stream.stamps_ns[first : first + BATCH_SCANS]
-        rng = np.random.default_rng([*stream.seed, first])
-        exact = obstructed(exact_ranges(world, stream, stamps_ns), world.clock.seconds(stamps_ns), settings)
-        ranges = measured(exact, settings, world.dust(stamps_ns), rng)
-        for stamp, row in zip(stamps_ns.tolist(), ranges, strict=True):
-            yield recorded(
-                stream.role, stamp + duration_ns, _scan(stream, settings.min_range_m, settings.max_range_m, stamp, row)
-            )
-
-
-def exact_ranges(world: DriftWorld, stream: ScannerStream, stamps_ns: npt.NDArray[np.int64]) -> Float32Array:
-    """Return exact ranges, shape (S, N), metres, inf for none, of the scans at `stamps_ns`."""
-    time_s = world.clock.seconds(stamps_ns)
-    surface = world.surface.near(world.place_m(float(np.mean(time_s))))
-    rays, blocked = rays_of(world.motion.table, time_s, stream.beams, stream.rig, surface.origin_m)
-    return np.minimum(surface.cast(rays), blocked).reshape(len(stamps_ns), -1)
-
-
-def _scan(stream: ScannerStream, low_m: float, high_m: float, stamp_ns: int, ranges_m: Float32Array) -> LaserScan:
-    beams = stream.beams
-    return LaserScan(
-        stamp_ns,
-        stream.frame_id,
-        float(beams.angles_rad[0]),
-        beams.increment_rad,
-        beams.time_increment_s,
-        low_m,
-        high_m,
-        ranges_m,
+def drift_sensors(world: DriftWorld) -> list[Sensor]:
+    """Return the sensors of the machine in the drift, with the scenario's faults."""
+    scenario, seed = world.scenario, world.sensor_seed
+    sensors = sensors_of(
+        world.machine, scenario.sensors, seed=seed, true_mounts=world.true_mounts, truth=scenario.truth
     )
+    return with_faults(sensors, scenario.faults, seed=seed)
 
 
-def truth_at(world: DriftWorld, stamps_ns: npt.NDArray[np.int64]) -> Trajectory:
-    """Return the exact poses of `base_link` in `map` at `stamps_ns`."""
-    rows: FloatArray = world.motion.at(world.clock.seconds(stamps_ns))
-    return Trajectory(stamps_ns, rows[:, :3], se3.quaternions_from_rpy(rows[:, 3], rows[:, 4], rows[:, 5]))
+def truth_of(world: DriftWorld) -> Trajectory:
+    """Return the exact poses of `base_link` in `map` at the stamps of the front scans."""
+    stamps = _front_stamps(world)
+    rows = np.array([world.history.state(stamp) for stamp in stamps]).reshape(len(stamps), -1)
+    quaternions = se3.quaternions_from_rpy(rows[:, Column.ROLL], rows[:, Column.PITCH], rows[:, Column.YAW])
+    return Trajectory(np.array(stamps, dtype=np.int64), rows[:, :3].copy(), quaternions)
 
 
-def truth_messages(truth: Trajectory) -> Iterator[Record]:
-    """Yield the truth as messages."""
-    for stamp, position, quaternion in zip(
-        truth.stamps_ns.tolist(), truth.positions_m, truth.quaternions_xyzw, strict=True
-    ):
-        yield recorded("ground_truth", stamp, GroundTruth(stamp, position, quaternion))
+def _front_stamps(world: DriftWorld) -> list[int]:
+    """Return the stamps of the front scans that are complete when the drive ends."""
+    settings = world.scenario.scanner
+    beat, last_ns, stamps = Beat(settings.rate_hz), world.history.last_ns - sweep_ns(beams_of(settings).times_s), []
+    while beat.stamp_ns <= last_ns:
+        stamps.append(beat.stamp_ns)
+        beat.advance()
+    return stamps

@@ -1,4 +1,4 @@
-"""The machine on the floor of the drift: its pose, joint angle and speed over time; the truth of a simulated log.
+"""The machine on the floor of the drift: its states over time (`lhdmap.simulation.history`); the truth of a simulated log.
 
 The front axle follows its path without side slip, the rear follows by Eq. (1). Roll and pitch are those of the plane
 through both front wheels' contacts and the middle of the rear axle (which swings, so that four wheels touch).
@@ -15,47 +15,18 @@ from lhdmap.machine import Machine
 from lhdmap.messages import FloatArray
 from lhdmap.mine.centre_line import STEP_M, CentreLine, beside
 from lhdmap.simulation.drift import Drift
+from lhdmap.simulation.history import Column
 from lhdmap.simulation.noise_field import Scales, noise_field
 from lhdmap.simulation.sections import DriveSettings
+from lhdmap.simulation.sensing.sections import WheelSettings
 from lhdmap.simulation.timetable import Timetable
 
 TABLE_RATE_HZ = 1000.0
+BOOM_RAD, BUCKET_RAD = -0.35, 0.6
+"""Tramming posture: boom down, bucket rolled back."""
+_GRAVITY_MPS2, _ROLLING_RESISTANCE_MPS2 = 9.81, 0.3
 _EVERY = 4  # of the path's samples the floor is asked for: 4 cm, far below a footprint
 _FOOTPRINT_M = 0.25  # half length and width of the patch under a tyre that carries it
-
-
-class Motion(NamedTuple):
-    """State at `TABLE_RATE_HZ`, one row each, columns x, y, z, roll, pitch, yaw of `base_link` in `map`, articulation.
-
-    Shape (N, 7), metres and radians, yaw continuous; `s_m` (N,) is the place on the path (horizontal arc length),
-    `speed_mps` (N,) the signed speed of the front axle along the floor.
-    """
-
-    table: FloatArray
-    s_m: FloatArray
-    speed_mps: FloatArray
-
-    @property
-    def duration_s(self) -> float:
-        """Length of the drive in seconds."""
-        return (len(self.table) - 1) / TABLE_RATE_HZ
-
-    @property
-    def distance_m(self) -> float:
-        """Distance driven along the floor, forwards and in reverse, metres."""
-        return float(np.abs(self.speed_mps).sum()) / TABLE_RATE_HZ
-
-    def at(self, time_s: FloatArray) -> FloatArray:
-        """Return rows of the table at any times, shape (M, 7), linear in between."""
-        return interpolated(self.table, time_s)
-
-
-def interpolated(table: FloatArray, time_s: FloatArray) -> FloatArray:
-    """Return rows of a table sampled at `TABLE_RATE_HZ` at any times, linear in between, its ends held."""
-    position = np.clip(np.asarray(time_s, dtype=float) * TABLE_RATE_HZ, 0.0, len(table) - 1.0)
-    index = np.minimum(position.astype(np.int64), len(table) - 2)
-    share = (position - index).reshape(-1, *([1] * (table.ndim - 1)))
-    return table[index] * (1.0 - share) + table[index + 1] * share
 
 
 def drive_path(drift: Drift, settings: DriveSettings, rng: np.random.Generator) -> CentreLine:
@@ -74,8 +45,11 @@ class Plan(NamedTuple):
     timetable: Timetable
 
 
-def simulate_motion(drift: Drift, plan: Plan, machine: Machine, shaking: Shaking) -> Motion:
-    """Return the motion of `machine` over the floor of `drift` as planned."""
+def simulate_motion(drift: Drift, plan: Plan, machine: Machine, shaking: Shaking) -> FloatArray:
+    """Return the motion of `machine` over the floor of `drift` as planned: rows (N, 17) of a history at `TABLE_RATE_HZ`.
+
+    The wheels do not slip: their speed is that of the machine.
+    """
     path, timetable = plan.path, plan.timetable
     time_s = np.arange(int(timetable.duration_s * TABLE_RATE_HZ) + 1) / TABLE_RATE_HZ
     on_path = _poses_on_path(drift, path, machine)
@@ -83,9 +57,41 @@ def simulate_motion(drift: Drift, plan: Plan, machine: Machine, shaking: Shaking
     way_m -= np.interp(plan.start_m, path.s_m, way_m)
     driven_m, speed_mps = timetable.at(time_s)
     s_m = np.interp(driven_m, way_m, path.s_m)
-    table = np.stack([np.interp(s_m, path.s_m, column) for column in on_path.T], axis=1)
-    table[:, 3:5] += shaking.angles(len(time_s))
-    return Motion(table, s_m, speed_mps)
+    rows = np.zeros((len(time_s), len(Column)))
+    for column, values in enumerate(on_path.T):
+        rows[:, column] = np.interp(s_m, path.s_m, values)
+    rows[:, Column.ROLL : Column.PITCH + 1] += shaking.angles(len(time_s))
+    rows[:, Column.SPEED] = rows[:, Column.WHEEL_SPEED] = speed_mps
+    rows[:, Column.ARTICULATION_RATE] = np.gradient(rows[:, Column.ARTICULATION]) * TABLE_RATE_HZ
+    rows[:, Column.BOOM], rows[:, Column.BUCKET] = BOOM_RAD, BUCKET_RAD
+    rows[:, Column.TRACTION] = _traction(speed_mps, rows[:, Column.PITCH])
+    return rows
+
+
+def _traction(speed_mps: FloatArray, pitch_rad: FloatArray) -> FloatArray:
+    """Return what the wheels give (m/s²): speeding up, climbing and rolling resistance; at rest the brakes hold."""
+    needed = np.gradient(speed_mps) * TABLE_RATE_HZ - _GRAVITY_MPS2 * np.sin(pitch_rad)
+    direction = np.sign(speed_mps)
+    return (needed + _ROLLING_RESISTANCE_MPS2 * direction) * np.abs(direction)
+
+
+def slip_factors(settings: WheelSettings, time_s: FloatArray, rng: np.random.Generator) -> FloatArray:
+    """Return the speed of the drive line over that of the machine, shape (N,): more than one in bursts, where wanted."""
+    factors = np.ones(len(time_s))
+    for start_s in _slip_bursts(settings, float(time_s[-1]), rng):
+        factors[(time_s >= start_s) & (time_s < start_s + settings.slip_burst_s)] += settings.slip_size
+    return factors
+
+
+def _slip_bursts(settings: WheelSettings, duration_s: float, rng: np.random.Generator) -> list[float]:
+    """Return the starts (s) of the slip bursts: at chance, never overlapping, at least one where slip is wanted."""
+    if not settings.slip:
+        return []
+    starts, at = [], rng.uniform(0.2, 0.8) * min(settings.slip_every_s, duration_s)
+    while at < duration_s:
+        starts.append(at)
+        at += settings.slip_burst_s + rng.exponential(max(settings.slip_every_s - settings.slip_burst_s, 0.1))
+    return starts
 
 
 class Shaking(NamedTuple):

@@ -1,7 +1,8 @@
 """What a machine did up to now: its states at a fixed rate, which is all that its sensors see of it.
 
 A drive whose motion is known beforehand is a whole history at once; a stepped machine appends to one. Sensors read both
-alike, so that both give the same bytes.
+alike, so that both give the same bytes: where between two rows a stamp lies is reckoned in whole nanoseconds, and a stamp
+on a row needs no row after it.
 """
 
 from __future__ import annotations
@@ -12,6 +13,9 @@ import numpy as np
 
 from lhdmap.messages import FloatArray
 
+START_NS = 1_700_000_000_123_456_789
+"""Stamp of the start of the clock, which is that of the first row."""
+SECOND_NS = 1_000_000_000
 _LEAST_ROWS = 1024
 
 
@@ -43,13 +47,14 @@ class Column(IntEnum):
 
 
 class History:
-    """Rows (N, 17) of the `Column`s at `rate_hz`, the first at `first_s` after the start of the clock.
+    """Rows (N, 17) of the `Column`s at `rate_hz` (a whole number), the first at the start of the clock.
 
     A stepped run forgets what is older than `keep_s`.
     """
 
     def __init__(self, rate_hz: float, rows: FloatArray | None = None, *, keep_s: float = 5.0) -> None:
         self.rate_hz = rate_hz
+        self._per_second = round(rate_hz)
         self._keep = max(int(keep_s * rate_hz), 2)
         self._rows = np.empty((_LEAST_ROWS, len(Column))) if rows is None else np.ascontiguousarray(rows, dtype=float)
         self._count = 0 if rows is None else len(rows)
@@ -68,6 +73,11 @@ class History:
         return (self._first + self._count - 1) / self.rate_hz
 
     @property
+    def last_ns(self) -> int:
+        """Stamp of the last row."""
+        return START_NS + (self._first + self._count - 1) * SECOND_NS // self._per_second
+
+    @property
     def rows(self) -> FloatArray:
         """The rows that are kept, shape (N, 17): a view."""
         return self._rows[: self._count]
@@ -76,6 +86,27 @@ class History:
     def first_index(self) -> int:
         """Index of the first row of `rows`, counted from the start of the clock."""
         return self._first
+
+    def split(self, stamp_ns: int) -> tuple[int, float]:
+        """Return the row at or before a stamp (its place in `rows`) and the share of the step to the next; ends are held.
+
+        Raises:
+            ValueError: the row is forgotten: `keep_s` is shorter than what a sensor looks back.
+        """
+        index, rest = divmod((stamp_ns - START_NS) * self._per_second, SECOND_NS)
+        index -= self._first
+        if index < 0 and self._first > 0:
+            raise ValueError(f"the state of {stamp_ns} ns is forgotten: keep_s must be larger")
+        if index < 0 or index >= self._count - 1:
+            return (0 if index < 0 else self._count - 1), 0.0
+        return index, rest / SECOND_NS
+
+    def state(self, stamp_ns: int) -> FloatArray:
+        """Return the state at a stamp, shape (17,), linear between the rows, the ends held; raises as `split`."""
+        index, share = self.split(stamp_ns)
+        if share == 0.0:
+            return self._rows[index].copy()
+        return self._rows[index] * (1.0 - share) + self._rows[index + 1] * share
 
     def at(self, time_s: FloatArray) -> FloatArray:
         """Return states at any times, shape (M, 17), linear in between, the ends held."""

@@ -13,13 +13,8 @@ from lhdmap.simulation.pile_draws import between, normal, rounded, tilt_error
 from lhdmap.simulation.pile_sections import VARIANTS, MountingSettings, PileSettings
 from lhdmap.simulation.pile_variants import SHAPES
 from lhdmap.simulation.scenario import DriftScenario
-from lhdmap.simulation.sections import (
-    DriftSettings,
-    DriveSettings,
-    InclinometerSettings,
-    ScannerSettings,
-    WheelSettings,
-)
+from lhdmap.simulation.sections import DriftSettings, DriveSettings
+from lhdmap.simulation.sensing.sections import InclinometerSettings, ScannerSettings, WheelSettings
 
 _BEHIND_M = 14.0  # the drift before the start, as the world makes it
 _LAST_STRAIGHT_M = (20.0, 26.0)

@@ -1,4 +1,4 @@
-"""A simulated 2D scanner: rays from the machine's pose at each beam's own time, then what spoils a range."""
+"""Scanners on the machine: rays from its pose at each beam's own time, then what spoils the ranges of a 2D scanner."""
 
 from __future__ import annotations
 
@@ -10,8 +10,10 @@ import numpy.typing as npt
 
 from lhdmap.machine import Machine, SensorMount
 from lhdmap.messages import Float32Array, FloatArray
+from lhdmap.simulation.history import History
 from lhdmap.simulation.ray_kernel import fill_rays
-from lhdmap.simulation.sections import ScannerSettings
+from lhdmap.simulation.sensing.sections import ScannerSettings
+from lhdmap.simulation.surroundings import View
 
 _PERSON_M = 1.2  # how near a person stands
 _EDGE_M, _EDGE_OVER_NEIGHBOURS = (
@@ -65,18 +67,41 @@ def rig_of(machine: Machine, mount: SensorMount, *, occlusion: bool) -> Rig:
     return Rig(mount.T_parent_sensor, mount.parent == "rear_link", joint, front, rear)
 
 
-def rays_of(
-    table: FloatArray, stamps_s: FloatArray, beams: Beams, rig: Rig, origin_m: FloatArray
-) -> tuple[Float32Array, Float32Array]:
-    """Return rays (S·N, 6), origin less `origin_m` and unit direction in `map`, and ranges to the own body (S·N,).
+class Sweep(NamedTuple):
+    """The rays of one turn of a scanner: directions in its frame, shape (N, 3), and times after the stamp (N,), s, rising."""
 
-    `table` is a motion's (`lhdmap.simulation.driving.Motion`), `stamps_s` (S,) the times of the first beams.
-    """
-    rays = np.empty((stamps_s.size * beams.angles_rad.size, 6), dtype=np.float32)
+    directions: FloatArray
+    times_s: FloatArray
+
+
+def sweep_of(beams: Beams) -> Sweep:
+    """Return the rays of a 2D scanner."""
+    angles = beams.angles_rad
+    return Sweep(np.stack([np.cos(angles), np.sin(angles), np.zeros_like(angles)], axis=1), beams.times_s)
+
+
+def sweep_ns(times_s: FloatArray) -> int:
+    """Return when the last of the beams is measured for sure, ns after the stamp."""
+    return math.floor(float(times_s[-1]) * 1e9) + 1 if times_s[-1] > 0.0 else 0
+
+
+def rays_of(
+    history: History, stamp_ns: int, sweep: Sweep, rig: Rig, origin_m: FloatArray
+) -> tuple[Float32Array, Float32Array]:
+    """Return rays (N, 6), origin less `origin_m` and unit direction in `map`, and ranges to the own body (N,)."""
+    rays = np.empty((sweep.times_s.size, 6), dtype=np.float32)
     blocked = np.empty(len(rays), dtype=np.float32)
     parts = (rig.T_parent_sensor, rig.on_rear, rig.joint_m, rig.front_boxes_m, rig.rear_boxes_m)
-    fill_rays(table, stamps_s, (beams.angles_rad, beams.times_s), parts, origin_m, rays, blocked)
+    beams = (sweep.directions, sweep.times_s)
+    fill_rays(history.rows, history.split(stamp_ns), history.rate_hz, beams, parts, origin_m, rays, blocked)
     return rays, blocked
+
+
+def exact_ranges(history: History, world: View, stamp_ns: int, sweep: Sweep, rig: Rig) -> Float32Array:
+    """Return exact ranges (N,), metres, inf for none, of the sweep that begins at a stamp."""
+    surface = world.near(history.state(stamp_ns)[:3])
+    rays, blocked = rays_of(history, stamp_ns, sweep, rig, surface.origin_m)
+    return np.minimum(surface.cast(rays), blocked)
 
 
 def obstructed(exact_m: Float32Array, time_s: FloatArray, settings: ScannerSettings) -> Float32Array:

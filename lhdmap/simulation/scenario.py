@@ -11,11 +11,15 @@ from lhdmap.errors import ConfigError
 from lhdmap.settings import figure, read_toml, setting
 from lhdmap.settings_tree import part, tree_from, tree_toml
 from lhdmap.simulation.pile_sections import MountingSettings, PileSettings
-from lhdmap.simulation.sections import (
-    DriftSettings,
-    DriveSettings,
+from lhdmap.simulation.sections import DriftSettings, DriveSettings
+from lhdmap.simulation.sensing.faults import FaultSettings
+from lhdmap.simulation.sensing.sections import (
+    CloudSettings,
+    ImuSettings,
     InclinometerSettings,
+    PressureSettings,
     ScannerSettings,
+    SensorSettings,
     WheelSettings,
 )
 
@@ -30,7 +34,8 @@ class DriftScenario:
 
     `planar` makes a 2D world: level scanners, flat floor, walls alike at all heights. `truth` writes the topic
     `/ground_truth/odometry`. `machine` is a machine file, or empty for the default. `pile` and `mounting` make it a
-    scenario of the kind 'pile': the drift ends in a pile, and the front scanner hangs as its mounting says.
+    scenario of the kind 'pile': the drift ends in a pile, and the front scanner hangs as its mounting says. `faults` are
+    those of sensors.
     """
 
     seed: int = setting(0, doc="Seed of all that is random.")
@@ -41,7 +46,11 @@ class DriftScenario:
     drive: DriveSettings = part(DriveSettings)
     scanner: ScannerSettings = part(ScannerSettings)
     inclinometer: InclinometerSettings = part(InclinometerSettings)
+    imu: ImuSettings = part(ImuSettings)
     wheels: WheelSettings = part(WheelSettings)
+    pressures: PressureSettings = part(PressureSettings)
+    cloud: CloudSettings = part(CloudSettings)
+    faults: tuple[FaultSettings, ...] = part(tuple, key="fault")
     pile: PileSettings | None = None
     mounting: MountingSettings | None = None
 
@@ -49,6 +58,11 @@ class DriftScenario:
     def kind(self) -> str:
         """Kind of the scenario: `drift` or `pile`."""
         return "drift" if self.pile is None else "pile"
+
+    @property
+    def sensors(self) -> SensorSettings:
+        """Settings of all sensors."""
+        return SensorSettings(self.scanner, self.inclinometer, self.imu, self.wheels, self.pressures, self.cloud)
 
     def __post_init__(self) -> None:
         """Check what the sections cannot; raises ConfigError."""
@@ -70,7 +84,10 @@ SECTIONS: dict[str, type[Any]] = {
     "drive": DriveSettings,
     "scanner": ScannerSettings,
     "inclinometer": InclinometerSettings,
+    "imu": ImuSettings,
     "wheels": WheelSettings,
+    "pressures": PressureSettings,
+    "cloud": CloudSettings,
 }
 _OF_A_PILE = ("pile", "mounting")
 

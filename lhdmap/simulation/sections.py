@@ -1,4 +1,4 @@
-"""The sections of a scenario: what there is to set, with unit and source."""
+"""The sections of a scenario: what there is to set of drift and drive, with unit and source."""
 
 from __future__ import annotations
 
@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from lhdmap.settings import setting
 
 FINDINGS = "simulated drift of the findings, section 3"
-LMS511 = "data sheet of the SICK LMS511"
 DEFAULT_PIECES = (
     (22.0, 0.0, 0.0),
     (13.0, 12.0, -4.0),
@@ -103,80 +102,4 @@ class DriveSettings:
         minimum=0.0,
         maximum=1.0,
         doc="Shaking of the front body in roll and pitch, standard deviation.",
-    )
-
-
-@dataclass(frozen=True, slots=True)
-class ScannerSettings:
-    """The 2D scanners, like SICK LMS511; rear and front alike."""
-
-    beams: int = setting(381, source=LMS511, minimum=5, maximum=4000, doc="Beams over the field of view: 381 or 761.")
-    field_of_view_deg: float = setting(
-        190.0, unit="deg", source=LMS511, minimum=10.0, maximum=359.0, doc="Field of view."
-    )
-    rate_hz: float = setting(25.0, unit="Hz", source=LMS511, minimum=0.5, maximum=100.0, doc="Sweeps in a second.")
-    noise_m: float = setting(
-        0.012, unit="m", source=FINDINGS, minimum=0.0, maximum=0.5, doc="Range noise, standard deviation."
-    )
-    min_range_m: float = setting(0.2, unit="m", minimum=0.0, maximum=5.0, doc="Shortest range that is measured.")
-    max_range_m: float = setting(
-        80.0, unit="m", source=LMS511, minimum=1.0, maximum=200.0, doc="Longest range that is measured."
-    )
-    sweep: bool = setting(
-        False, doc="Measure each beam at its own time (sweep distortion) instead of all at the stamp."
-    )
-    dust_share: float = setting(0.0, minimum=0.0, maximum=0.9, doc="Mean share of beams that a dust cloud returns.")
-    mixed_pixel_share: float = setting(
-        0.0, minimum=0.0, maximum=1.0, doc="Share of beams at depth edges that return a range between the two surfaces."
-    )
-    drop_out_share: float = setting(0.0, minimum=0.0, maximum=0.9, doc="Share of beams without a return.")
-    blackouts: tuple[tuple[float, float], ...] = setting(
-        (), unit="s, s", doc="Times without any return as (time in the log, duration)."
-    )
-    person: tuple[tuple[float, float, float], ...] = setting(
-        (),
-        unit="s, s, -",
-        doc="Someone before the scanners as (time, duration, share of the beams hidden, from the right).",
-    )
-    rear: bool = setting(True, doc="Whether the machine has a rear scanner.")
-    occlusion: bool = setting(True, doc="Whether the machine's own bodies hide what is behind them.")
-
-
-@dataclass(frozen=True, slots=True)
-class InclinometerSettings:
-    """The inclinometer of the front body."""
-
-    enabled: bool = setting(True, doc="Whether there is one.")
-    rate_hz: float = setting(100.0, unit="Hz", minimum=1.0, maximum=1000.0, doc="Readings in a second.")
-    noise_deg: float = setting(0.1, unit="deg", source="issue figures", minimum=0.0, maximum=5.0, doc="White noise.")
-    lag_s: float = setting(0.1, unit="s", source="issue figures", minimum=0.0, maximum=2.0, doc="Lag of the reading.")
-    lag_kind: str = setting(
-        "first_order", choices=("first_order", "delay"), doc="Low pass of that time constant, or pure delay."
-    )
-    bias_roll_deg: float = setting(0.0, unit="deg", minimum=-10.0, maximum=10.0, doc="Constant error of the roll.")
-    bias_pitch_deg: float = setting(0.0, unit="deg", minimum=-10.0, maximum=10.0, doc="Constant error of the pitch.")
-
-
-@dataclass(frozen=True, slots=True)
-class WheelSettings:
-    """Tachometer, joint encoders and transmission pressure."""
-
-    enabled: bool = setting(True, doc="Whether they are in the log.")
-    rate_hz: float = setting(50.0, unit="Hz", minimum=1.0, maximum=1000.0, doc="Readings in a second.")
-    scale_error: float = setting(
-        0.01,
-        source="issue figures",
-        minimum=0.0,
-        maximum=0.5,
-        doc="Size of the tachometer's scale error; the seed gives its sign.",
-    )
-    noise_mps: float = setting(0.02, unit="m/s", minimum=0.0, maximum=1.0, doc="White noise of the tachometer.")
-    slip: bool = setting(False, doc="Whether the wheels slip in bursts.")
-    slip_burst_s: float = setting(
-        2.0, unit="s", source="issue figures", minimum=0.1, maximum=60.0, doc="Length of a burst."
-    )
-    slip_every_s: float = setting(15.0, unit="s", minimum=1.0, maximum=600.0, doc="Mean time from burst to burst.")
-    slip_size: float = setting(0.5, minimum=0.0, maximum=5.0, doc="Wheel speed over ground speed in a burst, less one.")
-    articulation_noise_deg: float = setting(
-        0.05, unit="deg", minimum=0.0, maximum=5.0, doc="White noise of the joint encoder."
     )

@@ -32,9 +32,13 @@ class Ground(Protocol):
         ...
 
 
-class Surroundings(Ground, Protocol):
-    """A world to drive and look around in."""
+class View(Protocol):
+    """What scanners look at."""
 
     def near(self, position_m: FloatArray) -> Rays:
         """Return what rays from a point (3,) of `map` meet, to cast them against."""
         ...
+
+
+class Surroundings(Ground, View, Protocol):
+    """A world to drive and look around in."""

@@ -9,29 +9,29 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-import numpy.typing as npt
 
 from lhdmap.errors import ConfigError
 from lhdmap.kinematics import articulation_along_path
-from lhdmap.machine import Machine, load_machine
+from lhdmap.machine import Machine, SensorMount, load_machine
 from lhdmap.messages import FloatArray
 from lhdmap.mine.centre_line import STEP_M, CentreLine, Start, centre_line
 from lhdmap.simulation.crossing import Crossing, side_drift
 from lhdmap.simulation.drift import Drift, Mesh
-from lhdmap.simulation.driving import Motion, Plan, Shaking, drive_path, simulate_motion
+from lhdmap.simulation.driving import TABLE_RATE_HZ, Plan, Shaking, drive_path, simulate_motion, slip_factors
+from lhdmap.simulation.history import START_NS as START_NS  # others know it from here
+from lhdmap.simulation.history import Column, History
 from lhdmap.simulation.mesh_file import write_ply
 from lhdmap.simulation.pile import Pile, make_pile
 from lhdmap.simulation.pile_sections import MountingSettings
-from lhdmap.simulation.raycast import TiledSurface
-from lhdmap.simulation.scanner import Beams, Rig, beams_of, rig_of
+from lhdmap.simulation.raycast import Surface, TiledSurface
 from lhdmap.simulation.scenario import DriftScenario, flattened
-from lhdmap.simulation.sensors import Clock
 from lhdmap.simulation.timetable import timetable
 
 _PIECE_M = 30.0
+_TILE_M = 60.0  # a drift that is no longer than what is seen from such a stretch is one tile
+_PLACE_STEP = 50  # of the centre line's samples, to find a place on it
 FRONT = "lidar_front"
 _VIEW_M = 0.25  # how far a scanner's height is above the bucket: it is mounted where its view is free
-START_NS = 1_700_000_000_123_456_789
 BEHIND_M, _AHEAD_M = 14.0, 20.0  # drift behind the machine's start and ahead of its end
 
 
@@ -42,20 +42,26 @@ class DriftWorld:
         self.scenario = flattened(scenario)
         machine = load_machine(Path(scenario.machine) if scenario.machine else None)
         self.machine = _mounted(_levelled(machine, scenario.planar), scenario.mounting)
-        self.clock = Clock(START_NS)
         self.drift = self._make_drift()
         self.crossing = self._make_crossing()
         self.pile = self._make_pile()
-        self.motion = self._make_motion()
-        self.beams: Beams = beams_of(self.scenario.scanner)
-        reach_m = min(self.scenario.scanner.max_range_m, 85.0) + 15.0
-        self.surface = TiledSurface(self.mesh_between, reach_m, tile_m=40.0 if self.pile is None else 1e6)
+        self.history = self._make_history()
+        self._line_points = self._points_on_line()
+        reach_m = min(self.scenario.sensors.reach_m, 85.0) + 15.0
+        whole = self.pile is not None or self.drift.line.length_m <= 2.0 * reach_m + _TILE_M
+        self.surface = TiledSurface(self.mesh_between, reach_m, tile_m=1e6 if whole else _TILE_M)
 
     def rng(self, name: str) -> np.random.Generator:
         """Return the source of chance of the part `name`: independent of all others and of the order of use."""
         pile = self.scenario.pile
         kind = [] if pile is None else [zlib.crc32(pile.variant.encode())]
         return np.random.default_rng([self.scenario.seed, zlib.crc32(name.encode()), *kind])
+
+    @property
+    def sensor_seed(self) -> int:
+        """Seed of the sensors: other readings in each variant of a pile."""
+        pile = self.scenario.pile
+        return self.scenario.seed + (0 if pile is None else zlib.crc32(pile.variant.encode()) << 32)
 
     def _make_drift(self) -> Drift:
         settings, rng = self.scenario.drift, self.rng("start")
@@ -82,13 +88,20 @@ class DriftWorld:
             return None
         return make_pile(settings, self.drift, BEHIND_M + settings.toe_m, self.machine, self.rng("pile"))
 
-    def _make_motion(self) -> Motion:
+    def _make_history(self) -> History:
         settings = self.scenario.drive
         path = drive_path(self.drift, settings, self.rng("path"))
         plan = Plan(path, BEHIND_M, timetable(settings, self.rng("speed")))
         self._check_bends(path)
         shaking = Shaking(math.radians(settings.vibration_deg), self.rng("shaking"))
-        return simulate_motion(self.drift, plan, self.machine, shaking)
+        rows = simulate_motion(self.drift, plan, self.machine, shaking)
+        time_s = np.arange(len(rows)) / TABLE_RATE_HZ
+        rows[:, Column.WHEEL_SPEED] *= slip_factors(self.scenario.wheels, time_s, self.rng("slip"))
+        return History(TABLE_RATE_HZ, rows)
+
+    def _points_on_line(self) -> FloatArray:
+        line = self.drift.line
+        return np.stack([line.x_m, line.y_m, line.z_m], axis=1)[::_PLACE_STEP]
 
     def _check_bends(self, path: CentreLine) -> None:
         size = self.machine.dimensions
@@ -101,33 +114,28 @@ class DriftWorld:
                 f"{size.max_articulation_deg:g}° only: use larger radii"
             )
 
-    def rig(self, mount: str) -> Rig:
-        """Return the rig of the scanner with that mount.
+    @property
+    def true_mounts(self) -> dict[str, SensorMount]:
+        """Mounts that are other than the log says."""
+        if self.scenario.mounting is None or FRONT not in self.machine.mounts:
+            return {}
+        told = self.machine.mounts[FRONT]
+        return {FRONT: replace(told, pitch_deg=told.pitch_deg + self.scenario.mounting.tilt_error_deg)}
 
-        Raises:
-            ConfigError: the machine has no such mount.
-        """
-        if mount not in self.machine.mounts:
-            raise ConfigError(f"machine '{self.machine.name}' has no [mount.{mount}]: the simulator needs one")
-        true_mount = self.machine.mounts[mount]
-        if mount == FRONT and self.scenario.mounting is not None:
-            error_deg = self.scenario.mounting.tilt_error_deg
-            true_mount = replace(true_mount, pitch_deg=true_mount.pitch_deg + error_deg)
-        return rig_of(self.machine, true_mount, occlusion=self.scenario.scanner.occlusion)
+    @property
+    def distance_m(self) -> float:
+        """Distance driven along the floor, forwards and in reverse, metres."""
+        return float(np.abs(self.history.rows[:, Column.SPEED]).sum()) / TABLE_RATE_HZ
 
-    def place_m(self, time_s: float) -> float:
-        """Return the place of the machine along the drift at a time, metres."""
-        index = min(max(round(time_s * 1000.0), 0), len(self.motion.s_m) - 1)
-        return float(self.motion.s_m[index])
+    def place_m(self, position_m: FloatArray) -> float:
+        """Return the place along the drift that is nearest to a point (3,), metres."""
+        offsets = self._line_points - position_m
+        nearest = int(np.einsum("ij,ij->i", offsets, offsets).argmin())
+        return float(self.drift.line.s_m[_PLACE_STEP * nearest])
 
-    def dust(self, stamps_ns: npt.NDArray[np.int64]) -> FloatArray:
-        """Return the share of beams that dust returns in the sweeps at `stamps_ns`: clouds come and go in seconds."""
-        time_s = self.clock.seconds(stamps_ns)
-        phase = self.rng("dust").uniform(0.0, 2 * np.pi, 2)
-        wave = (
-            1.0 + 0.6 * np.sin(2 * np.pi * time_s / 7.0 + phase[0]) + 0.4 * np.sin(2 * np.pi * time_s / 2.3 + phase[1])
-        )
-        return np.clip(self.scenario.scanner.dust_share * wave, 0.0, 1.0)
+    def near(self, position_m: FloatArray) -> Surface:
+        """Return the surface that rays from a point (3,) near the centre line meet."""
+        return self.surface.near(self.place_m(position_m))
 
     def mesh_between(self, start_m: float, end_m: float) -> Mesh:
         """Return the mesh between two arc lengths; the drift's own ends are closed."""

@@ -9,9 +9,11 @@ from lhdmap.geometry import se3
 from lhdmap.messages import FloatArray, PointCloud
 from lhdmap.odometry.cloud_motion import CloudPrior
 from lhdmap.odometry.cloud_odometry import CloudOdometry, CloudStep
+from lhdmap.simulation.history import START_NS
 from lhdmap.simulation.scenario import DriftScenario
-from lhdmap.simulation.sections import DriftSettings, DriveSettings, ScannerSettings
-from lhdmap.simulation.world import START_NS, DriftWorld
+from lhdmap.simulation.sections import DriftSettings, DriveSettings
+from lhdmap.simulation.sensing.sections import ScannerSettings
+from lhdmap.simulation.world import DriftWorld
 
 RINGS, TURN, HALF_VIEW_DEG = 32, 450, 22.0
 PERIOD_S, NOISE_M = 0.1, 0.01
@@ -40,7 +42,7 @@ def simulate(world: DriftWorld, reach_m: float, *, count: int) -> CloudDrive:
     """Return the first `count` clouds of the drive in `world` by a scanner with a reach and a noise of 1 cm."""
     rng = np.random.default_rng(world.scenario.seed)
     starts_s = PERIOD_S * np.arange(count, dtype=np.float64)
-    assert starts_s[-1] + PERIOD_S < world.motion.duration_s
+    assert starts_s[-1] + PERIOD_S < world.history.last_s
     clouds = [_cloud(world, float(start_s), reach_m, rng) for start_s in starts_s]
     return CloudDrive(clouds, _poses(world, starts_s))
 
@@ -52,7 +54,7 @@ def drift_world(seed: int, drift: DriftSettings, speed_kmh: float, standstill_s:
 
 def _poses(world: DriftWorld, time_s: FloatArray) -> FloatArray:
     return np.array(
-        [se3.from_rpy(row[3], row[4], row[5], (row[0], row[1], row[2])) for row in world.motion.at(time_s).tolist()]
+        [se3.from_rpy(row[3], row[4], row[5], (row[0], row[1], row[2])) for row in world.history.at(time_s).tolist()]
     )
 
 
@@ -63,7 +65,7 @@ def _cloud(world: DriftWorld, start_s: float, reach_m: float, rng: np.random.Gen
     part = (share * _PARTS).astype(np.int64)
     times_s = PERIOD_S * (np.arange(_PARTS) + 0.5) / _PARTS
     T_map_sensor = (_poses(world, start_s + times_s) @ T_BASE_SENSOR)[part]
-    surface = world.surface.near(world.place_m(start_s))
+    surface = world.near(world.history.at(np.array([start_s]))[0, :3])
     directions = np.einsum("nij,nj->ni", T_map_sensor[:, :3, :3], beams)
     rays = np.concatenate([T_map_sensor[:, :3, 3] - surface.origin_m, directions], axis=1)
     ranges = surface.cast(rays.astype(np.float32)) + NOISE_M * rng.standard_normal(len(rays))

@@ -9,7 +9,8 @@ import pytest
 from lhdmap.pipeline.build import BuildRequest, BuildResult, build_map
 from lhdmap.simulation.drive import SimulatedDrive, simulate_drift
 from lhdmap.simulation.scenario import DriftScenario
-from lhdmap.simulation.sections import DriftSettings, DriveSettings, ScannerSettings
+from lhdmap.simulation.sections import DriftSettings, DriveSettings
+from lhdmap.simulation.sensing.sections import ScannerSettings
 
 SCENARIO = DriftScenario(
     seed=5,

@@ -20,7 +20,8 @@ from lhdmap.pipeline.track import resample
 from lhdmap.scan_matching.slant import rise_of, slants
 from lhdmap.simulation.drive import simulate_drift
 from lhdmap.simulation.scenario import DriftScenario
-from lhdmap.simulation.sections import DriftSettings, DriveSettings, ScannerSettings
+from lhdmap.simulation.sections import DriftSettings, DriveSettings
+from lhdmap.simulation.sensing.sections import ScannerSettings
 
 
 def wall(direction_rad: float, away_m: float = 2.0, spacing_m: float = 0.1) -> FloatArray:

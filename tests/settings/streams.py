@@ -32,7 +32,8 @@ from lhdmap.simulation.planar import (
     way_from_rest,
 )
 from lhdmap.simulation.scenario import DriftScenario
-from lhdmap.simulation.sections import DriftSettings, DriveSettings, ScannerSettings
+from lhdmap.simulation.sections import DriftSettings, DriveSettings
+from lhdmap.simulation.sensing.sections import ScannerSettings
 from lhdmap.simulation.world import DriftWorld
 
 from tests.odometry import cloud_drives
@@ -186,7 +187,7 @@ def clouds() -> Stream:
     drive = cloud_drives.simulate(world, 15.0, count=CLOUDS)
     first_ns = drive.clouds[0].stamp_ns
     times_s = np.arange(0.0, cloud_drives.PERIOD_S * (CLOUDS + 2), 0.02)
-    rows, behind = world.motion.at(times_s), world.motion.at(np.maximum(times_s - 0.02, 0.0))
+    rows, behind = world.history.at(times_s), world.history.at(np.maximum(times_s - 0.02, 0.0))
     messages: list[tuple[str, Message]] = [("points", _thinned(cloud)) for cloud in drive.clouds]
     for t, row, before in zip(times_s, rows, behind, strict=True):
         stamp = first_ns + round(float(t) * 1e9)

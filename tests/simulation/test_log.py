@@ -22,6 +22,8 @@ CONTRACT = {
     "/machine/joints": ("sensor_msgs/msg/JointState", None),
     "/machine/tachometer": ("geometry_msgs/msg/TwistStamped", None),
     "/machine/pressure/transmission": ("sensor_msgs/msg/FluidPressure", None),
+    "/machine/pressure/lift": ("sensor_msgs/msg/FluidPressure", None),
+    "/machine/pressure/tilt": ("sensor_msgs/msg/FluidPressure", None),
     "/operation/mode": ("std_msgs/msg/String", None),
     "/tf_static": ("tf2_msgs/msg/TFMessage", None),
     "/ground_truth/odometry": ("nav_msgs/msg/Odometry", "map"),
@@ -93,7 +95,7 @@ def test_truth_is_exact_at_every_front_scan(decoded: Decoded, drive: SimulatedDr
     positions = np.array([[m.pose.pose.position.x, m.pose.pose.position.y, m.pose.pose.position.z] for m in odometry])
     assert np.abs(positions - truth.positions_m).max() < 1e-6
     assert odometry[0].child_frame_id == "base_link"
-    table = DriftWorld(scenario).motion.table
+    table = DriftWorld(scenario).history.rows
     assert truth.positions_m[0] == pytest.approx(table[0, :3], abs=1e-6)
     assert truth.positions_m[-1] == pytest.approx(table[-1, :3], abs=1e-3)
 

@@ -12,7 +12,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 from lhdmap.errors import ConfigError, UsageError
 from lhdmap.simulation.drift import Mesh
-from lhdmap.simulation.drive import exact_ranges, scanner_stream
 from lhdmap.simulation.pile_facts import PileTruth, fit_face
 from lhdmap.simulation.pile_rocks import cylinder, extent, rock
 from lhdmap.simulation.pile_scenes import scene
@@ -22,6 +21,8 @@ from lhdmap.simulation.raycast import Surface
 from lhdmap.simulation.scenario import DriftScenario, scenario_from, scenario_toml
 from lhdmap.simulation.sections import DriftSettings, DriveSettings
 from lhdmap.simulation.world import DriftWorld
+
+from tests.simulation.scanners import exact, scanner
 
 CLEAN = DriftSettings(
     pieces=((200.0, 0.0, 0.0),),
@@ -130,7 +131,7 @@ def test_rocks_before_the_toe_are_not_in_the_truth() -> None:
 
 def test_the_distance_is_that_to_the_nearest_point_of_the_toe() -> None:
     world = clean_world()
-    distances = pile_truth(world).distances_m(world.motion.table[[0, -1], :3])
+    distances = pile_truth(world).distances_m(world.history.rows[[0, -1], :3])
     assert distances == pytest.approx([20.0, 8.0], abs=0.06)
 
 
@@ -182,13 +183,13 @@ def test_the_scanner_sees_what_the_variant_is_about(world: DriftWorld) -> None:
     """The last scans differ from those of the same drift without it; where there is nothing, they look far."""
     pile = world.pile
     assert pile is not None
-    stream = scanner_stream(world, "front")
-    stamps = stream.stamps_ns[[0, len(stream.stamps_ns) // 2, -60, -40, -1]]
-    seen = exact_ranges(world, stream, stamps)
+    front, last_s = scanner(world), world.history.last_s
+    times_s = [0.0, 0.5 * last_s, last_s - 2.4, last_s - 1.6, last_s - 0.03]
+    seen = exact(world, *times_s)
     empty = DriftWorld(world.scenario)
     empty.pile = None
-    without = exact_ranges(empty, stream, stamps)
-    beams = stream.beams.angles_rad
+    without = exact(empty, *times_s)
+    beams = front.beams.angles_rad
     if pile.meshes():
         assert ((without - seen) > 0.3).sum() > 5
     else:
@@ -198,7 +199,7 @@ def test_the_scanner_sees_what_the_variant_is_about(world: DriftWorld) -> None:
 
 
 def test_a_drive_ends_where_it_may_and_starts_far_away(world: DriftWorld, truth: PileTruth) -> None:
-    first, last = truth.distances_m(world.motion.table[[0, -1], :3])
+    first, last = truth.distances_m(world.history.rows[[0, -1], :3])
     assert 38.0 < first < 52.0
     assert 4.0 < last < 10.0
     assert truth.status == {
@@ -226,7 +227,7 @@ def test_a_seed_is_a_scene_and_another_seed_another() -> None:
     worlds = [DriftWorld(scene("normal", seed)) for seed in (1, 1, 2)]
     meshes: list[Mesh] = [joined_mesh(one) for one in worlds]
     assert np.array_equal(meshes[0].vertices_m, meshes[1].vertices_m)
-    headings = [one.motion.table[0, 5] for one in worlds]
+    headings = [one.history.rows[0, 5] for one in worlds]
     assert headings[0] == headings[1] != headings[2]
     assert worlds[0].scenario.mounting != worlds[2].scenario.mounting
 
@@ -257,7 +258,7 @@ def _bare(scenario: DriftScenario) -> DriftWorld:
 
 
 def test_a_flat_floor_has_no_waves() -> None:
-    waves, flat = (DriftWorld(scene("normal", 4, flat_floor=flat)).motion.table[:, 4].std() for flat in (False, True))
+    waves, flat = (DriftWorld(scene("normal", 4, flat_floor=flat)).history.rows[:, 4].std() for flat in (False, True))
     assert flat < waves
     assert scene("normal", 4, flat_floor=True).drift.floor_undulation_m == 0.0
 
@@ -267,7 +268,7 @@ def test_the_log_tells_the_nominal_tilt_and_the_rays_have_the_true_one() -> None
     world = DriftWorld(replace(base, mounting=MountingSettings(height_m=1.6, tilt_error_deg=1.0)))
     mount = world.machine.mounts["lidar_front"]
     assert (mount.pitch_deg, mount.position_m[2]) == (2.5, 1.6)
-    straight = exact_ranges(world, scanner_stream(world, "front"), world.clock.stamps_ns(0.1, 25.0))[0]
+    straight = exact(world, 0.0)[0]
     level = straight[len(straight) // 2]
     height = 1.6 - level * math.sin(math.radians(3.5))  # of the hit over the floor
     assert 0.8 + level * math.cos(math.radians(3.5)) == pytest.approx(20.0 + height, abs=0.05)

@@ -9,17 +9,14 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 from lhdmap.machine import Machine
-from lhdmap.simulation.drive import exact_ranges, scanner_stream
-from lhdmap.simulation.scanner import Beams, beams_of, measured, obstructed, rays_of, rig_of
+from lhdmap.simulation.history import START_NS, Column, History
+from lhdmap.simulation.scanner import Beams, beams_of, measured, obstructed, rays_of, rig_of, sweep_of
 from lhdmap.simulation.scenario import DriftScenario
-from lhdmap.simulation.sections import ScannerSettings
+from lhdmap.simulation.sensing.sections import ScannerSettings
 from lhdmap.simulation.world import DriftWorld
 
 from tests.simulation.conftest import COARSE, SHORT
-
-
-def stamps(world: DriftWorld, *times_s: float) -> npt.NDArray[np.int64]:
-    return world.clock.start_ns + np.array([round(t * 1e9) for t in times_s], dtype=np.int64)
+from tests.simulation.scanners import exact, scanner, stamp
 
 
 def side_walls(half_width_m: float, angles_rad: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
@@ -29,18 +26,18 @@ def side_walls(half_width_m: float, angles_rad: npt.NDArray[np.float64]) -> npt.
 
 @pytest.mark.parametrize("side", ["front", "rear"])
 def test_ranges_in_a_smooth_straight_drift(plain_world: DriftWorld, side: str) -> None:
-    stream = scanner_stream(plain_world, side)
-    ranges = exact_ranges(plain_world, stream, stamps(plain_world, 1.0, 4.0))
-    expected = side_walls(2.0, stream.beams.angles_rad)
-    beside = np.abs(np.degrees(stream.beams.angles_rad)) > 15.0
+    ranges = exact(plain_world, 1.0, 4.0, side=side)
+    angles = scanner(plain_world, side).beams.angles_rad
+    expected = side_walls(2.0, angles)
+    beside = np.abs(np.degrees(angles)) > 15.0
     assert np.abs(ranges[:, beside] - expected[beside]).max() < 1e-3
 
 
 def test_the_end_comes_nearer_as_the_machine_drives(plain_world: DriftWorld) -> None:
-    stream, middle = scanner_stream(plain_world, "front"), 190
-    near, far = exact_ranges(plain_world, stream, stamps(plain_world, 5.0, 3.0))[:, middle]
-    driven = plain_world.place_m(5.0) - plain_world.place_m(3.0)
-    assert far - near == pytest.approx(driven, abs=2e-3)
+    middle = 190
+    near, far = exact(plain_world, 5.0, 3.0)[:, middle]
+    there, here = (plain_world.history.state(stamp(t)) for t in (5.0, 3.0))
+    assert far - near == pytest.approx(float(np.hypot(*(there - here)[:2])), abs=2e-3)
 
 
 def test_both_sides_see_one_surface(world: DriftWorld) -> None:
@@ -51,11 +48,11 @@ def test_both_sides_see_one_surface(world: DriftWorld) -> None:
     scene = o3d.t.geometry.RaycastingScene()
     scene.add_triangles(o3d.core.Tensor(mesh.vertices_m.astype(np.float32)), o3d.core.Tensor(mesh.triangles))  # type: ignore[call-overload]
     for side in ("front", "rear"):
-        stream, at = scanner_stream(world, side), stamps(world, 2.0, 5.0, 7.0)
-        ranges = exact_ranges(world, stream, at)
-        rays, _ = rays_of(world.motion.table, world.clock.seconds(at), stream.beams, stream.rig, np.zeros(3))
-        hits = rays[:, :3] + ranges.reshape(-1, 1) * rays[:, 3:]
-        seen = np.isfinite(ranges).ravel()
+        one, times_s = scanner(world, side), (2.0, 5.0, 7.0)
+        sweep, ranges = sweep_of(one.beams), exact(world, *times_s, side=side).ravel()
+        rays = np.concatenate([rays_of(world.history, stamp(t), sweep, one.rig, np.zeros(3))[0] for t in times_s])
+        hits = rays[:, :3] + ranges[:, None] * rays[:, 3:]
+        seen = np.isfinite(ranges)
         assert seen.mean() > 0.95
         distance = scene.compute_distance(o3d.core.Tensor(hits[seen])).numpy()  # type: ignore[call-overload]
         assert distance.max() < 1e-3
@@ -75,19 +72,16 @@ def test_sweep_measures_each_beam_at_its_own_time(scenario: DriftScenario) -> No
     fast = replace(scenario, drive=replace(SHORT, speed_kmh=24.0, acceleration_mps2=4.0))
     still = DriftWorld(fast)
     swept = DriftWorld(replace(fast, scanner=replace(fast.scanner, sweep=True)))
-    stream, frozen = scanner_stream(swept, "front"), scanner_stream(still, "front")
-    at = stamps(swept, 3.0)
-    ranges = exact_ranges(swept, stream, at)[0]
+    ranges, times_s = exact(swept, 3.0)[0], scanner(swept).beams.times_s
     for beam in (0, 100, 250, 380):
-        later = at + round(float(stream.beams.times_s[beam]) * 1e9)
-        assert exact_ranges(still, frozen, later)[0, beam] == pytest.approx(ranges[beam], abs=1e-4)
-    distortion = np.abs(ranges - exact_ranges(still, frozen, at)[0])
+        assert exact(still, 3.0 + float(times_s[beam]))[0, beam] == pytest.approx(ranges[beam], abs=1e-4)
+    distortion = np.abs(ranges - exact(still, 3.0)[0])
     assert np.median(distortion[300:]) > 0.012  # more than the noise of a range
 
 
 def noisy(settings: ScannerSettings, exact_m: float = 5.0) -> npt.NDArray[np.float32]:
-    exact = np.full((200, 381), exact_m, dtype=np.float32)
-    return measured(exact, settings, np.full(200, settings.dust_share), np.random.default_rng(3))
+    true = np.full((200, 381), exact_m, dtype=np.float32)
+    return measured(true, settings, np.full(200, settings.dust_share), np.random.default_rng(3))
 
 
 @pytest.mark.parametrize("noise_m", [0.005, 0.012, 0.025])
@@ -146,11 +140,11 @@ def test_a_person_hides_beams_and_a_blackout_all() -> None:
 
 
 def blocked_by(machine: Machine, mount: str, bend_rad: float, angle_deg: float) -> float:
-    table = np.zeros((2, 7))
-    table[:, 6] = bend_rad
+    rows = np.zeros((2, len(Column)))
+    rows[:, Column.ARTICULATION] = bend_rad
     beams = Beams(np.radians([angle_deg, angle_deg + 0.5]), np.zeros(2))
     rig = rig_of(machine, machine.mounts[mount], occlusion=True)
-    return float(rays_of(table, np.zeros(1), beams, rig, np.zeros(3))[1][0])
+    return float(rays_of(History(100.0, rows), START_NS, sweep_of(beams), rig, np.zeros(3))[1][0])
 
 
 def test_own_bodies_hide_what_is_behind_them() -> None:
@@ -175,15 +169,20 @@ def test_the_default_scanners_see_past_the_machine(mount: str, bend_deg: float) 
 
 def test_long_drifts_are_cast_in_tiles_without_a_trace(scenario: DriftScenario) -> None:
     """A scan near a tile's border is the same whichever tile it is cast in."""
-    world = DriftWorld(replace(scenario, drift=replace(COARSE, mesh_m=0.2), drive=replace(SHORT, distance_m=60.0)))
-    stream, at = scanner_stream(world, "front"), stamps(world, 12.0)
-    place = world.place_m(12.0)
-    ranges = [
-        world.surface.near(s_m).cast(
-            rays_of(world.motion.table, np.array([12.0]), stream.beams, stream.rig, world.surface.near(s_m).origin_m)[0]
-        )
-        for s_m in (place, place - 40.0, place + 40.0)
-    ]
-    assert np.allclose(ranges[0], exact_ranges(world, stream, at)[0])
+    world = DriftWorld(replace(scenario, drift=replace(COARSE, mesh_m=0.2), drive=replace(SHORT, distance_m=220.0)))
+    one, at_ns = scanner(world), stamp(12.0)
+    place = world.place_m(world.history.state(at_ns)[:3])
+    ranges = []
+    for s_m in (place, place - 60.0, place + 60.0):
+        surface = world.surface.near(s_m)
+        ranges.append(surface.cast(rays_of(world.history, at_ns, sweep_of(one.beams), one.rig, surface.origin_m)[0]))
+    assert np.allclose(ranges[0], exact(world, 12.0)[0])
     for other in ranges[1:]:
         assert np.abs(other - ranges[0]).max() < 1e-3
+
+
+def test_a_place_is_found_along_the_drift(world: DriftWorld) -> None:
+    line = world.drift.line
+    for k in range(0, len(line.s_m), 137):
+        beside = np.array([line.x_m[k] + 0.3, line.y_m[k] - 0.4, line.z_m[k] + 0.1])
+        assert world.place_m(beside) == pytest.approx(line.s_m[k], abs=0.8)

@@ -26,7 +26,8 @@ from lhdmap.pipeline.outcome import ROLES_READ, Inputs, integrate_again
 from lhdmap.pipeline.track import Rows, resample, trajectory_of
 from lhdmap.simulation.drive import SimulatedDrive, simulate_drift
 from lhdmap.simulation.scenario import DriftScenario
-from lhdmap.simulation.sections import DriftSettings, DriveSettings, InclinometerSettings, ScannerSettings
+from lhdmap.simulation.sections import DriftSettings, DriveSettings
+from lhdmap.simulation.sensing.sections import InclinometerSettings, ScannerSettings
 from lhdmap.trajectory import Trajectory
 
 from tools.evaluate.figures import Figure, number, write

@@ -21,7 +21,8 @@ from lhdmap.pipeline.track import Rows, resample
 from lhdmap.simulation.drive import simulate_drift
 from lhdmap.simulation.planar import PlanarScanner, drift_world, drive_along, simulate_scans
 from lhdmap.simulation.scenario import DriftScenario
-from lhdmap.simulation.sections import DriftSettings, DriveSettings, InclinometerSettings, ScannerSettings
+from lhdmap.simulation.sections import DriftSettings, DriveSettings
+from lhdmap.simulation.sensing.sections import InclinometerSettings, ScannerSettings
 from lhdmap.smoothing.keys import KeyScans
 from lhdmap.smoothing.settings import SmoothingSettings
 from lhdmap.smoothing.trust import ExpectedError, expected_error

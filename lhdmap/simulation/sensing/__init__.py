@@ -1,0 +1,1 @@
+"""The sensors of a simulated machine: objects that are read when they are due, and faults that wrap them."""
