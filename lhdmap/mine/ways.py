@@ -123,9 +123,7 @@ def _points(network: Network, runs: list[Run]) -> FloatArray | None:
     return points[np.concatenate([[True], apart > 0.2 * STEP_M])] if len(points) > 1 else None
 
 
-def _leg(
-    points: FloatArray, gear: int, machine: Machine, stop: str, wander: FloatArray | None, driven_m: float
-) -> Leg:
+def _leg(points: FloatArray, gear: int, machine: Machine, stop: str, wander: FloatArray | None, driven_m: float) -> Leg:
     points = _resampled(points)
     count, more = len(points), round(_BEYOND_M / STEP_M)
     points = _smoothed(_extended(points, more), _SMOOTH_M)

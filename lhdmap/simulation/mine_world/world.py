@@ -27,6 +27,7 @@ from lhdmap.simulation.surroundings import Rays
 
 Zone = TypeVar("Zone", WetPlan, DustPlan)
 TILE_M = 60.0
+_PIECES = 512  # that are kept: the surface of some 6 km
 _SCENES = 3  # that are kept: a machine may go to and fro between two
 
 
@@ -62,8 +63,10 @@ class MineWorld:
         self._pieces = None if network.plan.surface.file else Pieces(network)
         self._skins: Skins = SurveyedSkins(network) if self._pieces is None else self._pieces
         self._boxes = self._skins.boxes_m
-        self.piece = functools.lru_cache(maxsize=4096)(self._make_piece)
+        self.piece = functools.lru_cache(maxsize=_PIECES)(self._make_piece)
+        self._walls = functools.lru_cache(maxsize=64)(self._make_walls)
         self._scenes: OrderedDict[frozenset[int], Surface] = OrderedDict()
+        self._here: tuple[tuple[float, ...], Surface] | None = None
         self._things: dict[str, Thing] = {}
         self._passing: dict[str, tuple[Thing, Surface]] = {}
         self._version = 0
@@ -75,8 +78,10 @@ class MineWorld:
 
     def near(self, position_m: FloatArray) -> Rays:
         """Return what rays from a point (3,) of `map` meet."""
-        tile = (np.floor(position_m[:2] / TILE_M) + 0.5) * TILE_M
-        scene = self._scene(tile, float(position_m[2]))
+        tile = tuple(((np.floor(position_m / TILE_M) + 0.5) * TILE_M).tolist())
+        if self._here is None or self._here[0] != tile:
+            self._here = (tile, self._scene(np.array(tile)))
+        scene = self._here[1]
         return scene if not self._passing else Layered(scene, [surface for _, surface in self._passing.values()])
 
     def floor_height(self, points_m: FloatArray) -> FloatArray:
@@ -103,9 +108,9 @@ class MineWorld:
         Floors are not in it; wheels stand on them.
         """
         for index in np.flatnonzero(_overlap(self._boxes, box_m)).tolist():
-            skin = self.piece(index)
-            if not skin.floor.all():
-                yield index, Mesh(skin.mesh.vertices_m, skin.mesh.triangles[~skin.floor])
+            walls = self._walls(index)
+            if len(walls.triangles):
+                yield index, walls
         for name, thing in {**self._things, **{k: v for k, (v, _) in self._passing.items()}}.items():
             if _overlap(thing.box_m[None], box_m)[0]:
                 yield f"{name} {self._version}", thing.mesh
@@ -123,6 +128,7 @@ class MineWorld:
         self._things[name] = _thing(mesh)
         self._version += 1
         self._scenes.clear()
+        self._here = None
 
     def appear(self, name: str, mesh: Mesh) -> None:
         """Put something into the mine that comes and goes: a person, an obstacle."""
@@ -148,10 +154,14 @@ class MineWorld:
         pit = None if self._pieces is None else self._pits.get(self._pieces.all[index].tube)
         return skin if pit is None else _opened(skin, *pit)
 
-    def _scene(self, tile_m: FloatArray, z_m: float) -> Surface:
-        reach = self.view_m + 0.75 * TILE_M
-        centre = np.array([*tile_m, z_m])
-        box = np.stack([centre - reach, centre + reach])
+    def _make_walls(self, index: int) -> Mesh:
+        skin = self.piece(index)
+        return Mesh(skin.mesh.vertices_m, skin.mesh.triangles[~skin.floor])
+
+    def _scene(self, tile_m: FloatArray) -> Surface:
+        """Return what can be seen from a tile."""
+        reach = self.view_m + 0.5 * TILE_M
+        box = np.stack([tile_m - reach, tile_m + reach])
         inside = frozenset(np.flatnonzero(_overlap(self._boxes, box)).tolist())
         found = self._scenes.get(inside)
         if found is None:

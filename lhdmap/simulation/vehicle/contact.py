@@ -37,9 +37,10 @@ class Touch(NamedTuple):
 
 
 class _Grid(NamedTuple):
-    """Triangles (M, 3, 3) and the cells that they lie in: corner (3,), shape, starts and members."""
+    """Triangles (M, 3, 3), balls around them (M, 4), and the cells that they lie in: corner (3,), shape, starts, members."""
 
     corners_m: FloatArray
+    balls_m: FloatArray
     low_m: FloatArray
     shape: tuple[int, int, int]
     starts: npt.NDArray[np.int64]
@@ -99,7 +100,9 @@ def _gridded(mesh: Mesh) -> _Grid:
     _list_cells(first, last, np.array(shape), cells, members)
     order = np.argsort(cells, kind="stable")
     starts = np.searchsorted(cells[order], np.arange(int(np.prod(shape)) + 1)).astype(np.int64)
-    return _Grid(corners, low, (shape[0], shape[1], shape[2]), starts, members[order])
+    middle = corners.mean(axis=1)
+    balls = np.column_stack([middle, np.linalg.norm(corners - middle[:, None], axis=2).max(axis=1)])
+    return _Grid(corners, balls, low, (shape[0], shape[1], shape[2]), starts, members[order])
 
 
 @nb.njit(cache=True, nogil=True)
@@ -117,7 +120,7 @@ def _list_cells(first, last, shape, cells, members):  # type: ignore[no-untyped-
 @nb.njit(cache=True, nogil=True)
 def _cells_of(middle, axes, half, more_m, grid):  # type: ignore[no-untyped-def]
     """First and last cell (6,) that a box, and `more_m` around it, overlaps; last below first for none."""
-    _, low, shape, _, _ = grid
+    _, _, low, shape, _, _ = grid
     out = np.empty(6, dtype=np.int64)
     for a in range(3):
         reach = more_m
@@ -131,7 +134,7 @@ def _cells_of(middle, axes, half, more_m, grid):  # type: ignore[no-untyped-def]
 @nb.njit(cache=True, nogil=True)
 def _deepest(middle, axes, half, grid, out):  # type: ignore[no-untyped-def]
     """Whether a box is in any triangle; `out` (4,) becomes the place and the depth of the deepest."""
-    corners, _, shape, starts, members = grid
+    corners, rounds, _, shape, starts, members = grid
     c = _cells_of(middle, axes, half, 0.0, grid)
     local, found = np.empty((3, 3)), False
     for i in range(c[0], c[3] + 1):
@@ -139,13 +142,17 @@ def _deepest(middle, axes, half, grid, out):  # type: ignore[no-untyped-def]
             for k in range(c[2], c[5] + 1):
                 cell = (i * shape[1] + j) * shape[2] + k
                 for n in range(starts[cell], starts[cell + 1]):
+                    if _far(rounds[members[n]], middle, axes, half, 0.0):
+                        continue
                     _into_box(corners[members[n]], middle, axes, local)
                     depth = _overlap(local, half)
                     if depth > 0.0 and depth > out[3]:
                         found = True
                         out[3] = depth
                         for a in range(3):
-                            out[a] = (corners[members[n], 0, a] + corners[members[n], 1, a] + corners[members[n], 2, a]) / 3.0
+                            out[a] = (
+                                corners[members[n], 0, a] + corners[members[n], 1, a] + corners[members[n], 2, a]
+                            ) / 3.0
     return found
 
 
@@ -198,7 +205,7 @@ def _parted(t, half, x, y, z):  # type: ignore[no-untyped-def]
 @nb.njit(cache=True, nogil=True)
 def _clearance(middle, axes, half, grid, least):  # type: ignore[no-untyped-def]
     """The distance of a box from the triangles, where it is less than `least`."""
-    corners, _, shape, starts, members = grid
+    corners, rounds, _, shape, starts, members = grid
     c = _cells_of(middle, axes, half, least, grid)
     local = np.empty((3, 3))
     for i in range(c[0], c[3] + 1):
@@ -206,9 +213,23 @@ def _clearance(middle, axes, half, grid, least):  # type: ignore[no-untyped-def]
             for k in range(c[2], c[5] + 1):
                 cell = (i * shape[1] + j) * shape[2] + k
                 for n in range(starts[cell], starts[cell + 1]):
-                    _into_box(corners[members[n]], middle, axes, local)
+                    m = members[n]
+                    if _far(rounds[m], middle, axes, half, least):
+                        continue
+                    _into_box(corners[m], middle, axes, local)
                     least = min(least, _distance(local, half, least))
     return least
+
+
+@nb.njit(cache=True, nogil=True)
+def _far(ball, middle, axes, half, least):  # type: ignore[no-untyped-def]
+    """Whether the ball (4,) around a triangle is farther from a box than `least`."""
+    x, y, z = ball[0] - middle[0], ball[1] - middle[1], ball[2] - middle[2]
+    total = 0.0
+    for b in range(3):
+        out = abs(axes[b, 0] * x + axes[b, 1] * y + axes[b, 2] * z) - half[b]
+        total += out * out if out > 0.0 else 0.0
+    return total > (least + ball[3]) ** 2
 
 
 @nb.njit(cache=True, nogil=True)
@@ -218,7 +239,11 @@ def _distance(t, half, least):  # type: ignore[no-untyped-def]
     for q in range(3):
         r = (q + 1) % 3
         size = max(size, math.sqrt((t[r, 0] - t[q, 0]) ** 2 + (t[r, 1] - t[q, 1]) ** 2 + (t[r, 2] - t[q, 2]) ** 2))
-    x, y, z = (t[0, 0] + t[1, 0] + t[2, 0]) / 3.0, (t[0, 1] + t[1, 1] + t[2, 1]) / 3.0, (t[0, 2] + t[1, 2] + t[2, 2]) / 3.0
+    x, y, z = (
+        (t[0, 0] + t[1, 0] + t[2, 0]) / 3.0,
+        (t[0, 1] + t[1, 1] + t[2, 1]) / 3.0,
+        (t[0, 2] + t[1, 2] + t[2, 2]) / 3.0,
+    )
     if _to_box(x, y, z, half) - size > least:
         return least
     if _overlap(t, half) > 0.0:
