@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from lhdmap.geometry import se3
+from lhdmap.machine_sections import Brakes, Drive, Linkage, Spread, Steering
 from lhdmap.messages import FloatArray
 from lhdmap.settings import REQUIRED, check_corners, setting
 from lhdmap.settings_tree import load_tree, part, tree_toml
@@ -118,10 +119,15 @@ def _default_mounts() -> dict[str, SensorMount]:
 
 @dataclass(frozen=True, slots=True)
 class Machine:
-    """A machine: its dimensions, the boxes of its bodies and the mounts of its sensors, both by name."""
+    """A machine: dimensions, what moves it, the boxes of its bodies and the mounts of its sensors, both by name."""
 
     name: str = setting("lhd_11t", doc="Name of the machine.")
     dimensions: Dimensions = part(Dimensions)
+    drive: Drive = part(Drive)
+    steering: Steering = part(Steering)
+    brakes: Brakes = part(Brakes)
+    linkage: Linkage = part(Linkage)
+    spread: Spread = part(Spread)
     bodies: dict[str, BodyBox] = part(_default_bodies, key="body")
     mounts: dict[str, SensorMount] = part(_default_mounts, key="mount")
 
@@ -134,8 +140,9 @@ class Machine:
 def load_machine(path: Path | None = None) -> Machine:
     """Return the machine that a TOML file describes, or the default 11-t loader where `path` is None.
 
-    A file has `name`, one `[dimensions]`, and a `[body.NAME]` and `[mount.NAME]` for each box and sensor; a part that
-    is left out keeps the default's values, bodies and mounts are replaced as a whole.
+    A file has `name`, one `[dimensions]`, `[drive]`, `[steering]`, `[brakes]`, `[linkage]`, `[spread]`, and a
+    `[body.NAME]` and `[mount.NAME]` for each box and sensor; a part that is left out keeps the default's values, bodies
+    and mounts are replaced as a whole.
 
     Raises:
         InputError: the file cannot be read or is not TOML.
