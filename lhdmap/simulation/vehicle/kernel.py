@@ -137,8 +137,10 @@ def _move(
         level = 1.0 / math.sqrt(1.0 + along * along)  # cosine of the pitch
         upright = 1.0 / (level * level * math.sqrt(1.0 + rise[0] * rise[0] + rise[1] * rise[1]))  # cos(roll) / cos(pitch)
         if share == 1.0:
-            row[_X] += speed_mps * step_s * level * math.cos(yaw)
-            row[_Y] += speed_mps * step_s * level * math.sin(yaw)
+            way = speed_mps * step_s * level
+            row[_X] += way * math.cos(yaw)
+            row[_Y] += way * math.sin(yaw)
+            row[_Z] += way * along
         yaw = row[_YAW] + share * step_s * turn * upright
     row[_YAW] = yaw
 

@@ -21,11 +21,12 @@ def braked(plant: Plant, speed_mps: float, brake: float, grip_n: float, weight_n
     """Return what a sub-step with the brake on does: the drive is in neutral.
 
     Brake and rolling resistance hold back together, as much as the floor takes. `weight_n` is what presses on the floor,
-    `pull_n` gravity along x.
+    `pull_n` gravity along x. A standing machine is let go by the drive only when the brake is on.
     """
     rolling = plant.rolling * weight_n
-    hold = min(brake * plant.brake_mps2 * plant.mass_kg + rolling, grip_n)
-    if speed_mps == 0.0 and abs(pull_n) <= hold:
+    wanted = brake * plant.brake_mps2 * plant.mass_kg + rolling
+    hold = min(wanted, grip_n)
+    if speed_mps == 0.0 and abs(pull_n) <= min(grip_n, max(wanted, plant.max_force_n if brake < 1.0 else 0.0)):
         return 0.0, 0.0, -pull_n
     way = math.copysign(1.0, speed_mps if speed_mps != 0.0 else pull_n)
     after = speed_mps + step_s * (pull_n - way * hold) / plant.mass_kg
@@ -62,7 +63,9 @@ def driven(
     if low <= force <= high:
         return carried, after, force
     force = min(max(force, low), high)
-    resisting = min(max(speed / SLOW_MPS, -1.0), 1.0) * rolling
+    if abs(speed) <= SLOW_MPS and abs(force + pull_n) <= rolling:
+        return 0.0, 0.0, force  # stalled
+    resisting = math.copysign(rolling, speed if speed != 0.0 else force + pull_n)
     carried = speed + per_n * (force + pull_n - resisting)
     return carried, wheel_for(force, carried, grip_n, plant.slip_stiffness), force
 
