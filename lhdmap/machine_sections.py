@@ -92,7 +92,7 @@ class Linkage:
     lip_m: tuple[float, float] = setting(
         (1.55, -0.45), unit="m", source=_LOADING, doc="From the pin to the lip (x, z), bucket level."
     )
-    heel_m: tuple[float, float] = setting((-0.19, -0.45), unit="m", source=_CLASS, doc="The same of the bucket's heel.")
+    heel_m: tuple[float, float] = setting((-0.18, -0.45), unit="m", source=_CLASS, doc="The same of the bucket's heel.")
     top_m: tuple[float, float] = setting((0.1, 0.9), unit="m", source=_CLASS, doc="The same of its upper edge.")
     bucket_angle_rad: float = setting(
         0.8, unit="rad", source=_LOADING, doc="Angle of the bucket's floor when tramming; positive: lip up."

@@ -10,6 +10,7 @@ import numpy as np
 from lhdmap.messages import FloatArray
 
 _MOST_CORNERS = 9  # a triangle cut by six planes
+_DEPTH_STEP_M = 0.0005
 
 
 @nb.njit(cache=True, nogil=True)
@@ -20,21 +21,24 @@ def point_distance(x: float, y: float, z: float, half: FloatArray) -> float:
 
 
 @nb.njit(cache=True, nogil=True)
-def clipped(corners: FloatArray, half: FloatArray, work: FloatArray) -> int:
-    """Cut a triangle (3, 3) by the box; its part in the box is `work[0]`, the number of its corners is returned, 0 for none.
+def clipped(corners: FloatArray, half: FloatArray, less_m: float, work: FloatArray) -> int:
+    """Cut a triangle (3, 3) by the box less `less_m` all around; `work[0]` becomes its part in there.
 
-    `work` has the shape (2, 10, 3). That a part is left says the same as thirteen separating axes.
+    Returns the number of corners of that part, 0 for none. `work` has the shape (2, 10, 3). That a part is left says the same
+    as thirteen separating axes.
     """
     count, here = 3, 0
     work[0, :3] = corners
     for axis in range(3):
+        size = half[axis] - less_m
         for way in (-1.0, 1.0):
             kept = 0
             for i in range(count):
                 j = (i + 1) % count
-                over, over_next = way * work[here, i, axis] - half[axis], way * work[here, j, axis] - half[axis]
+                over, over_next = way * work[here, i, axis] - size, way * work[here, j, axis] - size
                 if over <= 0.0:
-                    work[1 - here, kept] = work[here, i]
+                    for k in range(3):
+                        work[1 - here, kept, k] = work[here, i, k]
                     kept += 1
                 if (over < 0.0 < over_next) or (over_next < 0.0 < over):
                     share = over / (over - over_next)
@@ -48,22 +52,31 @@ def clipped(corners: FloatArray, half: FloatArray, work: FloatArray) -> int:
 
 
 @nb.njit(cache=True, nogil=True)
-def depth_in(corners: FloatArray, half: FloatArray, work: FloatArray, point: FloatArray) -> float:
-    """Return how deep a triangle reaches into the box, m, -1 where it does not touch; `point` (3,) becomes where."""
-    count = clipped(corners, half, work)
-    if count == 0:
+def depth_in(corners: FloatArray, half: FloatArray, least_m: float, work: FloatArray, point: FloatArray) -> float:
+    """Return how deep a triangle reaches into the box where that is more than `least_m`, m, else -1; `point` becomes where.
+
+    The depth is by how much the box can shrink and still touch: bisection, to half a millimetre.
+    """
+    low, high = max(least_m, 0.0), min(half[0], half[1], half[2])
+    count = clipped(corners, half, low, work)
+    if count == 0 or high <= low:
         return -1.0
+    _middle(work, count, point)
+    while high - low > _DEPTH_STEP_M:
+        middle = 0.5 * (low + high)
+        count = clipped(corners, half, middle, work)
+        if count > 0:
+            low = middle
+            _middle(work, count, point)
+        else:
+            high = middle
+    return low
+
+
+@nb.njit(cache=True, nogil=True)
+def _middle(work: FloatArray, count: int, point: FloatArray) -> None:
     for k in range(3):
-        work[0, count, k] = work[0, :count, k].mean()
-    best = -1.0
-    for i in range(count + 1):
-        depth = math.inf
-        for k in range(3):
-            depth = min(depth, half[k] - abs(work[0, i, k]))
-        if max(depth, 0.0) > best:
-            best = max(depth, 0.0)
-            point[:] = work[0, i]
-    return best
+        point[k] = work[0, :count, k].sum() / count
 
 
 @nb.njit(cache=True, nogil=True)
@@ -119,7 +132,7 @@ def _face_distance(corners: FloatArray, half: FloatArray, best: float, work: Flo
     nx, ny, nz = nx / length, ny / length, nz / length
     middle = -(a[0] * nx + a[1] * ny + a[2] * nz)  # of the box, over the plane
     if abs(middle) <= abs(nx) * half[0] + abs(ny) * half[1] + abs(nz) * half[2]:
-        return 0.0 if clipped(corners, half, work) > 0 else best
+        return 0.0 if clipped(corners, half, 0.0, work) > 0 else best
     way = math.copysign(1.0, middle)
     uu, uv, vv = (u * u).sum(), (u * v).sum(), (v * v).sum()
     for corner in range(8):

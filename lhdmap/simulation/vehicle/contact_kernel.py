@@ -143,7 +143,7 @@ def deepest(grid: Grid, centres: FloatArray, axes: FloatArray, half: FloatArray,
                 _into_box(grid.corners, t, centre, turned, corners)
                 if _least_gap(corners, size) > 0.0:
                     continue
-                depth = depth_in(corners, size, work, point)
+                depth = depth_in(corners, size, found[b, 3], work, point)
                 if depth > found[b, 3]:
                     found[b, 3] = depth
                     for k in range(3):

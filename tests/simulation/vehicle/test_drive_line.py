@@ -127,7 +127,7 @@ def test_the_engine_limits_a_climb() -> None:
 
 def test_too_steep_a_grade_stalls_the_drive() -> None:
     """The relief valve opens at 35 kN of gravity: it stands where rolling resistance helps enough, else it rolls back."""
-    for most_kn, speed_mps in ((30.0, 0.0), (20.0, -3.0 * (35.07 - 20.0 - 10.23) / 30.0)):
+    for most_kn, speed_mps in ((30.0, 0.0), (20.0, -3.25 * (35.07 - 20.0 - 10.23) / 30.0)):
         vehicle = Vehicle(Machine(drive=Drive(max_force_kn=most_kn)), Plane(0.12))
         end = drive(vehicle, at_rest(vehicle), command(1.0), 3.25)[-1]
         assert end.speed_mps == pytest.approx(speed_mps, rel=0.05)
