@@ -21,7 +21,9 @@ class Drive:
     payload_kg: float = setting(
         11_000.0, unit="kg", source="the papers' 11-t machine", minimum=1.0, doc="Load of a full bucket."
     )
-    engine_power_kw: float = setting(150.0, unit="kW", source=_LOADING, minimum=1.0, doc="Power that reaches the wheels.")
+    engine_power_kw: float = setting(
+        150.0, unit="kW", source=_LOADING, minimum=1.0, doc="Power that reaches the wheels."
+    )
     max_force_kn: float = setting(
         157.0,
         unit="kN",
@@ -30,7 +32,11 @@ class Drive:
         doc="Largest force of the drive at the tyres, driving or holding back.",
     )
     rolling_resistance: float = setting(
-        0.035, source="mine-road handbooks give 3 to 5 %", minimum=0.0, maximum=0.3, doc="Rolling resistance per weight."
+        0.035,
+        source="mine-road handbooks give 3 to 5 %",
+        minimum=0.0,
+        maximum=0.3,
+        doc="Rolling resistance per weight.",
     )
     slip_stiffness: float = setting(
         8.0, source=_LOADING, minimum=0.5, doc="k of the tyres' curve: force / weight = friction (1 - exp(-k slip))."
@@ -98,7 +104,11 @@ class Linkage:
         0.8, unit="rad", source=_LOADING, doc="Angle of the bucket's floor when tramming; positive: lip up."
     )
     boom_to_bucket: float = setting(
-        0.5, source=_LOADING, minimum=-1.0, maximum=1.0, doc="How far the bucket turns with the boom (1: as if fixed to it)."
+        0.5,
+        source=_LOADING,
+        minimum=-1.0,
+        maximum=1.0,
+        doc="How far the bucket turns with the boom (1: as if fixed to it).",
     )
     boom_min_rad: float = setting(-0.35, unit="rad", source=_CLASS, doc="Lower stop of `boom_lift`.")
     boom_max_rad: float = setting(0.85, unit="rad", source=_CLASS, doc="Upper stop of `boom_lift`.")
@@ -106,11 +116,19 @@ class Linkage:
     bucket_max_rad: float = setting(0.6, unit="rad", source=_CLASS, doc="Upper stop of `bucket_tilt`: rolled back.")
     lift_rate_rps: float = setting(0.16, unit="rad/s", source=_LOADING, minimum=0.01, doc="Boom at full engine speed.")
     tilt_rate_rps: float = setting(
-        0.24, unit="rad/s", source="fitted to the loading paper's Table 5", minimum=0.01, doc="Bucket at full engine speed."
+        0.24,
+        unit="rad/s",
+        source="fitted to the loading paper's Table 5",
+        minimum=0.01,
+        doc="Bucket at full engine speed.",
     )
     lag_s: float = setting(0.2, unit="s", source=_LOADING, minimum=0.001, doc="Time constant of both rates.")
     shared: float = setting(
-        0.6, source="autonomous_loading, section 3.4", minimum=0.1, maximum=1.0, doc="Share of the rates when both move."
+        0.6,
+        source="autonomous_loading, section 3.4",
+        minimum=0.1,
+        maximum=1.0,
+        doc="Share of the rates when both move.",
     )
     idle_share: float = setting(
         0.6, source=_CLASS, minimum=0.05, maximum=1.0, doc="Share of the rates without `full_rpm`."
@@ -131,7 +149,11 @@ class Spread:
     """How far a machine of a simulation is from what its file says: another one for each seed; the control knows the file."""
 
     steering_gain: float = setting(
-        0.0, source="0.05 in the guidance prototype", minimum=0.0, maximum=0.5, doc="Largest relative error of the gain."
+        0.0,
+        source="0.05 in the guidance prototype",
+        minimum=0.0,
+        maximum=0.5,
+        doc="Largest relative error of the gain.",
     )
     lags: float = setting(
         0.0, source="0.1 in the guidance prototype", minimum=0.0, maximum=0.5, doc="Largest relative error of the lags."

@@ -14,7 +14,9 @@ from lhdmap.simulation.vehicle.contact_grid import CELL_M, Grid
 
 
 @nb.njit(cache=True, nogil=True)
-def near_pieces(bounds_m: FloatArray, centre: FloatArray, axes: FloatArray, half: FloatArray, reach_m: float) -> list[int]:
+def near_pieces(
+    bounds_m: FloatArray, centre: FloatArray, axes: FloatArray, half: FloatArray, reach_m: float
+) -> list[int]:
     """Return which pieces, given by `bounds_m` (P, 2, 3), are within `reach_m` of a box (by their upright bounds)."""
     near = [0 for _ in range(0)]
     for p in range(len(bounds_m)):
@@ -147,7 +149,9 @@ def deepest(grid: Grid, centres: FloatArray, axes: FloatArray, half: FloatArray,
                 if depth > found[b, 3]:
                     found[b, 3] = depth
                     for k in range(3):
-                        found[b, k] = centres[b, k] + (turned[k, 0] * point[0] + turned[k, 1] * point[1] + turned[k, 2] * point[2])
+                        found[b, k] = centres[b, k] + (
+                            turned[k, 0] * point[0] + turned[k, 1] * point[1] + turned[k, 2] * point[2]
+                        )
 
 
 @nb.njit(cache=True, nogil=True)

@@ -135,7 +135,9 @@ def _move(
     for share in (0.5, 1.0):
         along = rise[0] * math.cos(yaw) + rise[1] * math.sin(yaw)
         level = 1.0 / math.sqrt(1.0 + along * along)  # cosine of the pitch
-        upright = 1.0 / (level * level * math.sqrt(1.0 + rise[0] * rise[0] + rise[1] * rise[1]))  # cos(roll) / cos(pitch)
+        upright = 1.0 / (
+            level * level * math.sqrt(1.0 + rise[0] * rise[0] + rise[1] * rise[1])
+        )  # cos(roll) / cos(pitch)
         if share == 1.0:
             way = speed_mps * step_s * level
             row[_X] += way * math.cos(yaw)

@@ -62,7 +62,7 @@ def drawn_errors(spread: Spread, seed: int) -> Errors:
     return Errors(*(1.0 + sizes * share).tolist())
 
 
-def plant_of(machine: Machine, load_kg: float, errors: Errors = Errors()) -> Plant:
+def plant_of(machine: Machine, load_kg: float, errors: Errors) -> Plant:
     """Return the numbers of `machine` with a load; what depends on it is linear up to the payload."""
     size, drive, steering, brakes, linkage = (
         machine.dimensions,

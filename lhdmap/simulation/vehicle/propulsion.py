@@ -17,7 +17,9 @@ Speeds = tuple[float, float, float]
 
 
 @nb.njit(cache=True, nogil=True)
-def braked(plant: Plant, speed_mps: float, brake: float, grip_n: float, weight_n: float, pull_n: float, step_s: float) -> Speeds:
+def braked(
+    plant: Plant, speed_mps: float, brake: float, grip_n: float, weight_n: float, pull_n: float, step_s: float
+) -> Speeds:
     """Return what a sub-step with the brake on does: the drive is in neutral.
 
     Brake and rolling resistance hold back together, as much as the floor takes. `weight_n` is what presses on the floor,

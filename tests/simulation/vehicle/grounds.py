@@ -38,7 +38,13 @@ class Waves:
 
 
 def command(
-    propel: float = 0.0, steering_rps: float = 0.0, *, tilt: float = 0.0, lift: float = 0.0, rpm: bool = False, brake: bool = False
+    propel: float = 0.0,
+    steering_rps: float = 0.0,
+    *,
+    tilt: float = 0.0,
+    lift: float = 0.0,
+    rpm: bool = False,
+    brake: bool = False,
 ) -> Command:
     return Command(0, propel, steering_rps, tilt, lift, rpm, brake)
 

@@ -78,7 +78,9 @@ def _spread(corners: FloatArray, n: int) -> FloatArray:
 
 
 @nb.njit(cache=True)
-def outside_and_inside(point: FloatArray, centre: FloatArray, axes: FloatArray, half: FloatArray) -> tuple[float, float]:
+def outside_and_inside(
+    point: FloatArray, centre: FloatArray, axes: FloatArray, half: FloatArray
+) -> tuple[float, float]:
     """Return how far a point is from a box, and how deep in it (below 0: not)."""
     outside, inside = 0.0, np.inf
     x, y, z = point[0] - centre[0], point[1] - centre[1], point[2] - centre[2]
@@ -110,11 +112,11 @@ def brute(cloud: Dense, centres: FloatArray, axes: FloatArray, half: FloatArray)
 
 def random_state(rng: np.random.Generator) -> VehicleState:
     still = Vehicle(Machine(), Plane()).at_rest(0.0, 0.0, 0.0, near_z_m=0.0, time_ns=0)
-    return still._replace(
-        x_m=ORIGIN[0] + rng.uniform(-1.0, 2.0), y_m=ORIGIN[1] + rng.uniform(-0.5, 0.5), z_m=ORIGIN[2] + rng.uniform(0.0, 0.3),
-        roll_rad=rng.uniform(-0.05, 0.05), pitch_rad=rng.uniform(-0.05, 0.05), yaw_rad=rng.uniform(-0.15, 0.15),
-        articulation_rad=rng.uniform(-0.3, 0.3), boom_rad=rng.choice([-0.35, -0.35, -0.35, rng.uniform(-0.35, 0.85)]), bucket_rad=rng.uniform(-1.2, 0.6),
-    )  # fmt: skip
+    x, y, z = ORIGIN + rng.uniform((-1.0, -0.5, 0.0), (2.0, 0.5, 0.3))
+    roll, pitch, yaw, bend = rng.uniform(-1.0, 1.0, 4) * (0.05, 0.05, 0.15, 0.3)
+    boom = -0.35 if rng.random() < 0.75 else rng.uniform(-0.35, 0.85)
+    turned = still._replace(x_m=x, y_m=y, z_m=z, roll_rad=roll, pitch_rad=pitch, yaw_rad=yaw, articulation_rad=bend)
+    return turned._replace(boom_rad=boom, bucket_rad=rng.uniform(-1.2, 0.6))
 
 
 def test_a_thousand_poses_in_a_rough_tunnel() -> None:
@@ -191,7 +193,10 @@ def test_what_is_farther_than_the_limit_is_the_limit() -> None:
     wall = plate([(-2.0, 0.0, -1.0), (2.0, 0.0, -1.0), (0.0, 0.0, 5.0)])
     assert wall.clearance_m(box_at((0.0, -3.0, 1.0), (1.0, 1.0, 1.0)), 0.5) == 0.5
     assert Contacts([]).clearance_m(box_at((0.0, 0.0, 0.0), (1.0, 1.0, 1.0)), 0.7) == 0.7
-    assert Contacts([ContactPiece(np.zeros((0, 3)), np.zeros((0, 3), dtype=int))]).touching(box_at((0, 0, 0), (1, 1, 1))) == []
+    assert (
+        Contacts([ContactPiece(np.zeros((0, 3)), np.zeros((0, 3), dtype=int))]).touching(box_at((0, 0, 0), (1, 1, 1)))
+        == []
+    )
 
 
 def test_floors_do_not_count_but_steep_triangles_of_them_do() -> None:

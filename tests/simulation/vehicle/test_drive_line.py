@@ -140,7 +140,13 @@ def test_reverse_is_the_mirror_of_forward(grade: float) -> None:
     for way in (1.0, -1.0):
         vehicle = Vehicle(Machine(), Plane(way * grade))
         moving = drive(vehicle, at_rest(vehicle), command(0.7 * way), 6.0)
-        runs.append([*moving, *drive(vehicle, moving[-1], command(-0.3 * way), 6.0), *drive(vehicle, moving[-1], command(brake=True), 4.0)])
+        runs.append(
+            [
+                *moving,
+                *drive(vehicle, moving[-1], command(-0.3 * way), 6.0),
+                *drive(vehicle, moving[-1], command(brake=True), 4.0),
+            ]
+        )
     for name in ("x_m", "speed_mps", "wheel_speed_mps", "traction_mps2"):
         assert np.abs(column(runs[0], name) + column(runs[1], name)).max() < 1e-9
 

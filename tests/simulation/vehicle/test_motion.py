@@ -36,7 +36,9 @@ def test_a_held_joint_drives_a_circle(bend_rad: float, propel: float) -> None:
 def test_the_circle_of_a_curvature_closes_after_a_turn() -> None:
     vehicle = Vehicle(Machine(), Plane())
     bend = articulation_for_curvature(1.0 / 8.0, Machine())
-    states = drive(vehicle, vehicle.at_rest(0.0, 0.0, 0.0, near_z_m=0.0, articulation_rad=bend, time_ns=0), command(0.5), 22.0)
+    states = drive(
+        vehicle, vehicle.at_rest(0.0, 0.0, 0.0, near_z_m=0.0, articulation_rad=bend, time_ns=0), command(0.5), 22.0
+    )
     yaw = column(states, "yaw_rad")
     k = int(np.argmax(yaw > 2.0 * math.pi))
     assert math.hypot(states[k].x_m, states[k].y_m - 8.0) == pytest.approx(8.0, abs=1e-3)
@@ -48,14 +50,18 @@ def test_a_clothoid_is_driven_to_the_millimetre(rate_pm2: float) -> None:
     """The joint is commanded as Eq. (1) wants it on a path of linear curvature, with what undoes lag and dead time."""
     machine, speed = UNEVEN, 3.0
     vehicle = Vehicle(machine, Plane())
-    start = drive(vehicle, vehicle.at_rest(0.0, 0.0, 0.0, near_z_m=0.0, time_ns=0), command(speed / (24.0 / 3.6)), 15.0)[-1]
+    start = drive(
+        vehicle, vehicle.at_rest(0.0, 0.0, 0.0, near_z_m=0.0, time_ns=0), command(speed / (24.0 / 3.6)), 15.0
+    )[-1]
     speed = start.speed_mps
     front_m, rear_m, length_m = 1.4, 2.1, 16.0
 
     def slope(s: float, bend: float) -> float:
         return (rate_pm2 * s * (front_m * math.cos(bend) + rear_m) - math.sin(bend)) / rear_m
 
-    path = solve_ivp(lambda s, g: [slope(s, g[0])], (0.0, length_m + 6.0), [0.0], rtol=1e-10, atol=1e-12, dense_output=True)
+    path = solve_ivp(
+        lambda s, g: [slope(s, g[0])], (0.0, length_m + 6.0), [0.0], rtol=1e-10, atol=1e-12, dense_output=True
+    )
 
     def joint(t: float) -> float:
         return float(path.sol(max(speed * t, 0.0))[0])
@@ -98,7 +104,9 @@ def test_a_circle_on_a_slope_stays_in_its_plane() -> None:
     plane = Plane(0.1, -0.06)
     vehicle = Vehicle(Machine(), plane)
     bend = articulation_for_curvature(0.1, Machine())
-    states = drive(vehicle, vehicle.at_rest(0.0, 0.0, 0.3, near_z_m=0.0, articulation_rad=bend, time_ns=0), command(0.3), 30.0)
+    states = drive(
+        vehicle, vehicle.at_rest(0.0, 0.0, 0.3, near_z_m=0.0, articulation_rad=bend, time_ns=0), command(0.3), 30.0
+    )
     poses = np.stack([_pose(np.array(state[1:7])) for state in states])
     centre = poses[:, :3, 3] + 10.0 * poses[:, :3, 1]
     assert np.ptp(centre, axis=0).max() < 1e-3
@@ -146,7 +154,9 @@ def test_a_hole_in_the_floor_is_driven_over() -> None:
 
 def test_a_row_of_the_history_is_the_state() -> None:
     vehicle = Vehicle(Machine(), Plane())
-    state = drive(vehicle, vehicle.at_rest(1.0, 2.0, 0.3, near_z_m=0.0, load_kg=500.0, time_ns=7), command(0.5, 0.1), 1.0)[-1]
+    state = drive(
+        vehicle, vehicle.at_rest(1.0, 2.0, 0.3, near_z_m=0.0, load_kg=500.0, time_ns=7), command(0.5, 0.1), 1.0
+    )[-1]
     row = state.row()
     assert row.shape == (17,)
     assert row[:9].tolist() == [
