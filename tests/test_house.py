@@ -29,7 +29,7 @@ FLOORS = [
     {"errors"},
     {"messages", "settings", "resources", "names", "interrupts", "descriptions"},
     {"geometry", "tables", "provenance", "outputs", "json_files", "roles", "settings_tree"},
-    {"trajectory", "runfolder"},
+    {"trajectory", "runfolder", "machine_sections"},
     {"machine", "mapfolder"},
     {"kinematics"},
     {"scan_matching"},

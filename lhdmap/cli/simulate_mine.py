@@ -118,8 +118,8 @@ def run_mine(arguments: argparse.Namespace, console: Console, scanner: dict[str,
     files = "\n".join(
         f"{name:9} {values[name]}" for name in ("log", "truth", "topology", "nodes", "mesh") if values[name]
     )
-    told = f"{drive.distance_m:.1f} m in {drive.duration_s:.1f} s, {drive.scans} front scans, least clearance {drive.min_clearance_m:.2f} m"
-    console.result(values, f"{files}\n{told}")
+    told = f"{drive.distance_m:.1f} m in {drive.duration_s:.1f} s, {drive.scans} front scans"
+    console.result(values, f"{files}\n{told}, least clearance {drive.min_clearance_m:.2f} m")
     return 0
 
 

@@ -24,14 +24,13 @@ from lhdmap.mine.ways import Leg, legs_of
 from lhdmap.outputs import OutputFiles
 from lhdmap.roles import ROLES
 from lhdmap.simulation.history import SECOND_NS, START_NS, Column, History
+from lhdmap.simulation.mine_world.bumper import Bumper
 from lhdmap.simulation.mine_world.world import MineWorld
 from lhdmap.simulation.operator import Operator, OperatorSettings, wander_of
 from lhdmap.simulation.sensing.faults import FaultSettings, with_faults
 from lhdmap.simulation.sensing.sections import SensorSettings
 from lhdmap.simulation.sensing.sensor import Due, Sensor
 from lhdmap.simulation.sensing.suite import sensors_of
-from lhdmap.simulation.vehicle.bodies import Bodies
-from lhdmap.simulation.vehicle.contact import Contact
 from lhdmap.simulation.vehicle.shaking import Shaking
 from lhdmap.simulation.vehicle.state import VehicleState
 from lhdmap.simulation.vehicle.vehicle import Vehicle
@@ -93,12 +92,13 @@ class MineDrive:
         self.legs = planned(network, machine, start, settings)
         self.world = MineWorld(network, machine, view_m=settings.sensors.scanner.max_range_m + 5.0)
         self.directory = Directory(network)
-        self._vehicle = Vehicle(machine, self.world)
+        self._vehicle = Vehicle(machine, self.world, seed=settings.seed)
         x, y, z, yaw = network.tubes[start.tube].pose(start.at_m, start.facing).tolist()
         self.state = self._vehicle.at_rest(x, y, yaw, near_z_m=z, time_ns=START_NS)
         self._operator = Operator(self.legs, machine, settings.operator, seed=settings.seed)
+        self._command = self._operator.command(self.state, START_NS)
         self._shaking = Shaking(math.radians(settings.vibration_deg), settings.seed)
-        self._bodies, self._contact = Bodies(machine), Contact(self.world)
+        self._bumper = Bumper(machine, self.world)
         self.distance_m, self.min_clearance_m = 0.0, 1.0
         self.contacts: list[str] = []
 
@@ -128,7 +128,7 @@ class MineDrive:
             f"the operator is stuck in '{where.node}' at {where.at_m:.0f} m, on leg {self._operator.leg + 1}"
         )
 
-    def where(self, stamp_ns: int, state: FloatArray) -> str:
+    def where(self, _stamp_ns: int, state: FloatArray) -> str:
         """Return the name of the node that a machine is in."""
         return self.directory.at(state[[Column.X, Column.Y, Column.Z]]).node
 
@@ -144,20 +144,19 @@ class MineDrive:
         return row
 
     def _advance(self, step: int) -> None:
-        state = self.state
-        command = self._operator.command(state, state.time_ns) if step % _COMMAND_STEPS == 0 else None
-        self.state = self._vehicle.step(state, command, STEP_NS / SECOND_NS)
+        if step % _COMMAND_STEPS == 0:
+            self._command = self._operator.command(self.state, self.state.time_ns)
+        self.state = self._vehicle.step(self.state, self._command, STEP_NS / SECOND_NS)
         self.distance_m += abs(self.state.speed_mps) * STEP_NS / SECOND_NS
         if step % _LOOK_STEPS == 0:
             self._look(self.state)
 
     def _look(self, state: VehicleState) -> None:
         """Note how near the bodies are to walls, and what they touch."""
-        boxes = self._bodies.at(state)
-        self.min_clearance_m = min(self.min_clearance_m, self._contact.clearance_m(boxes, self.min_clearance_m))
+        self.min_clearance_m = self._bumper.clearance_m(state, self.min_clearance_m)
         if self.min_clearance_m > 0.0:
             return
-        for touch in self._contact.touching(boxes):
+        for touch in self._bumper.touching(state):
             where = self.directory.at(state.position_m)
             told = f"{touch.body} in {where.node} at {where.at_m:.0f} m"
             if told not in self.contacts:

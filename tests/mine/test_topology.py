@@ -17,7 +17,7 @@ from tests.mine.plans import TEE, lines, network_of
 MACHINE = Machine()
 
 
-def truth(table: dict[str, object], **more: object) -> dict[str, Any]:
+def truth(table: dict[str, Any], **more: Any) -> dict[str, Any]:
     return topology_json(network_of(table, **more), MACHINE)
 
 
@@ -92,7 +92,9 @@ def test_where_a_place_is(point: tuple[float, float], node: str) -> None:
 
 
 def test_where_a_place_is_on_its_drift() -> None:
-    assert Directory(network_of(TEE)).at(np.array([60.0, 1.0, 0.0])) == ("A", pytest.approx(60.0, abs=0.13))
+    node, at_m = Directory(network_of(TEE)).at(np.array([60.0, 1.0, 0.0]))
+    assert node == "A"
+    assert at_m == pytest.approx(60.0, abs=0.13)
 
 
 def test_levels_above_each_other_are_told_apart() -> None:

@@ -9,13 +9,13 @@ from typing import NamedTuple, Protocol, TypeVar
 
 import numpy as np
 import numpy.typing as npt
+from scipy.spatial import KDTree
 
 from lhdmap.errors import ConfigError
 from lhdmap.machine import Machine
 from lhdmap.messages import FloatArray
 from lhdmap.mine.network import Network
 from lhdmap.mine.plan import DustPlan, PlacePlan, WetPlan
-from lhdmap.mine.polyline import on_line
 from lhdmap.mine.stands import PIT_M, place_end
 from lhdmap.simulation.drift import FloorHeight, Mesh
 from lhdmap.simulation.mine_world.hollow import Skin
@@ -28,14 +28,16 @@ from lhdmap.simulation.surroundings import Rays
 Zone = TypeVar("Zone", WetPlan, DustPlan)
 TILE_M = 60.0
 _PIECES = 512  # that are kept: the surface of some 6 km
+_STATION_M = 0.5
 _SCENES = 3  # that are kept: a machine may go to and fro between two
 
 
 class Thing(NamedTuple):
-    """Something that stands in the mine: its mesh, and the box around it (2, 3)."""
+    """Something that stands in the mine: its mesh, the box around it (2, 3), and which of its kind it is."""
 
     mesh: Mesh
     box_m: FloatArray
+    version: int = 0
 
 
 class Skins(Protocol):
@@ -63,8 +65,8 @@ class MineWorld:
         self._pieces = None if network.plan.surface.file else Pieces(network)
         self._skins: Skins = SurveyedSkins(network) if self._pieces is None else self._pieces
         self._boxes = self._skins.boxes_m
+        self._line = functools.lru_cache(maxsize=None)(self._make_line)
         self.piece = functools.lru_cache(maxsize=_PIECES)(self._make_piece)
-        self._walls = functools.lru_cache(maxsize=64)(self._make_walls)
         self._scenes: OrderedDict[frozenset[int], Surface] = OrderedDict()
         self._here: tuple[tuple[float, ...], Surface] | None = None
         self._things: dict[str, Thing] = {}
@@ -95,25 +97,34 @@ class MineWorld:
 
     def friction(self, position_m: FloatArray) -> float:
         """Return the friction of tyres on the floor at a point (3,)."""
-        wet = self._wet_at(position_m)
-        return self.network.plan.floor.friction if wet is None else wet.friction
+        plan = self.network.plan
+        return min((zone.friction for zone in self._zones_at(plan.wet, position_m)), default=plan.floor.friction)
 
     def dust(self, position_m: FloatArray) -> float:
         """Return the share of beams that dust returns to a scanner at a point (3,)."""
         return max((one.share for one in self._zones_at(self.network.plan.dust, position_m)), default=0.0)
 
-    def walls(self, box_m: FloatArray) -> Iterator[tuple[int | str, Mesh]]:
-        """Yield what bodies within a box (2, 3) may touch: each with a key under which it stays the same, and its walls.
+    def keys_in(self, box_m: FloatArray) -> list[int | str]:
+        """Return keys of the pieces and things that overlap a box (2, 3); what has a key stays as it is."""
+        things = {**self._things, **{name: thing for name, (thing, _) in self._passing.items()}}
+        pieces: list[int | str] = list(np.flatnonzero(_overlap(self._boxes, box_m)).tolist())
+        return pieces + [
+            f"{name}#{thing.version}" for name, thing in things.items() if _overlap(thing.box_m[None], box_m)[0]
+        ]
 
-        Floors are not in it; wheels stand on them.
-        """
-        for index in np.flatnonzero(_overlap(self._boxes, box_m)).tolist():
-            walls = self._walls(index)
-            if len(walls.triangles):
-                yield index, walls
-        for name, thing in {**self._things, **{k: v for k, (v, _) in self._passing.items()}}.items():
-            if _overlap(thing.box_m[None], box_m)[0]:
-                yield f"{name} {self._version}", thing.mesh
+    def solid(self, key: int | str) -> tuple[Mesh, npt.NDArray[np.bool_] | None]:
+        """Return the mesh behind a key, and which of its triangles are floor (None: none)."""
+        if isinstance(key, int):
+            skin = self.piece(key)
+            return skin.mesh, skin.floor
+        name = key.rpartition("#")[0]
+        thing = self._passing[name][0] if name in self._passing else self._things[name]
+        return thing.mesh, None
+
+    @property
+    def version(self) -> int:
+        """Goes up whenever something appears, goes or changes."""
+        return self._version
 
     # What changes.
 
@@ -125,15 +136,15 @@ class MineWorld:
 
     def stand(self, name: str, mesh: Mesh) -> None:
         """Put something into the mine that stays for long (scenes are made anew)."""
-        self._things[name] = _thing(mesh)
         self._version += 1
+        self._things[name] = _thing(mesh, self._version)
         self._scenes.clear()
         self._here = None
 
     def appear(self, name: str, mesh: Mesh) -> None:
         """Put something into the mine that comes and goes: a person, an obstacle."""
-        self._passing[name] = (_thing(mesh), Surface(mesh))
         self._version += 1
+        self._passing[name] = (_thing(mesh, self._version), Surface(mesh))
 
     def vanish(self, name: str) -> None:
         """Take away what has appeared."""
@@ -153,10 +164,6 @@ class MineWorld:
         skin = self._skins.skin(index)
         pit = None if self._pieces is None else self._pits.get(self._pieces.all[index].tube)
         return skin if pit is None else _opened(skin, *pit)
-
-    def _make_walls(self, index: int) -> Mesh:
-        skin = self.piece(index)
-        return Mesh(skin.mesh.vertices_m, skin.mesh.triangles[~skin.floor])
 
     def _scene(self, tile_m: FloatArray) -> Surface:
         """Return what can be seen from a tile."""
@@ -189,22 +196,25 @@ class MineWorld:
         index, _, _ = place_end(self.network, place)
         return pile_of(self.network, place, self._pieces.drift(index), self.machine, taken_m)
 
-    def _wet_at(self, position_m: FloatArray) -> WetPlan | None:
-        return next(iter(self._zones_at(self.network.plan.wet, position_m)), None)
-
     def _zones_at(self, zones: Sequence[Zone], position_m: FloatArray) -> list[Zone]:
+        """Return the zones that a point is in."""
         found = []
         for zone in zones:
             tube = self.network.tubes[self.network.tube(zone.drift)]
-            s = float(on_line(tube.line, position_m)[0])
-            apart = float(np.linalg.norm(tube.pose(s)[:3] - position_m))
+            apart, station = self._line(zone.drift).query(position_m)
+            s = float(station) * _STATION_M
             if zone.from_m <= s <= zone.to_m and apart < tube.half_width_m(s) + 3.0:
                 found.append(zone)
         return found
 
+    def _make_line(self, drift: str) -> KDTree:
+        """Return a tree of points each `_STATION_M` on the centre line of a drift."""
+        tube = self.network.tubes[self.network.tube(drift)]
+        return KDTree(tube.line.at(np.arange(0.0, tube.length_m, _STATION_M))[:, :3])
 
-def _thing(mesh: Mesh) -> Thing:
-    return Thing(mesh, np.stack([mesh.vertices_m.min(axis=0), mesh.vertices_m.max(axis=0)]))
+
+def _thing(mesh: Mesh, version: int = 0) -> Thing:
+    return Thing(mesh, np.stack([mesh.vertices_m.min(axis=0), mesh.vertices_m.max(axis=0)]), version)
 
 
 def _overlap(boxes_m: FloatArray, box_m: FloatArray) -> npt.NDArray[np.bool_]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -21,7 +22,7 @@ MACHINE = Machine()
 FINE = {"mesh_m": 0.12}
 
 
-def world_of(table: dict[str, object], **more: object) -> MineWorld:
+def world_of(table: dict[str, Any], **more: Any) -> MineWorld:
     return MineWorld(network_of(table, walls=FINE, **more), MACHINE)
 
 
@@ -204,12 +205,14 @@ def test_water_is_slippery_and_dust_hangs_where_the_plan_says() -> None:
 
 def test_what_bodies_may_touch_is_near_them(tee: MineWorld) -> None:
     box = np.array([[18.0, -3.0, 0.0], [26.0, 3.0, 3.0]])
-    meshes = dict(tee.walls(box))
-    assert 0 < len(meshes) < 4
-    for mesh in meshes.values():
-        normal = np.cross(
-            *(mesh.vertices_m[mesh.triangles[:, k]] - mesh.vertices_m[mesh.triangles[:, 0]] for k in (1, 2))
-        )
+    keys = tee.keys_in(box)
+    assert 0 < len(keys) < 4
+    for key in keys:
+        mesh, floor = tee.solid(key)
+        assert floor is not None
+        mesh = mesh._replace(triangles=mesh.triangles[~floor])
+        a, b, c = (mesh.vertices_m[mesh.triangles[:, k]] for k in range(3))
+        normal = np.cross(b - a, c - a)
         level = np.abs(normal[:, 2]) > 0.95 * np.linalg.norm(normal, axis=1)
         assert (mesh.vertices_m[mesh.triangles].mean(axis=1)[level, 2] > 1.5).all()  # roof, no floor
 
