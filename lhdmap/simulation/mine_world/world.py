@@ -26,7 +26,8 @@ from lhdmap.simulation.raycast import Layered, Surface
 from lhdmap.simulation.surroundings import Rays
 
 Zone = TypeVar("Zone", WetPlan, DustPlan)
-TILE_M = 60.0
+TILE_M = 100.0
+_WHOLE_PIECES = 120  # of a mine that is one scene: some 1.8 km, 3 million triangles, 400 MiB
 _PIECES = 512  # that are kept: the surface of some 6 km
 _STATION_M = 0.5
 _SCENES = 3  # that are kept: a machine may go to and fro between two
@@ -166,8 +167,8 @@ class MineWorld:
         return skin if pit is None else _opened(skin, *pit)
 
     def _scene(self, tile_m: FloatArray) -> Surface:
-        """Return what can be seen from a tile."""
-        reach = self.view_m + 0.5 * TILE_M
+        """Return what can be seen from a tile; of a small mine all, which need not be made anew."""
+        reach = self.view_m + 0.5 * TILE_M if len(self._boxes) > _WHOLE_PIECES else np.inf
         box = np.stack([tile_m - reach, tile_m + reach])
         inside = frozenset(np.flatnonzero(_overlap(self._boxes, box)).tolist())
         found = self._scenes.get(inside)
