@@ -126,7 +126,7 @@ def measured(
     ranges = exact_m.astype(float)
     if settings.mixed_pixel_share > 0.0:
         ranges = _mixed(ranges, settings.mixed_pixel_share, rng)
-    if settings.dust_share > 0.0:
+    if dust.any():
         near = 0.5 + rng.exponential(3.0, ranges.shape)
         ranges = np.where((rng.random(ranges.shape) < dust[:, None]) & (near < ranges), near, ranges)
     if settings.noise_m > 0.0:

@@ -133,6 +133,10 @@ class DriftWorld:
         nearest = int(np.einsum("ij,ij->i", offsets, offsets).argmin())
         return float(self.drift.line.s_m[_PLACE_STEP * nearest])
 
+    def dust(self, position_m: FloatArray) -> float:  # noqa: ARG002  # it is nowhere
+        """Return the share of beams that dust returns at a place: it hangs nowhere, clouds come with time."""
+        return 0.0
+
     def near(self, position_m: FloatArray) -> Surface:
         """Return the surface that rays from a point (3,) near the centre line meet."""
         return self.surface.near(self.place_m(position_m))

@@ -9,11 +9,15 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 from lhdmap.machine import Machine
-from lhdmap.messages import FloatArray
+from lhdmap.messages import FloatArray, LaserScan
 from lhdmap.mine.network import Network, make_network
 from lhdmap.mine.plan import find_plan, load_plan
+from lhdmap.simulation.history import Column, History
 from lhdmap.simulation.mine_world.hollow import Volume
 from lhdmap.simulation.mine_world.world import MineWorld
+from lhdmap.simulation.scanner import rig_of
+from lhdmap.simulation.sensing.scans import Scanner
+from lhdmap.simulation.sensing.sections import ScannerSettings
 from scipy.spatial import KDTree
 
 from tests.mine.plans import TEE, lines, network_of
@@ -224,3 +228,28 @@ def test_a_mine_of_five_kilometres_is_there_at_once() -> None:
     world = MineWorld(network, MACHINE)
     assert sum(edge.length_m for edge in network.edges) > 5000.0
     assert look(world, (100.0, 0.0), np.array([math.pi / 2]))[0] == pytest.approx(2.25, abs=0.6)
+
+
+def test_dust_that_hangs_in_a_drift_is_what_scanners_see_there() -> None:
+    zone = {"drift": "A", "from_m": 10.0, "to_m": 20.0, "share": 0.3}
+    world = world_of(TEE, dust=[zone])
+    near = [_share_nearer(world, x) for x in (5.0, 15.0)]
+    assert near[0] == 0.0
+    assert 0.05 < near[1] < 0.3  # dust behind a wall is not seen
+
+
+def _share_nearer(world: MineWorld, x_m: float) -> float:
+    """Return the share of beams of some scans that are much shorter than without dust."""
+    scans = []
+    for where in (world, MineWorld(network_of(TEE, walls=FINE), MACHINE)):
+        history = History(100.0)
+        row = np.zeros(len(Column))
+        row[:3] = x_m, 0.0, float(world.floor_height(np.array([[x_m, 0.0, 0.0]]))[0])
+        for _ in range(30):
+            history.append(row)
+        sensor = Scanner(
+            "front", ScannerSettings(noise_m=0.0), rig_of(MACHINE, MACHINE.mounts["lidar_front"], occlusion=False), 1
+        )
+        records = [record for _ in range(6) for record in sensor.read(history, where)]
+        scans.append(np.array([record.message.ranges_m for record in records if isinstance(record.message, LaserScan)]))
+    return float((scans[0] < scans[1] - 0.05).mean())
