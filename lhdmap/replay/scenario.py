@@ -131,7 +131,7 @@ def load_scenario(path: Path, **over: Any) -> Scenario:
         ConfigError: a key or a value in it is wrong.
     """
     scenario = load_tree(Scenario, path, "scenario file")
-    beside = {key: _beside(path, getattr(scenario, key)) for key in ("mine", "machine", "map")}
+    beside: dict[str, Any] = {key: _beside(path, getattr(scenario, key)) for key in ("mine", "machine", "map")}
     return replace(scenario, **beside, **over)
 
 
