@@ -15,8 +15,8 @@ import numpy.typing as npt
 
 from lhdmap.errors import UsageError
 from lhdmap.messages import FloatArray
+from lhdmap.mine.centre_line import Start, centre_line
 from lhdmap.settings import figure
-from lhdmap.simulation.centre_line import Start, centre_line
 from lhdmap.simulation.drift import Drift, Mesh
 from lhdmap.simulation.raycast import Surface
 

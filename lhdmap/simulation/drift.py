@@ -5,21 +5,26 @@ The surface is a function of (arc length s, position u on the profile) and is me
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from lhdmap.messages import FloatArray
-from lhdmap.simulation.centre_line import CentreLine
+from lhdmap.mine.centre_line import CentreLine
 from lhdmap.simulation.noise_field import Scales, noise_field
 from lhdmap.simulation.sections import DriftSettings
 
 _UNDULATION = Scales(3, 4.0, 0.6)  # waves of about 8, 4 and 2 m: what a machine of 3.4 m wheelbase rides up and down
 _ROUGH_FLOOR = Scales(3, 0.4, 0.7)
+_SAMPLED_M = 500.0  # of a longer drift this much tells how rough the drawn fields are
 
 
 Triangles = npt.NDArray[np.uint32]
+FloorHeight = Callable[[FloatArray], FloatArray]
+"""Height of a floor (N,) under points (N, 3) of `map`."""
 
 
 class Mesh(NamedTuple):
@@ -78,39 +83,61 @@ def _blurred(points: FloatArray, half: int) -> FloatArray:
 
 
 class Drift:
-    """The surface of one drift along `line`; `rng` draws its roughness."""
+    """The surface of one drift along `line`; `rng` draws its roughness, the floor's too where none is given for all drifts."""
 
     def __init__(
-        self, settings: DriftSettings, line: CentreLine, rng: np.random.Generator, *, planar: bool = False
+        self,
+        settings: DriftSettings,
+        line: CentreLine,
+        rng: np.random.Generator,
+        *,
+        planar: bool = False,
+        floor: FloorHeight | None = None,
     ) -> None:
-        self.settings, self.line, self.profile = settings, line, profile(settings, planar=planar)
+        self.settings, self.line, self.profile, self._floor = settings, line, profile(settings, planar=planar), floor
         span, width = (0.0, line.length_m), settings.half_width_m + 1.0 + _widest(settings)
         perimeter = (0.0, float(self.profile.u_m[-1]))
         wall_rng, floor_rng, end_rng, self._blast_rng = rng.spawn(4)
         scales = Scales(settings.roughness_octaves, settings.roughness_scale_m, settings.roughness_gain)
         self._walls = noise_field(wall_rng, scales, span, perimeter)
-        self._waves = noise_field(floor_rng, _UNDULATION, span, (-width, width))
-        self._stones = noise_field(floor_rng, _ROUGH_FLOOR, span, (-width, width))
+        if floor is None:
+            self._waves = noise_field(floor_rng, _UNDULATION, span, (-width, width))
+            self._stones = noise_field(floor_rng, _ROUGH_FLOOR, span, (-width, width))
         self._ends = noise_field(end_rng, scales, (-width, width), (-1.0, settings.height_m + 1.0))
         self._normalise(width)
 
     def _normalise(self, width: float) -> None:
-        settings, s = self.settings, np.arange(0.0, self.line.length_m, 0.15)
+        settings, s = self.settings, np.arange(0.0, min(self.line.length_m, _SAMPLED_M), 0.15)
         lateral = np.arange(-width + 1.0, width - 1.0 + 1e-9, 0.2)
         self._walls.normalise(
             s, np.unique(self.profile.u_m)[:: max(1, int(0.15 / settings.mesh_m))], settings.roughness_m
         )
-        self._waves.normalise(s, lateral, settings.floor_undulation_m)
-        self._stones.normalise(s, lateral, settings.floor_roughness_m)
+        if self._floor is None:
+            self._waves.normalise(s, lateral, settings.floor_undulation_m)
+            self._stones.normalise(s, lateral, settings.floor_roughness_m)
         self._ends.normalise(lateral, np.arange(0.0, settings.height_m, 0.2), settings.roughness_m)
 
     def floor_offset(self, s_m: FloatArray, lateral_m: FloatArray) -> FloatArray:
         """Return the floor's height (m) over the centre line's at points of one shape."""
+        if self._floor is not None:
+            x, y, z, heading = np.moveaxis(self.line.at(s_m), -1, 0)
+            points = np.stack([x - lateral_m * np.sin(heading), y + lateral_m * np.cos(heading), z], axis=-1)
+            return self._floor(points.reshape(-1, 3)).reshape(s_m.shape) - z
         return self._waves.at(s_m, lateral_m) + self._stones.at(s_m, lateral_m)
 
     def wall_offset(self, s_m: FloatArray) -> FloatArray:
         """Return how far walls and roof lie outside their nominal profile (m), shape (len(s), len(profile))."""
-        return self._walls.grid(s_m, self.profile.u_m) + self._flare(s_m)[:, None]
+        return self._walls.grid(s_m, self.profile.u_m) + self._flare(s_m)[:, None] - self._bolts(s_m)
+
+    def _bolts(self, s_m: FloatArray) -> FloatArray | float:
+        """Return how far the plates of rock bolts stand out (m), shape (len(s), len(profile)): short bumps on a square grid."""
+        settings = self.settings
+        if settings.bolts_m == 0.0:
+            return 0.0
+        along, around = (
+            np.maximum(np.cos(2 * np.pi * way / settings.bolt_spacing_m), 0.0) ** 6 for way in (s_m, self.profile.u_m)
+        )
+        return settings.bolts_m * along[:, None] * around
 
     def _flare(self, s_m: FloatArray) -> FloatArray:
         """Return the flare of the blast rounds (m): each widens towards its end and steps back over 0.15 m."""
@@ -119,6 +146,21 @@ class Drift:
         back = 0.15 / settings.blast_round_m
         ramp = np.where(phase < 1.0 - back, phase / (1.0 - back), (1.0 - phase) / back)
         return settings.blast_flare_m * (ramp - 0.5)
+
+    def reversed(self) -> Drift:
+        """Return the same drift with its line the other way round; its nominal walls only, for what stands at its start."""
+        line = self.line
+        turned = CentreLine(
+            line.length_m - line.s_m[::-1], line.x_m[::-1], line.y_m[::-1], line.z_m[::-1],
+            line.heading_rad[::-1] + np.pi, -line.curvature_pm[::-1],
+        )  # fmt: skip
+        settings = replace(
+            self.settings,
+            widenings=tuple(
+                (line.length_m - at, right, left, roof) for at, left, right, roof in self.settings.widenings[::-1]
+            ),
+        )
+        return Drift(settings, turned, np.random.default_rng(0), floor=self._floor)
 
     def ring_count(self) -> int:
         """Return the number of rings of the whole mesh."""

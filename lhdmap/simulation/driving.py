@@ -13,7 +13,7 @@ import numpy as np
 from lhdmap.kinematics import articulation_along_path
 from lhdmap.machine import Machine
 from lhdmap.messages import FloatArray
-from lhdmap.simulation.centre_line import STEP_M, CentreLine, beside
+from lhdmap.mine.centre_line import STEP_M, CentreLine, beside
 from lhdmap.simulation.drift import Drift
 from lhdmap.simulation.history import Column
 from lhdmap.simulation.noise_field import Scales, noise_field

@@ -40,6 +40,23 @@ class Surface:
         return self._scene.count_intersections(self._tensor(rays), nthreads=1).numpy()
 
 
+class Layered:
+    """Several surfaces as one: a large one that stays, and small ones that come and go."""
+
+    def __init__(self, base: Surface, others: list[Surface]) -> None:
+        self._base, self._others = base, others
+        self.origin_m = base.origin_m
+
+    def cast(self, rays: Float32Array) -> Float32Array:
+        """Return the range of each ray, as `Surface.cast`."""
+        ranges = self._base.cast(rays)
+        for other in self._others:
+            moved = rays.copy()
+            moved[:, :3] += (self.origin_m - other.origin_m).astype(np.float32)
+            ranges = np.minimum(ranges, other.cast(moved))
+        return ranges
+
+
 class TiledSurface:
     """The surface around a place of a long drift; it is renewed as the machine drives on, so memory does not grow."""
 

@@ -57,6 +57,10 @@ class DriftSettings:
     blast_flare_m: float = setting(
         0.0, unit="m", minimum=0.0, maximum=0.5, doc="How far walls and roof flare over a round before they step back."
     )
+    bolts_m: float = setting(
+        0.0, unit="m", minimum=0.0, maximum=0.3, doc="How far plates of rock bolts and mesh stand out of the rock."
+    )
+    bolt_spacing_m: float = setting(1.2, unit="m", minimum=0.4, maximum=5.0, doc="Distance from bolt to bolt.")
     cross_drifts: tuple[tuple[float, float, float], ...] = setting(
         (),
         unit="m, deg, m",

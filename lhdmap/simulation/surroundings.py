@@ -4,8 +4,20 @@ from __future__ import annotations
 
 from typing import Protocol
 
-from lhdmap.messages import FloatArray
-from lhdmap.simulation.raycast import Surface
+from lhdmap.messages import Float32Array, FloatArray
+
+
+class Rays(Protocol):
+    """What rays meet around a place."""
+
+    @property
+    def origin_m(self) -> FloatArray:
+        """A point (3,) of `map` near by, from which rays' origins are counted."""
+        ...
+
+    def cast(self, rays: Float32Array) -> Float32Array:
+        """Return the range of each ray, shape (N,), metres, inf for none; `rays` (N, 6): origin less `origin_m`, direction."""
+        ...
 
 
 class Ground(Protocol):
@@ -23,8 +35,8 @@ class Ground(Protocol):
 class View(Protocol):
     """What scanners look at."""
 
-    def near(self, position_m: FloatArray) -> Surface:
-        """Return the surface that rays from a point (3,) of `map` meet, to cast them against."""
+    def near(self, position_m: FloatArray) -> Rays:
+        """Return what rays from a point (3,) of `map` meet, to cast them against."""
         ...
 
 

@@ -15,7 +15,7 @@ from lhdmap.errors import ConfigError
 from lhdmap.kinematics import articulation_along_path
 from lhdmap.machine import Machine, SensorMount, load_machine
 from lhdmap.messages import FloatArray
-from lhdmap.simulation.centre_line import STEP_M, CentreLine, Start, centre_line
+from lhdmap.mine.centre_line import STEP_M, CentreLine, Start, centre_line
 from lhdmap.simulation.crossing import Crossing, side_drift
 from lhdmap.simulation.drift import Drift, Mesh
 from lhdmap.simulation.driving import TABLE_RATE_HZ, Plan, Shaking, drive_path, simulate_motion, slip_factors

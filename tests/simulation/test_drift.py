@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from lhdmap.messages import Float32Array, FloatArray
-from lhdmap.simulation.centre_line import Start, beside, centre_line
+from lhdmap.mine.centre_line import Start, beside, centre_line
 from lhdmap.simulation.crossing import Crossing, side_drift
 from lhdmap.simulation.drift import Drift, Mesh
 from lhdmap.simulation.noise_field import Scales, noise_field

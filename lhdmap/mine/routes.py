@@ -1,0 +1,390 @@
+"""Routes on a plan: drifts and places in order, with gears, become runs along edges, turns and inversions.
+
+A search over (edge, direction of motion, gear): a machine never turns round in a drift, so its gear follows from the way it
+came. To invert it drives past a node until it has all of its length behind it, and leaves by another branch.
+"""
+
+from __future__ import annotations
+
+import functools
+import heapq
+import itertools
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from lhdmap.errors import UsageError
+from lhdmap.machine import Machine
+from lhdmap.mine.network import Branch, Edge, Network, Turn
+from lhdmap.mine.plan import BLIND, MinePlan, PlacePlan
+from lhdmap.mine.polyline import on_line
+from lhdmap.mine.stands import kept_free_m, overhang_m, place_end, stand_at
+from lhdmap.settings import nearest
+
+_INVERSION_M = 20.0  # what an inversion is worth, as a way
+_REVERSE = 2.5  # a way in reverse against one forwards
+_BEHIND_M = 1.0
+_AT_NODE_M = 13.0  # so near a node a turn may leave an edge, or come into it
+_TEACHING_REVERSE = 8.0  # a teaching drive goes forwards where it can
+LEAST_RADIUS_M = 5.0
+"""Turns of a smaller radius are not driven (guidance prototype, tightest bends)."""
+
+
+class Stop(NamedTuple):
+    """One element of a route: a drift to drive through or a place to come to, and in which gear (1, -1; 0: either)."""
+
+    name: str
+    gear: int
+
+
+class Run(NamedTuple):
+    """A way along a tube, of the leading axle: from and to (m), and the gear; `stop` names the place that it ends at."""
+
+    tube: int
+    from_m: float
+    to_m: float
+    gear: int
+    stop: str = ""
+
+
+class Start(NamedTuple):
+    """Where a machine stands at first: tube, arc length of its front axle (m), which way it faces (1: along, -1: against)."""
+
+    tube: int
+    at_m: float
+    facing: int
+
+
+def parse_route(text: str, plan: MinePlan) -> list[Stop]:
+    """Return the elements of `T1,T2,-T3,DP1`.
+
+    Raises:
+        UsageError: a name is not in the plan.
+    """
+    known = [drift.name for drift in plan.drifts] + [place.name for place in plan.places]
+    stops = []
+    for word in (part.strip() for part in text.split(",")):
+        name = word.removeprefix("-")
+        if name not in known:
+            raise UsageError(f"route {text}: '{name}' is no drift or place of mine '{plan.name}'{nearest(name, known)}")
+        stops.append(Stop(name, -1 if word.startswith("-") else 1))
+    return stops
+
+
+def start_of(network: Network, machine: Machine, name: str | None) -> Start:
+    """Return where a drive begins: at a place, at the start of a drift, or, without a name, where one parks or T1 begins.
+
+    Raises:
+        UsageError: the name is not in the plan.
+    """
+    plan = network.plan
+    if name is None:
+        park = next((place for place in plan.places if place.kind == "park"), None)
+        name = plan.drifts[0].name if park is None else park.name
+    place = next((one for one in plan.places if one.name == name), None)
+    if place is not None:
+        return Start(*stand_at(network, place, machine))
+    if name not in [drift.name for drift in plan.drifts]:
+        known = [drift.name for drift in plan.drifts] + [one.name for one in plan.places]
+        raise UsageError(f"start '{name}' is no drift or place of mine '{plan.name}'{nearest(name, known)}")
+    tube = network.tube(name)
+    behind = PlacePlan(drift=name, kind="park", side="end", at_m=0.0, name="")
+    return Start(*stand_at(network, behind, machine))._replace(tube=tube)
+
+
+class _State(NamedTuple):
+    """At one end of an edge: `entering` it in a direction and gear, or having come to its other end."""
+
+    edge: int
+    direction: int
+    gear: int
+    entering: bool
+
+
+class _Step(NamedTuple):
+    """A step of a search: what it costs (m), where it leads, and what is driven."""
+
+    cost_m: float
+    state: _State
+    runs: tuple[Run, ...]
+
+
+class Planner:
+    """Finds routes of a machine through a network."""
+
+    def __init__(self, network: Network, machine: Machine) -> None:
+        self.network, self.machine = network, machine
+        self._wheelbase_m, self._reverse = machine.dimensions.wheelbase_m, _REVERSE
+        self._turns: dict[tuple[int, Branch], list[Turn]] = {}
+        for turn in network.turns:
+            if turn.tube < 0 or turn.radius_m >= LEAST_RADIUS_M:
+                self._turns.setdefault((turn.node, turn.start), []).append(turn)
+        self._edge_of = {
+            (edge.tube, outward, round(s, 3)): index
+            for index, edge in enumerate(network.edges)
+            for outward, s in ((1, edge.start_m), (-1, edge.end_m))
+        }
+
+    def route(self, start: Start, stops: Sequence[Stop]) -> list[Run]:
+        """Return the runs of a route.
+
+        Raises:
+            UsageError: there is no way to one of its elements.
+        """
+        runs, states = self._begin(start)
+        for number, stop in enumerate(stops):
+            reached = self._reaches(stop, last=number == len(stops) - 1)
+            found = self._search(states, reached)
+            if found is None:
+                raise UsageError(
+                    f"no way to '{stop.name}'{' in reverse' if stop.gear < 0 else ''}: no turn that leads there is wide enough"
+                )
+            state, driven = found
+            runs = [*runs, *self._named(driven, stop)]
+            states = {state: ()}
+        return _trimmed(self.network, _joined(runs))
+
+    def teaching(self, start: Start) -> list[Run]:
+        """Return the runs of a drive through every edge that can be reached, each time the nearest that is left."""
+        self._reverse = _TEACHING_REVERSE
+        runs, states = self._begin(start)
+        left = {index for index, edge in enumerate(self.network.edges) if not self._blind(edge)}
+        while left:
+            found = self._search(states, functools.partial(self._covers_any, frozenset(left)))
+            if found is None:
+                break
+            state, driven = found
+            runs += driven
+            left -= {k for k in left for run in driven if self._covered(k, run)}
+            states = {state: ()}
+        return _trimmed(self.network, _joined(runs))
+
+    def _blind(self, edge: Edge) -> bool:
+        place = self.network.tubes[edge.tube].place
+        return place is not None and place.kind in BLIND
+
+    def _covers_any(self, edges: frozenset[int], step: _Step) -> bool:
+        return any(self._covered(k, run) for k in edges for run in step.runs)
+
+    def _covered(self, index: int, run: Run) -> bool:
+        """Return whether a run goes through an edge, but for what is about its nodes, and what a machine keeps from the rock."""
+        edge, direction = self.network.edges[index], 1 if run.to_m > run.from_m else -1
+        if run.tube != edge.tube:
+            return False
+        first = edge.start_m if direction > 0 else edge.end_m
+        last = self._end(edge, direction, run.gear)
+        begins = (run.from_m - first) * direction < _AT_NODE_M
+        return begins and (run.to_m - last) * direction > -min(_AT_NODE_M, 0.4 * abs(last - first))
+
+    def _begin(self, start: Start) -> tuple[list[Run], dict[_State, tuple[Run, ...]]]:
+        """Return where a machine that stands somewhere can go to first, in both gears."""
+        states: dict[_State, tuple[Run, ...]] = {}
+        for index, edge in enumerate(self.network.edges):
+            if edge.tube != start.tube or not edge.start_m - 0.01 <= start.at_m <= edge.end_m + 0.01:
+                continue
+            for gear in (1, -1):
+                direction = start.facing * gear
+                lead = start.at_m if gear > 0 else start.at_m - start.facing * self._wheelbase_m
+                end = self._end(edge, direction, gear)
+                if (end - lead) * direction > 0.0:
+                    states[_State(index, direction, gear, False)] = (Run(edge.tube, lead, end, gear),)
+            break
+        return [], states
+
+    def _end(self, edge: Edge, direction: int, gear: int) -> float:
+        """Return where on its tube the leading axle is when an edge has been driven through: at the node, or before the rock."""
+        node, s = (edge.end, edge.end_m) if direction > 0 else (edge.start, edge.start_m)
+        if self.network.nodes[node].degree > 1:
+            return s
+        return s - direction * (kept_free_m(self.network, edge.tube, s) + overhang_m(self.machine, gear))
+
+    def _steps(self, state: _State) -> Iterator[_Step]:
+        edge = self.network.edges[state.edge]
+        if state.entering:
+            yield from self._through(state, edge)
+            yield from self._short_inversion(state, edge)
+        else:
+            yield from self._on(state, edge)
+
+    def _through(self, state: _State, edge: Edge) -> Iterator[_Step]:
+        begin = edge.start_m if state.direction > 0 else edge.end_m
+        end = self._end(edge, state.direction, state.gear)
+        way = (end - begin) * state.direction
+        if way > 0.0:
+            run = Run(edge.tube, begin, end, state.gear)
+            yield _Step(way * (1.0 if state.gear > 0 else self._reverse), state._replace(entering=False), (run,))
+
+    def _short_inversion(self, state: _State, edge: Edge) -> Iterator[_Step]:
+        """Drive into an edge until the whole machine is past the node, and come back in the other gear."""
+        node, begin = (edge.start, edge.start_m) if state.direction > 0 else (edge.end, edge.end_m)
+        reach = max(
+            (
+                turn.end_at_m
+                for turns in self._turns.values()
+                for turn in turns
+                if turn.node == node and turn.end.tube == edge.tube
+            ),
+            default=0.0,
+        )
+        depth = reach + self._wheelbase_m + _BEHIND_M
+        if (self._end(edge, state.direction, state.gear) - begin) * state.direction < depth:
+            return
+        there = begin + state.direction * depth
+        back = there - state.direction * self._wheelbase_m
+        runs = (Run(edge.tube, begin, there, state.gear), Run(edge.tube, back, begin, -state.gear))
+        yield _Step(2.0 * depth + _INVERSION_M, _State(state.edge, -state.direction, -state.gear, False), runs)
+
+    def _on(self, state: _State, edge: Edge) -> Iterator[_Step]:
+        """Go on from the end of an edge: into another one, or back in the other gear."""
+        node, s = (edge.end, edge.end_m) if state.direction > 0 else (edge.start, edge.start_m)
+        for turn in self._turns.get((node, Branch(edge.tube, s, -state.direction)), ()):
+            following = self._edge_of.get((turn.end.tube, turn.end.outward, round(turn.end.s_m, 3)))
+            if following is not None:
+                runs = () if turn.tube < 0 else (self._turn_run(turn, edge, state.gear),)
+                yield _Step(0.1, _State(following, turn.end.outward, state.gear, True), runs)
+        if self.network.nodes[node].degree == 1:
+            back = self._end(edge, state.direction, state.gear) - state.direction * self._wheelbase_m
+            begin = edge.start_m if state.direction > 0 else edge.end_m
+            other = (
+                self._end(edge, -state.direction, -state.gear) if self._is_dead_end(edge, -state.direction) else begin
+            )
+            if (back - other) * state.direction > 0.0:
+                way = (back - other) * state.direction * (1.0 if state.gear < 0 else self._reverse)
+                yield _Step(
+                    way + _INVERSION_M,
+                    _State(state.edge, -state.direction, -state.gear, False),
+                    (Run(edge.tube, back, other, -state.gear),),
+                )
+
+    def _is_dead_end(self, edge: Edge, direction: int) -> bool:
+        return self.network.nodes[edge.end if direction > 0 else edge.start].degree == 1
+
+    def _turn_run(self, turn: Turn, edge: Edge, gear: int) -> Run:
+        """Return the run through a turn's tube; which way follows from which of its ends is nearer to the edge."""
+        tube = self.network.tubes[turn.tube]
+        begin = self.network.tubes[edge.tube].pose(turn.start.s_m + turn.start.outward * turn.start_at_m)
+        first, last = tube.pose(0.0), tube.pose(tube.length_m)
+        ahead = ((first - begin)[:2] ** 2).sum() <= ((last - begin)[:2] ** 2).sum()
+        return Run(turn.tube, 0.0, tube.length_m, gear) if ahead else Run(turn.tube, tube.length_m, 0.0, gear)
+
+    def _reaches(self, stop: Stop, *, last: bool) -> Callable[[_Step], bool]:
+        """Return what tells whether a step reaches an element of a route."""
+        network = self.network
+        place = next((one for one in network.plan.places if one.name == stop.name), None)
+        if place is None:
+            tube = network.tube(stop.name)
+            return lambda step: (
+                not step.state.entering
+                and network.edges[step.state.edge].tube == tube
+                and step.state.gear == stop.gear
+                and any(run.tube == tube and run.gear == stop.gear for run in step.runs)
+                and (not last or self._is_last(step.state))
+            )
+        if place.kind in (*BLIND, "passing_bay"):
+            tube, at_m, _ = stand_at(network, place, self.machine)
+            return lambda step: any(
+                run.tube == tube
+                and run.gear == stop.gear
+                and min(run.from_m, run.to_m) <= at_m <= max(run.from_m, run.to_m)
+                for run in step.runs
+            )
+        tube, end_m, direction = place_end(network, place)
+        return lambda step: (
+            not step.state.entering
+            and step.state.gear == stop.gear
+            and step.state.direction == direction
+            and network.edges[step.state.edge].tube == tube
+            and abs(
+                (network.edges[step.state.edge].end_m if direction > 0 else network.edges[step.state.edge].start_m)
+                - end_m
+            )
+            < 0.01
+        )
+
+    def _is_last(self, state: _State) -> bool:
+        """Return whether the tube does not go on behind this edge."""
+        edge = self.network.edges[state.edge]
+        s = edge.end_m if state.direction > 0 else edge.start_m
+        return not any(
+            other.tube == edge.tube and abs((other.start_m if state.direction > 0 else other.end_m) - s) < 8.0
+            for other in self.network.edges
+            if other is not edge
+        )
+
+    def _named(self, runs: list[Run], stop: Stop) -> list[Run]:
+        """Return runs whose last one stops at the place that the route names."""
+        place = next((one for one in self.network.plan.places if one.name == stop.name), None)
+        if place is None or not runs:
+            return runs
+        if place.kind in (*BLIND, "passing_bay"):
+            _, at_m, _ = stand_at(self.network, place, self.machine)
+            last = runs[-1]
+            return [*runs[:-1], last._replace(to_m=at_m, stop=stop.name), last._replace(from_m=at_m)]
+        return [*runs[:-1], runs[-1]._replace(stop=stop.name)]
+
+    def _search(
+        self, states: dict[_State, tuple[Run, ...]], reached: Callable[[_Step], bool]
+    ) -> tuple[_State, list[Run]] | None:
+        """Return the cheapest way from one of `states` to what is `reached`: where it ends, and the runs."""
+        count = itertools.count()
+        queue: list[tuple[float, int, _State, tuple[Run, ...], tuple[object, ...]]] = []
+        for state, runs in states.items():
+            way = sum(abs(run.to_m - run.from_m) * (1.0 if run.gear > 0 else self._reverse) for run in runs)
+            first = _Step(way, state, runs)
+            if runs and reached(first):
+                heapq.heappush(queue, (way, next(count), state, runs, ("end",)))
+            heapq.heappush(queue, (way, next(count), state, runs, ()))
+        done: set[_State] = set()
+        while queue:
+            cost, _, state, runs, end = heapq.heappop(queue)
+            if end:
+                return state, list(runs)
+            if state in done:
+                continue
+            done.add(state)
+            for step in self._steps(state):
+                following = (cost + step.cost_m, next(count), step.state, (*runs, *step.runs))
+                if reached(step):
+                    heapq.heappush(queue, (*following, ("end",)))
+                if step.state not in done:
+                    heapq.heappush(queue, (*following, ()))
+        return None
+
+
+def _joined(runs: Iterable[Run]) -> list[Run]:
+    """Return runs of which those that go on in the same tube are one."""
+    joined: list[Run] = []
+    for run in runs:
+        before = joined[-1] if joined else None
+        if before is not None and not before.stop and before.tube == run.tube and before.gear == run.gear:
+            joined[-1] = before._replace(to_m=run.to_m, stop=run.stop)
+        else:
+            joined.append(run)
+    return joined
+
+
+def _trimmed(network: Network, runs: list[Run]) -> list[Run]:
+    """Return runs that end and begin where the turns between them do; who stands in a turn begins there."""
+    trimmed: list[Run | None] = list(runs)
+    for k, run in enumerate(runs):
+        turn = network.tubes[run.tube]
+        if turn.kind != "turn":
+            continue
+        for near in (k - 1, k + 1):
+            other = trimmed[near] if 0 <= near < len(runs) else None
+            if other is None or other.gear != run.gear or network.tubes[other.tube].kind == "turn":
+                continue
+            line, sign = network.tubes[other.tube].line, 1.0 if other.to_m > other.from_m else -1.0
+            cut_m = float(on_line(line, turn.pose(run.from_m if near < k else run.to_m)[:3])[0])
+            shorter = other._replace(to_m=cut_m) if near < k else other._replace(from_m=cut_m)
+            if (shorter.to_m - shorter.from_m) * sign > 0.0:
+                trimmed[near] = shorter
+                continue
+            there = other.from_m if near < k else other.to_m
+            at_m = float(on_line(turn.line, line.at(np.array([there]))[0, :3])[0])
+            trimmed[near] = None
+            mine = trimmed[k] or run
+            stop = mine.stop or other.stop
+            trimmed[k] = mine._replace(from_m=at_m) if near < k else mine._replace(to_m=at_m, stop=stop)
+    return [run for run in trimmed if run is not None]
