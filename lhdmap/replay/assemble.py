@@ -27,12 +27,15 @@ def parts_of(scenario: Scenario) -> Parts:
     """Return world, machine, sensors and operator of a scenario.
 
     Raises:
-        UsageError: there is no such mine, place or route, or this version does not replay the kind.
+        UsageError: there is no such place or route, or this version does not replay the kind.
+        ConfigError: there is no such mine.
     """
     if scenario.kind != "tram" or scenario.mission or scenario.goal:
         what = f"kind = '{scenario.kind}'" + (" with a goal" if scenario.goal else "")
         raise UsageError(f"{what}: this version replays kind = 'tram' along a route that an operator drives")
-    raise UsageError(f"mine = '{scenario.mine}': no mine world is built in")
+    from lhdmap.replay.mine_parts import mine_parts  # what a mine needs takes a second to load
+
+    return mine_parts(scenario)
 
 
 class Watchers(NamedTuple):

@@ -58,6 +58,8 @@ class Engine:
     def run(self, until_ns: int) -> Iterator[int]:
         """Run up to a time, and yield the time ten times a second, when the caller may stop."""
         queue, told_ns = self._queue, self.now_ns
+        if self.now_ns >= self._faults.next_ns:
+            self._faults.update(self.now_ns)
         while queue and queue[0][0] <= until_ns:
             now_ns, kind, _, _, _, what = heapq.heappop(queue)
             if now_ns != self.now_ns:

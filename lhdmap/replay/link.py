@@ -66,12 +66,18 @@ class Link:
         key = f"{topic} to {receiver}"
         index = self._counts.get(key, 0)
         self._counts[key] = index + 1
-        chance = self._chances.setdefault(key, Chance(self._seed, f"link {key}")).of(index).random(2)
+        chance = self._chance(key).of(index).random(2)
         if chance[0] < loss:
             self.lost += 1
             return None
         late_ns = round((1.0 + _SPREAD * (2.0 * float(chance[1]) - 1.0)) * delay_s * SECOND_NS)
         return self._in_order(topic, receiver, sent_ns + late_ns)
+
+    def _chance(self, key: str) -> Chance:
+        found = self._chances.get(key)
+        if found is None:
+            found = self._chances[key] = Chance(self._seed, f"link {key}")
+        return found
 
     def _in_order(self, topic: str, receiver: str, at_ns: int) -> int:
         key = topic, receiver
