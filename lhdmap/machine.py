@@ -131,7 +131,11 @@ class Drive:
         1.2, unit="m/s²", source=GUIDANCE, minimum=0.05, maximum=10.0, doc="The same with a full bucket."
     )
     slip_slope: float = setting(
-        8.0, source=LOADING, minimum=1.0, maximum=100.0, doc="k of the tyre: force / weight = friction (1 - exp(-k slip))."
+        8.0,
+        source=LOADING,
+        minimum=1.0,
+        maximum=100.0,
+        doc="k of the tyre: force / weight = friction (1 - exp(-k slip)).",
     )
 
 
@@ -146,7 +150,12 @@ class Brakes:
         2.0, unit="m/s²", source=GUIDANCE, minimum=0.1, maximum=10.0, doc="The same with a full bucket."
     )
     ramp_s: float = setting(
-        0.3, unit="s", source=GUIDANCE, minimum=0.0, maximum=5.0, doc="Until they have their full force, after the dead time."
+        0.3,
+        unit="s",
+        source=GUIDANCE,
+        minimum=0.0,
+        maximum=5.0,
+        doc="Until they have their full force, after the dead time.",
     )
 
 
@@ -167,8 +176,12 @@ class Steering:
 class Linkage:
     """Boom and bucket: rates, limits, and how the bucket's box moves with them."""
 
-    lift_rate_rps: float = setting(0.16, unit="rad/s", source=LOADING, minimum=0.0, maximum=2.0, doc="Rate of the boom.")
-    tilt_rate_rps: float = setting(0.24, unit="rad/s", source=LOADING, minimum=0.0, maximum=2.0, doc="Rate of the bucket.")
+    lift_rate_rps: float = setting(
+        0.16, unit="rad/s", source=LOADING, minimum=0.0, maximum=2.0, doc="Rate of the boom."
+    )
+    tilt_rate_rps: float = setting(
+        0.24, unit="rad/s", source=LOADING, minimum=0.0, maximum=2.0, doc="Rate of the bucket."
+    )
     both_share: float = setting(
         0.6, source=LOADING, minimum=0.1, maximum=1.0, doc="Share of its rate that each has where both move."
     )
@@ -180,8 +193,12 @@ class Linkage:
     tilt_limits_rad: tuple[float, float] = setting(
         (-0.9, 0.65), unit="rad", source=LOADING, doc="Least (dumped) and largest (racked) angle of the bucket."
     )
-    pivot_m: tuple[float, float] = setting((-0.3, 1.45), unit="m", source=LOADING, doc="Boom's pivot, x and z in base_link.")
-    boom_m: float = setting(2.2, unit="m", source=LOADING, minimum=0.5, maximum=6.0, doc="From there to the bucket's pin.")
+    pivot_m: tuple[float, float] = setting(
+        (-0.3, 1.45), unit="m", source=LOADING, doc="Boom's pivot, x and z in base_link."
+    )
+    boom_m: float = setting(
+        2.2, unit="m", source=LOADING, minimum=0.5, maximum=6.0, doc="From there to the bucket's pin."
+    )
     body: str = setting("boom_and_bucket", doc="Body that moves with boom and bucket.")
 
 

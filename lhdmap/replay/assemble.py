@@ -70,7 +70,8 @@ def assemble(
     if scenario.perception:
         processes.append(Perception(parts.settings, parts.machine, journal.of(Perception.name)))
     site = STATION if scenario.driver == TELEOPERATOR else MACHINE
-    processes.append(Driver(parts.operator, journal.of(Driver.name), site=site))
+    if parts.operator is not None:
+        processes.append(Driver(parts.operator, journal.of(Driver.name), site=site))
     processes += [*watchers.more, watchers.film, monitor]
     processes += [] if watchers.recorder is None else [watchers.recorder]
     _check(scenario, parts, processes)

@@ -107,7 +107,7 @@ def _node_of(network: Network) -> Callable[[int, FloatArray], str]:
     """Return what tells the name of the node that a machine is in: the teaching drive's `/operation/node`."""
     directory = Directory(network)
 
-    def told(stamp_ns: int, state: FloatArray) -> str:
+    def told(stamp_ns: int, state: FloatArray) -> str:  # noqa: ARG001  # a `Told`
         return directory.at(state[[Column.X, Column.Y, Column.Z]]).node
 
     return told

@@ -113,7 +113,7 @@ class Parts:
         vehicle: steps the state.
         start: its state at the start of the clock.
         sensors: without faults; where readings are due at the same time, those of the first come first.
-        operator: who drives.
+        operator: who drives by hand; None: nobody does.
         bumper: what is touched.
         changing: the world again, where obstacles and persons can appear in it.
         places: points (x, y, z) by name, for faults that begin at one.
@@ -128,7 +128,7 @@ class Parts:
     vehicle: Vehicle
     start: State
     sensors: Sequence[Sensor]
-    operator: Operator
+    operator: Operator | None
     bumper: Bumper | None = None
     changing: Changing | None = None
     places: Mapping[str, Position] = field(default_factory=dict)

@@ -11,6 +11,7 @@ import numpy as np
 from lhdmap.machine import Machine
 from lhdmap.messages import Command, FloatArray, Text
 from lhdmap.replay.faults import Position
+from lhdmap.replay.journal import Scribe
 from lhdmap.replay.parts import Parts, Touch
 from lhdmap.replay.process import Outgoing, Process, Received
 from lhdmap.simulation.drift import Mesh
@@ -121,7 +122,11 @@ class Straight:
 
 
 def parts(
-    operator: Any = None, *, world: Corridor | None = None, scans: bool = True, places: dict[str, Position] | None = None
+    operator: Any = None,
+    *,
+    world: Corridor | None = None,
+    scans: bool = True,
+    places: dict[str, Position] | None = None,
 ) -> Parts:
     """Return a machine in the corridor; without `scans` there are no scanners, which is quick."""
     world, machine = world or Corridor(), Machine()
@@ -168,3 +173,21 @@ def _together(meshes: Sequence[Mesh]) -> Mesh:
     offsets = np.cumsum([0, *(len(one.vertices_m) for one in meshes[:-1])])
     triangles = [one.triangles + np.uint32(offset) for one, offset in zip(meshes, offsets, strict=True)]
     return Mesh(np.concatenate([one.vertices_m for one in meshes]), np.concatenate(triangles))
+
+
+class Blind(Process):
+    """Drives by what it is told about itself alone: the speed falls with the way that perception believes in."""
+
+    name, period_ns, priority, reads = "autonomy", 50_000_000, 30, ("/perception/pose", "/machine/tachometer")
+
+    def __init__(self, scribe: Scribe) -> None:
+        self._scribe, self.poses, self._x_m = scribe, 0, 0.0
+
+    def step(self, now_ns: int, inbox: Sequence[Received]) -> list[Outgoing]:
+        for topic, _, message in inbox:
+            if topic == "/perception/pose":
+                self.poses += 1
+                self._x_m = float(message.T_odom_base[0, 3])
+        self._scribe.goes(f"at {math.floor(self._x_m)} m", "pose", x_m=self._x_m)
+        propel = max(2.0 - 0.2 * self._x_m, 0.3) / TOP_MPS
+        return [Outgoing("/machine/command", Command(now_ns, propel, 0.0, 0.0, 0.0, False, False))]

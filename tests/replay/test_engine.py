@@ -37,7 +37,9 @@ def test_turns_come_at_their_period_and_in_one_order() -> None:
     for one in processes:
         one.on_turn = lambda now_ns, name=one.name: order.append((now_ns - START_NS, name))  # type: ignore[misc]
     run(processes, 60.0)
-    expected = [(t * MS, name) for t in range(0, 61, 10) for name, every in (("c", 20), ("a", 30), ("b", 30)) if t % every == 0]
+    expected = [
+        (t * MS, name) for t in range(0, 61, 10) for name, every in (("c", 20), ("a", 30), ("b", 30)) if t % every == 0
+    ]
     assert order == expected
 
 

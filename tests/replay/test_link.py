@@ -75,7 +75,7 @@ def test_a_degraded_link_loses_its_share_and_keeps_the_order() -> None:
     order = [number for _, number in got]
     assert order == sorted(order)
     late_s = np.array([at - 0.01 * (number - 1) for at, number in got])
-    assert 0.1 - 1e-9 <= late_s.min()
+    assert late_s.min() >= 0.1 - 1e-9
     assert late_s.max() <= 0.3 + 0.002
 
 

@@ -42,9 +42,7 @@ class Bodies:
 
     def at(self, state: VehicleState) -> Boxes:
         """Return the boxes in `map`."""
-        T_map_base = se3.from_rpy(
-            state.roll_rad, state.pitch_rad, state.yaw_rad, (state.x_m, state.y_m, state.z_m)
-        )
+        T_map_base = se3.from_rpy(state.roll_rad, state.pitch_rad, state.yaw_rad, (state.x_m, state.y_m, state.z_m))
         T_of = {"base_link": T_map_base, "rear_link": T_map_base @ T_base_rear(state.articulation_rad, self._machine)}
         middles, axes = np.empty((len(self._parts), 3)), np.empty((len(self._parts), 3, 3))
         for k, (name, body) in enumerate(self._parts):

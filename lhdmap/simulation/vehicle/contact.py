@@ -145,7 +145,9 @@ def _deepest(middle, axes, half, grid, out):  # type: ignore[no-untyped-def]
                         found = True
                         out[3] = depth
                         for a in range(3):
-                            out[a] = (corners[members[n], 0, a] + corners[members[n], 1, a] + corners[members[n], 2, a]) / 3.0
+                            out[a] = (
+                                corners[members[n], 0, a] + corners[members[n], 1, a] + corners[members[n], 2, a]
+                            ) / 3.0
     return found
 
 
@@ -218,7 +220,11 @@ def _distance(t, half, least):  # type: ignore[no-untyped-def]
     for q in range(3):
         r = (q + 1) % 3
         size = max(size, math.sqrt((t[r, 0] - t[q, 0]) ** 2 + (t[r, 1] - t[q, 1]) ** 2 + (t[r, 2] - t[q, 2]) ** 2))
-    x, y, z = (t[0, 0] + t[1, 0] + t[2, 0]) / 3.0, (t[0, 1] + t[1, 1] + t[2, 1]) / 3.0, (t[0, 2] + t[1, 2] + t[2, 2]) / 3.0
+    x, y, z = (
+        (t[0, 0] + t[1, 0] + t[2, 0]) / 3.0,
+        (t[0, 1] + t[1, 1] + t[2, 1]) / 3.0,
+        (t[0, 2] + t[1, 2] + t[2, 2]) / 3.0,
+    )
     if _to_box(x, y, z, half) - size > least:
         return least
     if _overlap(t, half) > 0.0:

@@ -37,7 +37,13 @@ PROPEL, STEER, TILT, LIFT, RPM, STOP = range(6)
 
 def parameters(machine: Machine, load_kg: float) -> FloatArray:
     """Return the parameters of the kernel, shape (25,), for a load."""
-    size, drive, brakes, steering, arm = machine.dimensions, machine.drive, machine.brakes, machine.steering, machine.linkage
+    size, drive, brakes, steering, arm = (
+        machine.dimensions,
+        machine.drive,
+        machine.brakes,
+        machine.steering,
+        machine.linkage,
+    )
     full = min(max(load_kg / drive.payload_kg, 0.0), 1.0) if drive.payload_kg > 0.0 else 0.0
 
     def between(empty: float, loaded: float) -> float:

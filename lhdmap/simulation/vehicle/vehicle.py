@@ -72,7 +72,9 @@ class Vehicle:
         pending: tuple[tuple[int, Command], ...],
         active: Command,
     ) -> VehicleState:
-        x, y, yaw, bend, bend_rate, speed, wheel, traction, brake, boom, boom_rate, bucket, bucket_rate = values.tolist()
+        x, y, yaw, bend, bend_rate, speed, wheel, traction, brake, boom, boom_rate, bucket, bucket_rate = (
+            values.tolist()
+        )
         z, roll, pitch = self._attitude(x, y, state.z_m, yaw, bend)
         return VehicleState(
             time_ns, x, y, z, roll, pitch, yaw, bend, bend_rate, speed, wheel, traction, brake,

@@ -86,7 +86,9 @@ def test_no_wall_is_left_inside_another_drift(tee: MineWorld) -> None:
 def test_the_middle_of_all_drifts_and_turns_is_free(name: str) -> None:
     world = MineWorld(make_network(load_plan(find_plan(name))), MACHINE)
     skins = [world.piece(k) for k in range(len(world._boxes))]
-    walls = KDTree(np.concatenate([skin.mesh.vertices_m[np.unique(skin.mesh.triangles[~skin.floor])] for skin in skins]))
+    walls = KDTree(
+        np.concatenate([skin.mesh.vertices_m[np.unique(skin.mesh.triangles[~skin.floor])] for skin in skins])
+    )
     for tube in world.network.tubes:
         ends_m = 0.0 if tube.kind == "turn" else 2.5
         for s in np.arange(ends_m, tube.length_m - ends_m, 1.0):
