@@ -39,7 +39,7 @@ FLOORS = [
     {"report"},
     {"config"},
     {"pipeline"},
-    {"front"},
+    {"front", "replay"},
     {"cli"},
     {"__main__"},
 ]

@@ -15,6 +15,7 @@ _WHAT = {
     "plan": "rockbreaker's plan",
     "workspace": "rockbreaker's workspace",
     "suite": "suite of scenes",
+    "replay": "replay",
 }
 
 
@@ -97,6 +98,8 @@ def _drive_lines(counts: Mapping[str, Any]) -> list[str]:
     if "distance_m" not in counts:
         return []
     drive = f"drive        {counts['distance_m']:.0f} m in {counts['duration_s']:.0f} s"
+    if "scans" not in counts:
+        return [drive]
     if counts.get("poses"):
         return [drive, f"scans        {counts['scans']}, poses given: {counts['poses']}"]
     from lhdmap.report.text import trust_line
@@ -115,7 +118,7 @@ def _result_lines(folder: Path) -> list[str]:
     import json
 
     lines = []
-    for name in ("pile.json", "plan.json"):
+    for name, line_of in _RESULTS.items():
         if not (folder / name).is_file():
             continue
         try:
@@ -123,7 +126,7 @@ def _result_lines(folder: Path) -> list[str]:
         except (OSError, ValueError):
             lines.append(f"{name:<12} not readable")
             continue
-        lines.append(_pile_line(found) if name == "pile.json" else _plan_line(found))
+        lines.append(line_of(found))
     return lines
 
 
@@ -138,6 +141,15 @@ def _plan_line(found: Mapping[str, Any]) -> str:
     if not found.get("feasible"):
         return f"plan         not feasible: {(found.get('reason') or {}).get('text', 'no reason given')}"
     return f"plan         {str(found['path']).upper()}, {found['timing']}: {found['duration_s']:.2f} s"
+
+
+def _verdict_line(found: Mapping[str, Any]) -> str:
+    contacts, near = len(found.get("contacts", [])), found.get("min_clearance_m")
+    walls = f"{contacts} contacts" + ("" if near is None else f", clearance {near:.2f} m")
+    return f"verdict      {'ok' if found.get('ok') else 'not ok'}: {found.get('reason')}; {walls}"
+
+
+_RESULTS = {"pile.json": _pile_line, "plan.json": _plan_line, "verdict.json": _verdict_line}
 
 
 def _size(size: int) -> str:

@@ -30,6 +30,7 @@ COMMANDS = {
     "pile": "find and measure the ore pile at the end of a drive",
     "rockbreaker": "plan trajectories of a rockbreaker over its grizzly",
     "simulate": "write a simulated log and its truth",
+    "replay": "drive a simulated machine in closed loop: log, journal, verdict, report",
     "eval": "compare results with ground truth",
     "config": "print the settings with unit and source",
     "completion": "print the tab completion for bash, zsh or fish",

@@ -90,6 +90,11 @@ class ScanRecords:
         return int(np.count_nonzero(lost[1:] & ~lost[:-1]))
 
     @property
+    def lost_now(self) -> bool:
+        """Whether the last processed scan did not match."""
+        return bool(self._lost) and bool(self._lost[-1])
+
+    @property
     def all_lost(self) -> bool:
         """Whether none of the scans after the first could be placed."""
         return len(self._lost) > 1 and all(self._lost[1:])

@@ -31,6 +31,7 @@ from lhdmap.trajectory import Trajectory
 APPLICATION = "lhdmap"
 TIMELINE = "time"
 SCAN = 0xF2F2F2FF
+LOOPBACK, _LIVE_MEMORY = "127.0.0.1", "64MB"
 Stamps = npt.NDArray[np.int64]
 _VIRIDIS = np.array([[59, 82, 139], [33, 145, 140], [94, 201, 98], [253, 231, 37]], dtype=float)
 
@@ -80,8 +81,19 @@ class Thinning:
 class RecordingWriter:
     """Writes one `.rrd` file. Scans and texts may come while the run goes on, the rest comes when it is known."""
 
-    def __init__(self, path: Path, title: str, start_ns: int, settings: RecordingSettings | None = None) -> None:
-        """Open the file in the background; `start_ns` is the stamp that counts as time zero."""
+    def __init__(
+        self,
+        path: Path,
+        title: str,
+        start_ns: int,
+        settings: RecordingSettings | None = None,
+        *,
+        live_port: int | None = None,
+    ) -> None:
+        """Open the file in the background; `start_ns` is the stamp that counts as time zero.
+
+        `live_port`: viewers on this machine may follow there while it is written.
+        """
         self._settings = settings or RecordingSettings()
         self._path, self._failed = path, False
         self._start_ns = self._end_ns = start_ns
@@ -93,7 +105,7 @@ class RecordingWriter:
         self.curves = RUN_CURVES
         self._scans: deque[tuple[int, FloatArray, str]] = deque()
         loader = ThreadPoolExecutor(max_workers=1, thread_name_prefix="recording")
-        self._opened = loader.submit(_open, path, title, start_ns)  # loading Rerun takes most of a second
+        self._opened = loader.submit(_open, path, title, start_ns, live_port)  # loading Rerun takes most of a second
         loader.shutdown(wait=False)
 
     def __enter__(self) -> Self:
@@ -176,12 +188,21 @@ class RecordingWriter:
 
     def add_articulation(self, stamps_ns: Stamps, angles_rad: FloatArray, machine: Machine) -> None:
         """Record the rear body, which follows the joint angles (M,), positive when the machine bends to the left."""
+        self.add_joint(stamps_ns, angles_rad, machine)
+        self._boxes("map/base_link/rear_link/rear_body", machine.boxes("rear_link"))
+
+    def add_bodies(self, machine: Machine) -> None:
+        """Record the boxes of both bodies; their poses come with `add_moving` and `add_joint`."""
+        self._boxes("map/base_link/front_body", machine.boxes("base_link"))
+        self._boxes("map/base_link/rear_link/rear_body", machine.boxes("rear_link"))
+
+    def add_joint(self, stamps_ns: Stamps, angles_rad: FloatArray, machine: Machine) -> None:
+        """Record how the rear body stands to the front one, by joint angles (M,)."""
         front_m, rear_m = machine.dimensions.joint_to_front_axle_m, machine.dimensions.joint_to_rear_axle_m
         x, y = -front_m - rear_m * np.cos(angles_rad), rear_m * np.sin(angles_rad)
         zero = np.zeros(len(x))
         quaternions = np.column_stack([zero, zero, np.sin(-angles_rad / 2), np.cos(-angles_rad / 2)])
         self.add_moving("map/base_link/rear_link", stamps_ns, np.column_stack([x, y, zero]), quaternions)
-        self._boxes("map/base_link/rear_link/rear_body", machine.boxes("rear_link"))
 
     def add_cloud(self, cloud: Cloud) -> None:
         """Record the cloud in parts, each from the time on at which its points were first measured."""
@@ -275,13 +296,17 @@ class RecordingWriter:
         self._bounds = np.array([seen.min(axis=0), seen.max(axis=0)], dtype=float)
 
 
-def _open(path: Path, title: str, start_ns: int) -> tuple[Any, Any]:
+def _open(path: Path, title: str, start_ns: int, live_port: int | None) -> tuple[Any, Any]:
     """Return the module of Rerun, and a stream into the file; what goes wrong is told by `close`, in our words."""
     rr = load_quietly()
     title = shown(title)
     stream = rr.RecordingStream(APPLICATION, recording_id=f"{title} {start_ns}")
     with in_utf8(path) as written:  # it is open from here on
-        stream.save(written)
+        if live_port is None:
+            stream.save(written)
+        else:  # never a connection to a viewer: a slow one would hold up the run
+            server = rr.GrpcServerSink(bind_ip=LOOPBACK, port=live_port, server_memory_limit=_LIVE_MEMORY)
+            stream.set_sinks(rr.FileSink(written), server)
     stream.send_recording_name(title)
     stream.log("map", rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
     return rr, stream

@@ -21,6 +21,12 @@ RUN_CURVES: Curves = (
     ("Standard deviation of a scan match", ("scan_match/deviation/**",)),
     ("Residual, direction not observed", ("scan_match/residual", "scan_match/weak")),
 )
+REPLAY_CURVES: Curves = (
+    ("Speed, km/h", ("motion/speed/**",)),
+    ("Articulation, deg", ("motion/articulation",)),
+    ("Clearance, m", ("motion/clearance",)),
+    ("States", ("state/**",)),
+)
 LOG_CURVES: Curves = (("Speed, m/s", ("motion/speed/**",)), ("Angles, deg", ("angles/**",)))
 
 

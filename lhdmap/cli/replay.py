@@ -1,0 +1,131 @@
+"""`lhdmap replay SCENARIO`: a simulated machine in closed loop; log, journal, verdict, report and recording."""
+
+from __future__ import annotations
+
+import argparse
+import contextlib
+import os
+import socket
+import subprocess
+import sys
+from collections.abc import Iterable, Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+from lhdmap.cli.console import Console
+from lhdmap.cli.options import add_output, suggest
+from lhdmap.cli.viewer import started, viewer
+from lhdmap.errors import EvaluationShortfall
+from lhdmap.resources import resource
+
+_HOST = "127.0.0.1"
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the options of `lhdmap replay`."""
+    names = sorted(path.stem for path in resource("pipelines/scenarios").glob("*.toml"))
+    suggest(
+        parser.add_argument(
+            "scenario", metavar="SCENARIO", help=f"scenario file, or one that ships: {', '.join(names)}"
+        ),
+        *names,
+        "files",
+    )
+    add_output(parser, "folder to make (default: SCENARIO_run here)", "RUN")
+    parser.add_argument("--seed", type=int, metavar="N", help="over the scenario's; same seed, same journal to the bit")
+    parser.add_argument("--view", action="store_true", help="follow the run in Rerun: a window, or a page without one")
+    parser.add_argument("--no-truth", action="store_true", help="no /ground_truth/odometry in run.mcap")
+    parser.add_argument("--no-recording", action="store_true", help="no recording.rrd: faster, less disk")
+
+
+def run(arguments: argparse.Namespace, console: Console) -> int:
+    """Run the scenario; exit code 1 where the verdict is not ok."""
+    from lhdmap.errors import UsageError
+    from lhdmap.outputs import free_folder
+    from lhdmap.replay.run import ReplayRequest, replay
+    from lhdmap.replay.scenario import find_scenario, load_scenario
+
+    if arguments.view and arguments.no_recording:
+        raise UsageError("--view shows the recording while it is written; --no-recording was found beside it")
+    if arguments.seed is not None and arguments.seed < 0:
+        raise UsageError(f"--seed {arguments.seed}: 0 or more was wanted")
+    path = find_scenario(arguments.scenario)
+    scenario = load_scenario(path, **({} if arguments.seed is None else {"seed": arguments.seed}))
+    target = arguments.output or Path(f"{path.stem}_run")
+    free_folder(target, force=arguments.force, inputs=[path])
+    port = _free_port() if arguments.view else None
+    request = ReplayRequest(
+        scenario,
+        target,
+        name=path.stem,
+        truth=not arguments.no_truth,
+        recording=not arguments.no_recording,
+        live_port=port,
+        force=arguments.force,
+        sources=[path],
+        progress=_progress_of(console),
+    )
+    with _viewer(port, console):
+        result = replay(request)
+    values = {"run": str(result.folder), **result.verdict}
+    failure = None if result.verdict["ok"] else EvaluationShortfall(f"not ok: {result.verdict['reason']}")
+    console.result(values, verdict_text(values), failure=failure)
+    return 0 if failure is None else failure.exit_code
+
+
+def verdict_text(values: Mapping[str, Any]) -> str:
+    """Return the verdict in words."""
+    from lhdmap.report.text import duration
+
+    near = values["min_clearance_m"]
+    speed = f"mean {values['mean_speed_kmh']:.1f} km/h, {values['stops']} stops"
+    lines = [
+        f"verdict      {'ok' if values['ok'] else 'not ok'}: {values['reason']}",
+        f"run          {values['run']}",
+        f"report       {Path(values['run']) / 'report.html'}",
+        f"drive        {values['distance_m']:.1f} m in {duration(values['duration_s'])}, {speed}",
+        f"walls        {len(values['contacts'])} contacts"
+        + ("" if near is None else f", never nearer than {near:.2f} m"),
+        *([f"faults       {len(values['faults'])} injected"] if values["faults"] else []),
+        f"journal      {values['journal_sha256'][:16]}…, {values['realtime_factor']:.1f} x real time",
+    ]
+    return "\n".join(lines)
+
+
+def _progress_of(console: Console) -> Any:
+    def wrap(moments: Iterable[int], duration_s: float) -> Iterable[int]:
+        """Return the simulated times, shown as they go by."""
+        from lhdmap.simulation.history import START_NS
+
+        def position(now_ns: int) -> float:
+            return (now_ns - START_NS) * 1e-9
+
+        return console.progress(moments, total=duration_s, label="replay", position=position)
+
+    return wrap
+
+
+@contextlib.contextmanager
+def _viewer(port: int | None, console: Console) -> Iterator[None]:
+    """Have a viewer follow the run: a window where there is a display, which stays open afterwards; else a page."""
+    if port is None:
+        yield
+        return
+    data = f"rerun+http://{_HOST}:{port}/proxy"
+    if os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY") or not sys.platform.startswith("linux"):
+        with started(viewer(data), stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) as process:
+            yield
+            console.note("the run has ended; close the window to go on")
+            process.wait()
+        return
+    page = _free_port()
+    options = ("--serve-web", "--bind", _HOST, "--web-viewer-port", str(page), "--port", str(_free_port()))
+    with started(viewer(*options, data), stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL):
+        console.note(f"follow the run at http://{_HOST}:{page}/?url=rerun%2Bhttp://{_HOST}:{port}/proxy")
+        yield
+
+
+def _free_port() -> int:
+    """Return a port of this machine that nobody listens on."""
+    with socket.create_server((_HOST, 0)) as server:
+        return int(server.getsockname()[1])

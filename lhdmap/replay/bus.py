@@ -1,0 +1,96 @@
+"""The bus: who gets which topic. Truth goes to the simulator, the operator and the witnesses alone, by their names."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Iterator, Sequence
+
+from lhdmap.replay.link import Link
+from lhdmap.replay.process import EVERYTHING, TRUTH, Process, Received
+
+SEES_TRUTH = ("plant", "operator", "monitor", "recorder", "film")
+"""The simulator, the scripted operator, and those who only watch: nobody else may subscribe to the truth."""
+
+
+class Inbox:
+    """What waits for a process: bounded, the oldest are lost first and counted."""
+
+    def __init__(self, process: Process) -> None:
+        self.process, self.lost = process, 0
+        self._waiting: deque[Received] = deque(maxlen=process.inbox_size)
+        self._full = process.inbox_size
+
+    def __len__(self) -> int:
+        return len(self._waiting)
+
+    def put(self, message: Received) -> None:
+        """Take a message."""
+        if len(self._waiting) == self._full:
+            self.lost += 1
+        self._waiting.append(message)
+
+    def take(self) -> list[Received]:
+        """Return all that waits, in the order in which it came."""
+        if not self._waiting:
+            return []
+        found = list(self._waiting)
+        self._waiting.clear()
+        return found
+
+    def told_lost(self) -> int:
+        """Return how many were lost since the last call."""
+        lost, self.lost = self.lost, 0
+        return lost
+
+
+class Bus:
+    """Routes by topic; which inboxes get a topic is found once."""
+
+    def __init__(self, processes: Sequence[Process], link: Link | None, *, withhold_truth: bool = False) -> None:
+        """`withhold_truth`: nobody gets it, to prove that nobody who should not have it needs it.
+
+        Raises:
+            ValueError: a process subscribes to the truth that may not see it.
+        """
+        self._link, self._withhold = link, withhold_truth
+        self.inboxes = {process.name: Inbox(process) for process in processes}
+        self._routes: dict[str, list[Inbox]] = {}
+        for process in processes:
+            secret = [topic for topic in process.reads if topic.startswith(TRUTH)]
+            if secret and process.name not in SEES_TRUTH:
+                raise ValueError(f"process '{process.name}' may not see {secret[0]}: only {', '.join(SEES_TRUTH)}")
+
+    def deliveries(self, sender: Process, topic: str, sent_ns: int) -> Iterator[tuple[int, list[Inbox]]]:
+        """Yield when a message arrives, and at whom."""
+        route = self._routes.get(topic)
+        if route is None:
+            route = self._routes[topic] = self._route(topic)
+        if not route:
+            return
+        link = self._link
+        if link is None or topic.startswith(TRUTH):
+            yield sent_ns, route
+            return
+        here = sender.site
+        at_once: list[Inbox] = []
+        for inbox in route:
+            crosses = bool(here and inbox.process.site and here != inbox.process.site)
+            if not crosses and (not link.at_fault or not inbox.process.site):
+                at_once.append(inbox)
+                continue
+            at_ns = link.arrival_ns(topic, inbox.process.name, sent_ns, crosses=crosses)
+            if at_ns is not None:
+                yield at_ns, [inbox]
+        if at_once:
+            yield sent_ns, at_once
+
+    def _route(self, topic: str) -> list[Inbox]:
+        if topic.startswith(TRUTH) and self._withhold:
+            return []
+        return [inbox for inbox in self.inboxes.values() if _gets(inbox.process, topic)]
+
+
+def _gets(process: Process, topic: str) -> bool:
+    if topic.startswith(TRUTH) and process.name not in SEES_TRUTH:
+        return False
+    return topic in process.reads or EVERYTHING in process.reads

@@ -1,0 +1,143 @@
+"""The parts of a replay in a mine: world of its plan, stepped machine, sensors, an operator who drives a route."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+import numpy as np
+
+from lhdmap.machine import Machine, load_machine
+from lhdmap.messages import FloatArray
+from lhdmap.mine.network import Network, make_network
+from lhdmap.mine.plan import find_plan, load_plan
+from lhdmap.mine.routes import Planner, Start, parse_route, start_of
+from lhdmap.mine.stands import place_pose
+from lhdmap.mine.topology import Directory
+from lhdmap.mine.ways import Leg, legs_of
+from lhdmap.replay.faults import Position
+from lhdmap.replay.parts import Parts, Touch
+from lhdmap.replay.scenario import TELEOPERATOR, Scenario
+from lhdmap.simulation.history import START_NS, Column
+from lhdmap.simulation.mine_world.bumper import Bumper
+from lhdmap.simulation.mine_world.world import MineWorld
+from lhdmap.simulation.operator import Operator, OperatorSettings, wander_of
+from lhdmap.simulation.sensing.sections import SensorSettings
+from lhdmap.simulation.sensing.sensor import Sensor
+from lhdmap.simulation.sensing.suite import sensors_of
+from lhdmap.simulation.vehicle.state import VehicleState
+from lhdmap.simulation.vehicle.vehicle import Vehicle
+
+_DRAWN_M = 1.0
+_KG = 1000.0  # of a tonne
+_SLOWER = 1.4  # a drive with its bends and rests takes so much longer than its way at full speed
+_LEAST_CLEAR_M = 1.0  # what is farther is not measured
+
+
+class BodyBumper:
+    """What the boxes of a machine touch in a mine."""
+
+    def __init__(self, machine: Machine, world: MineWorld) -> None:
+        self._bumper = Bumper(machine, world)
+
+    def touching(self, state: VehicleState) -> Sequence[Touch]:
+        """Return the bodies that are in a wall."""
+        found = self._bumper.touching(state)
+        return [Touch(one.body, _point(one.point_m), one.depth_m) for one in found]
+
+    def clearance_m(self, state: VehicleState) -> float:
+        """Return the least distance of any body from a wall, at most 1 m."""
+        return self._bumper.clearance_m(state, _LEAST_CLEAR_M)
+
+
+def mine_parts(scenario: Scenario) -> Parts:
+    """Return the parts of a drive by hand.
+
+    Raises:
+        ConfigError: there is no such mine.
+        UsageError: the route or the start is not in it.
+    """
+    machine = load_machine(Path(scenario.machine) if scenario.machine else None)
+    network = make_network(load_plan(find_plan(scenario.mine)))
+    start = start_of(network, machine, scenario.start or None)
+    settings = OperatorSettings(speed_kmh=scenario.speed_kmh, wander_m=scenario.wander_m)
+    legs = _legs(scenario, network, machine, start, settings)
+    world = MineWorld(network, machine)
+    vehicle = Vehicle(machine, world, seed=scenario.seed)
+    way_m = sum(leg.length_m for leg in legs)
+    return Parts(
+        machine=machine,
+        world=world,
+        vehicle=vehicle,
+        start=_state(vehicle, network.tubes[start.tube].pose(start.at_m, start.facing), scenario),
+        sensors=_sensors(scenario, machine, network),
+        operator=Operator(legs, machine, settings, seed=scenario.seed),
+        bumper=BodyBumper(machine, world),
+        changing=world,
+        places=_places(network, machine),
+        lines_m=_walls(network),
+        expected_s=_SLOWER * way_m / (scenario.speed_kmh / 3.6) + 10.0,
+    )
+
+
+def _legs(
+    scenario: Scenario, network: Network, machine: Machine, start: Start, settings: OperatorSettings
+) -> list[Leg]:
+    planner = Planner(network, machine)
+    stops = parse_route(scenario.route, network.plan) if scenario.route else []
+    runs = planner.route(start, stops) if stops else planner.teaching(start)
+    way_m = sum(abs(run.to_m - run.from_m) for run in runs)
+    pose = network.tubes[start.tube].pose(start.at_m, start.facing)
+    return legs_of(network, runs, machine, start=pose, wander=wander_of(settings, way_m, scenario.seed))
+
+
+def _state(vehicle: Vehicle, pose: FloatArray, scenario: Scenario) -> VehicleState:
+    x, y, z, yaw = pose.tolist()
+    return vehicle.at_rest(x, y, yaw, near_z_m=z, time_ns=START_NS, load_kg=_KG * scenario.load)
+
+
+def _sensors(scenario: Scenario, machine: Machine, network: Network) -> list[Sensor]:
+    mode = _mode_of("teleoperated" if scenario.driver == TELEOPERATOR else "manual")
+    return sensors_of(machine, SensorSettings(), seed=scenario.seed, mode=mode, node=_node_of(network))
+
+
+def _mode_of(mode: str) -> Callable[[int, FloatArray], str]:
+    def told(stamp_ns: int, state: FloatArray) -> str:  # noqa: ARG001  # a `Told`
+        return mode
+
+    return told
+
+
+def _node_of(network: Network) -> Callable[[int, FloatArray], str]:
+    """Return what tells the name of the node that a machine is in: the teaching drive's `/operation/node`."""
+    directory = Directory(network)
+
+    def told(stamp_ns: int, state: FloatArray) -> str:  # noqa: ARG001  # a `Told`
+        return directory.at(state[[Column.X, Column.Y, Column.Z]]).node
+
+    return told
+
+
+def _places(network: Network, machine: Machine) -> dict[str, Position]:
+    """Return where a machine stands at each place, and the nodes by their names."""
+    places = {place.name: _point(place_pose(network, place, machine)) for place in network.plan.places if place.name}
+    nodes = {node.name: _point(node.position_m) for node in network.nodes if node.name}
+    return {**nodes, **places}
+
+
+def _walls(network: Network) -> list[FloatArray]:
+    """Return the walls of all drifts as the plan has them: lines (N, 3), two of each."""
+    lines = []
+    for tube in network.tubes:
+        if tube.kind == "turn":
+            continue
+        s = np.append(np.arange(0.0, tube.length_m, _DRAWN_M), tube.length_m)
+        poses = tube.line.at(s)
+        half = np.array([tube.half_width_m(float(one)) for one in s])
+        across = np.column_stack([-np.sin(poses[:, 3]), np.cos(poses[:, 3]), np.zeros(len(s))])
+        lines += [poses[:, :3] + side * half[:, None] * across for side in (1.0, -1.0)]
+    return lines
+
+
+def _point(values: FloatArray) -> Position:
+    return float(values[0]), float(values[1]), float(values[2])

@@ -1,0 +1,138 @@
+"""What a replay is put together from: world, machine, sensors, operator. `assemble` makes them; tests make simpler ones."""
+
+# ruff: noqa: D102  # the names of a state say what they are
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any, NamedTuple, Protocol
+
+from lhdmap.config import Settings
+from lhdmap.machine import Machine
+from lhdmap.messages import Command, FloatArray
+from lhdmap.replay.faults import Position
+from lhdmap.simulation.drift import Mesh
+from lhdmap.simulation.sensing.sensor import Sensor
+from lhdmap.simulation.surroundings import View
+
+
+class State(Protocol):
+    """The true state of a machine at a moment (`VehicleState`), SI units."""
+
+    @property
+    def time_ns(self) -> int: ...
+    @property
+    def x_m(self) -> float: ...
+    @property
+    def y_m(self) -> float: ...
+    @property
+    def z_m(self) -> float: ...
+    @property
+    def roll_rad(self) -> float: ...
+    @property
+    def pitch_rad(self) -> float: ...
+    @property
+    def yaw_rad(self) -> float: ...
+    @property
+    def articulation_rad(self) -> float: ...
+    @property
+    def speed_mps(self) -> float: ...
+
+    def row(self) -> FloatArray:
+        """Return it as a row of a history, shape (17,)."""
+        ...
+
+
+class Vehicle(Protocol):
+    """A machine that is stepped."""
+
+    def step(self, state: Any, command: Command, dt_s: float) -> Any:
+        """Return the state a moment later."""
+        ...
+
+
+class Touch(NamedTuple):
+    """A body that touches something: its name, where (x, y, z) in `map`, and how deep it is in."""
+
+    body: str
+    point_m: Position
+    depth_m: float
+
+
+class Nearness(NamedTuple):
+    """What the machine touches now, and how near its bodies come to walls (None: not looked at)."""
+
+    touches: tuple[Touch, ...]
+    clearance_m: float | None = None
+
+
+class Bumper(Protocol):
+    """Tells what a machine touches."""
+
+    def touching(self, state: Any) -> Sequence[Touch]:
+        """Return the bodies that are in a wall."""
+        ...
+
+    def clearance_m(self, state: Any) -> float:
+        """Return the least distance of any body from a wall, metres."""
+        ...
+
+
+class Operator(Protocol):
+    """A scripted driver who sees the truth."""
+
+    @property
+    def done(self) -> bool:
+        """Whether the route has been driven."""
+        ...
+
+    def command(self, state: Any, now_ns: int) -> Command | None:
+        """Return what is done at this moment; None: nothing new."""
+        ...
+
+
+class Changing(Protocol):
+    """A world in which things come and go."""
+
+    def appear(self, name: str, mesh: Mesh) -> None:
+        """Put something into it."""
+        ...
+
+    def vanish(self, name: str) -> None:
+        """Take it away again."""
+        ...
+
+
+@dataclass(frozen=True, slots=True)
+class Parts:
+    """All that is simulated, and what is known of it beforehand.
+
+    Attributes:
+        machine: what the log says of it.
+        world: what sensors see.
+        vehicle: steps the state.
+        start: its state at the start of the clock.
+        sensors: without faults; where readings are due at the same time, those of the first come first.
+        operator: who drives by hand; None: nobody does.
+        bumper: what is touched.
+        changing: the world again, where obstacles and persons can appear in it.
+        places: points (x, y, z) by name, for faults that begin at one.
+        goal_m: where the drive must end.
+        lines_m: walls or centre lines (N, 3) to draw.
+        expected_s: about how long it will take.
+        settings: of the perception.
+    """
+
+    machine: Machine
+    world: View
+    vehicle: Vehicle
+    start: State
+    sensors: Sequence[Sensor]
+    operator: Operator | None
+    bumper: Bumper | None = None
+    changing: Changing | None = None
+    places: Mapping[str, Position] = field(default_factory=dict)
+    goal_m: Position | None = None
+    lines_m: Sequence[FloatArray] = ()
+    expected_s: float | None = None
+    settings: Settings = field(default_factory=Settings)

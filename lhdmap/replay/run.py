@@ -1,0 +1,174 @@
+"""`replay`: a scenario in, a run folder out."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import ExitStack
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+from lhdmap import __version__
+from lhdmap.logs.writer import LogWriter
+from lhdmap.pipeline.interruption import Interruption
+from lhdmap.replay.assemble import Run, Watchers, assemble, parts_of
+from lhdmap.replay.journal import Journal
+from lhdmap.replay.parts import Parts
+from lhdmap.replay.processes.film import Film
+from lhdmap.replay.processes.recorder import Recorder
+from lhdmap.replay.scenario import Scenario, scenario_toml
+from lhdmap.replay.series import Timeline
+from lhdmap.report.replay_data import ReplayData
+from lhdmap.report.replay_page import write_replay_report
+from lhdmap.report.replay_recording import ReplayRecording
+from lhdmap.runfolder import RunFolderWriter, RunInfo
+from lhdmap.simulation.history import SECOND_NS, START_NS
+
+KIND = "replay"
+LOG, JOURNAL, VERDICT, REPORT, RECORDING = "run.mcap", "journal.jsonl", "verdict.json", "report.html", "recording.rrd"
+_GRACE_S = 60  # the monitor ends a run at its limit; this is for a monitor that sees nothing
+Progress = Callable[[Iterable[int], float], Iterable[int]]
+
+
+@dataclass(frozen=True, slots=True)
+class ReplayRequest:
+    """What is to be replayed, and what is to be written.
+
+    `truth`: the true pose in the log; `recording`: a Rerun recording; `live_port`: where it can be followed meanwhile;
+    `sources`: files that the run is made from; `progress` shows the simulated times that it is given with their end (s).
+    """
+
+    scenario: Scenario
+    target: Path
+    name: str = KIND
+    truth: bool = True
+    recording: bool = True
+    live_port: int | None = None
+    force: bool = False
+    sources: Sequence[Path] = ()
+    progress: Progress | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class ReplayResult:
+    """The folder and the verdict."""
+
+    folder: Path
+    verdict: dict[str, Any]
+
+
+def replay(request: ReplayRequest, parts: Parts | None = None) -> ReplayResult:
+    """Run a scenario and write its folder; `parts` are used instead of those that the scenario names.
+
+    Raises:
+        UsageError: the folder is there already, or the scenario names what is not there.
+        ConfigError: a fault of the scenario has no target here.
+        KeyboardInterrupt: Ctrl-C was pressed; what was finished is kept in the partial folder.
+    """
+    interruption = Interruption()
+    with RunFolderWriter(KIND, request.target, force=request.force, inputs=request.sources) as folder:
+        made = parts_of(request.scenario) if parts is None else parts
+        with interruption.comes_first():
+            verdict = _Replay(request, made, folder).run(interruption)
+        path = folder.complete(_info(request, verdict))
+    return ReplayResult(path, verdict)
+
+
+class _Replay:
+    """One run with all that it writes."""
+
+    def __init__(self, request: ReplayRequest, parts: Parts, folder: RunFolderWriter) -> None:
+        self._request, self._parts, self._folder = request, parts, folder
+        self._timeline = Timeline()
+        self._recording: ReplayRecording | None = None
+
+    def run(self, interruption: Interruption) -> dict[str, Any]:
+        """Run, write all files, return the verdict."""
+        journal = Journal(self._folder.path / JOURNAL)
+        journal.listeners.append(self._timeline)
+        with ExitStack() as open_files:
+            open_files.callback(journal.close)
+            log = open_files.enter_context(LogWriter(self._folder.path / LOG))
+            film = self._film(journal)
+            run = assemble(
+                self._request.scenario, self._parts, journal, Watchers(film, Recorder(log, truth=self._request.truth))
+            )
+            started = time.monotonic()
+            with interruption:
+                self._go(run, journal, interruption)
+            simulated_s = (run.engine.now_ns - START_NS) / SECOND_NS
+            factor = simulated_s / max(time.monotonic() - started, 1e-6)
+        faults = [fault.told() for fault in run.faults.all]
+        verdict = run.monitor.tally.verdict(run.engine.now_ns, faults, factor, journal.sha256)
+        self._write(verdict, film)
+        return verdict
+
+    def _film(self, journal: Journal) -> Film:
+        request, machine = self._request, self._parts.machine
+        if request.recording:
+            path = self._folder.path / RECORDING
+            self._recording = ReplayRecording(path, request.name, START_NS, machine, request.live_port)
+        film = Film(machine, self._recording, live=request.live_port is not None)
+        journal.listeners.append(film.take)
+        return film
+
+    def _go(self, run: Run, journal: Journal, interruption: Interruption) -> None:
+        """Run until the monitor has seen enough, or somebody wants it to end."""
+        scenario = self._request.scenario
+        settings = {"kind": scenario.kind, "mine": Path(scenario.mine).stem, "seed": scenario.seed}
+        journal.write("engine", "started", values=settings)
+        for _ in self._shown(run.engine.run(START_NS + round((scenario.limits.time_s + _GRACE_S) * SECOND_NS))):
+            if run.monitor.ended or interruption.asked:
+                break
+        if interruption.asked:
+            run.monitor.tally.interrupt()
+        run.engine.finish()
+        tally = run.monitor.tally
+        missed = {name: count for name, count in run.engine.missed().items() if count}
+        values = {"ok": tally.ok, "messages": run.engine.messages, "lost": run.link.lost, "missed": missed}
+        journal.write("engine", "ended", cause=tally.reason, values=values)
+
+    def _shown(self, moments: Iterator[int]) -> Iterable[int]:
+        request = self._request
+        if request.progress is None:
+            return moments
+        return request.progress(moments, self._parts.expected_s or request.scenario.limits.time_s)
+
+    def _write(self, verdict: dict[str, Any], film: Film) -> None:
+        """Write what is known at the end."""
+        folder = self._folder
+        for name in (JOURNAL, LOG):
+            folder.finished(folder.path / name)
+        folder.write_json(VERDICT, verdict)
+        data = self._data(verdict, film)
+        if self._recording is not None:
+            self._recording.close(data)
+            folder.finished(folder.path / RECORDING)
+        write_replay_report(folder.path / REPORT, data)
+        folder.finished(folder.path / REPORT)
+
+    def _data(self, verdict: dict[str, Any], film: Film) -> ReplayData:
+        scenario = self._request.scenario
+        made = {
+            "software": f"lhdmap {__version__}",
+            "mine": scenario.mine,
+            "machine": self._parts.machine.name,
+            "seed": str(scenario.seed),
+            "speed of the run": f"{verdict['realtime_factor']:.1f} × real time",
+        }
+        left_out = self._timeline.left_out
+        warnings = [f"{left_out} changes of state are in journal.jsonl alone: there are too many to draw"]
+        return ReplayData(
+            f"Replay {self._request.name}", verdict, film.series.rows(), START_NS, self._timeline.changes,
+            self._parts.lines_m, film.believed_m(), self._parts.goal_m, made, scenario_toml(scenario),
+            warnings if left_out else (),
+        )  # fmt: skip
+
+
+def _info(request: ReplayRequest, verdict: dict[str, Any]) -> RunInfo:
+    counts = {key: value for key, value in verdict.items() if key not in ("contacts", "faults")}
+    counts |= {"contacts": len(verdict["contacts"]), "faults": len(verdict["faults"])}
+    asked = {"name": request.name, "truth": request.truth, "recording": request.recording}
+    frames = {"map": "the mine's own grid"}
+    return RunInfo(request.sources, {"scenario": asdict(request.scenario), "request": asked}, counts, (), frames)

@@ -1,0 +1,146 @@
+"""What a replay is: a typed file (`load_tree`). Those that ship are in `pipelines/scenarios/` and are found by their name."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from lhdmap.errors import ConfigError, UsageError
+from lhdmap.replay.link import LINK, LinkSettings
+from lhdmap.resources import resource
+from lhdmap.roles import ROLES
+from lhdmap.settings import REQUIRED, nearest, setting
+from lhdmap.settings_tree import load_tree, part, tree_toml
+from lhdmap.simulation.sensing.faults import FaultSettings
+
+KINDS = ("tram", "loading", "mission", "haulage", "grizzly")
+OPERATOR, TELEOPERATOR = "operator", "teleoperator"
+FOLDER = "pipelines/scenarios"
+_NO_MEASUREMENTS = ("/tf_static", "/ground_truth/odometry")
+
+
+@dataclass(frozen=True, slots=True)
+class Errand:
+    """A part of a mission: so many buckets from a draw point to a dump."""
+
+    source: str = setting(REQUIRED, key="from", doc="Draw point.")
+    to: str = setting(REQUIRED, doc="Dump.")
+    buckets: int = setting(1, minimum=1, maximum=10_000, doc="How many.")
+
+
+@dataclass(frozen=True, slots=True)
+class Limits:
+    """When a replay ends, and what it must not do."""
+
+    time_s: float = setting(3600.0, unit="s", minimum=1.0, doc="Simulated time that it may take.")
+    no_progress_s: float = setting(
+        120.0, unit="s", minimum=1.0, doc="How long the machine may stay within no_progress_m of a point."
+    )
+    no_progress_m: float = setting(0.5, unit="m", minimum=0.01, doc="What counts as not moving on.")
+    arrival_m: float = setting(1.0, unit="m", minimum=0.01, doc="How near the goal the machine must end.")
+    contacts: int = setting(0, minimum=0, doc="How many contacts with walls are borne; one more ends the run.")
+
+
+@dataclass(frozen=True, slots=True)
+class Scenario:
+    """A replay: where, what machine, what it is to do, and what goes wrong."""
+
+    kind: str = setting("tram", choices=KINDS, doc="What the machine does.")
+    mine: str = setting(REQUIRED, doc="Mine plan: a file, or the name of one that ships.")
+    seed: int = setting(0, minimum=0, doc="Seed of all chance; same seed, same journal to the bit.")
+    machine: str = setting("", doc="Machine file; empty for the default.")
+    map: str = setting("", doc="Map folder; built from a teaching drive first where it is absent.")
+    start: str = setting("", doc="Place or drift where it stands at first; empty: where the plan parks.")
+    goal: str = setting("", doc="Place to drive to.")
+    load: float = setting(0.0, unit="t", minimum=0.0, maximum=100.0, doc="What is in the bucket at the start.")
+    driver: str = setting(
+        OPERATOR,
+        choices=(OPERATOR, TELEOPERATOR),
+        doc="Who drives: a scripted operator who sees the truth, in the cabin, or at the station behind the link.",
+    )
+    route: str = setting("", doc="Drifts and places in order, - for reverse gear: T1,T2,-T3,DP1; empty: all drifts.")
+    speed_kmh: float = setting(10.0, unit="km/h", minimum=0.5, maximum=40.0, doc="The operator's speed on straights.")
+    wander_m: float = setting(0.0, unit="m", minimum=0.0, maximum=1.0, doc="The operator's lateral wandering, rms.")
+    perception: bool = setting(True, doc="Whether odometry runs on what the sensors say.")
+    mission: tuple[Errand, ...] = part(tuple)
+    limits: Limits = part(Limits)
+    link: LinkSettings = part(LinkSettings)
+    faults: tuple[FaultSettings, ...] = part(tuple, key="fault")
+
+    def __post_init__(self) -> None:
+        """Check what a key alone cannot; raises ConfigError."""
+        if self.goal and self.mission:
+            raise ConfigError(f"goal = '{self.goal}' and mission: one of them was wanted")
+        if self.goal and self.route:
+            raise ConfigError(f"goal = '{self.goal}' and route = '{self.route}': one of them was wanted")
+        for number, fault in enumerate(self.faults, start=1):
+            try:
+                _check_target(fault)
+            except ConfigError as error:
+                raise ConfigError(f"[[fault]] {number}: {error}") from error
+
+
+def _check_target(fault: FaultSettings) -> None:
+    """Refuse a fault without something that could have it; names of processes are known later."""
+    topics = [role.topic for role in ROLES.values()]
+    if fault.of_sensor:
+        topics = [topic for topic in topics if topic not in _NO_MEASUREMENTS and topic != ROLES["command"].topic]
+    elif fault.kind in ("link_lost", "link_degraded"):
+        topics = [LINK, *topics]
+    elif fault.kind == "overrun":
+        if not fault.target:
+            raise ConfigError("target is missing: 'overrun' wants the name of a process")
+        return
+    else:
+        if fault.target:
+            raise ConfigError(f"target = '{fault.target}': '{fault.kind}' has none")
+        return
+    if fault.target not in topics:
+        raise ConfigError(f"target = '{fault.target}': '{fault.kind}' wants a topic{nearest(fault.target, topics)}")
+    if fault.kind == "link_degraded" and not 0.0 <= fault.size <= 1.0:
+        raise ConfigError(f"size = {fault.size:g}: 'link_degraded' wants a share, 0 to 1")
+
+
+def find_scenario(word: str) -> Path:
+    """Return the file of a scenario: a path, or the name of one that ships.
+
+    Raises:
+        UsageError: there is none.
+    """
+    path = Path(word)
+    if path.is_file():
+        return path
+    shipped = shipped_scenarios()
+    if word in shipped:
+        return shipped[word]
+    raise UsageError(f"'{word}': a scenario file or the name of one that ships was wanted{nearest(word, shipped)}")
+
+
+def shipped_scenarios() -> Mapping[str, Path]:
+    """Return the scenarios that ship, by name."""
+    return {path.stem: path for path in sorted(resource(FOLDER).glob("*.toml"))}
+
+
+def load_scenario(path: Path, **over: Any) -> Scenario:
+    """Read a scenario file; `over` replaces keys. Files that it names are looked for beside it.
+
+    Raises:
+        InputError: the file cannot be read or is not TOML.
+        ConfigError: a key or a value in it is wrong.
+    """
+    scenario = load_tree(Scenario, path, "scenario file")
+    beside: dict[str, Any] = {key: _beside(path, getattr(scenario, key)) for key in ("mine", "machine", "map")}
+    return replace(scenario, **beside, **over)
+
+
+def _beside(path: Path, name: str) -> str:
+    """Return a name, or the path of what is beside the scenario under it."""
+    there = path.parent / name
+    return str(there) if name and there.exists() else name
+
+
+def scenario_toml(scenario: Scenario) -> str:
+    """Print a scenario as a file that `load_scenario` reads back, each value with meaning and unit."""
+    return tree_toml(scenario)

@@ -1,0 +1,121 @@
+"""Charts of a replay: the way from above, figures over time, states of the processes."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from lhdmap.messages import FloatArray
+from lhdmap.report import charts
+from lhdmap.report.path_charts import plan_axes
+from lhdmap.report.replay_data import Change, ReplayData
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+_SECOND_NS = 1e9
+_MOST_BARS = 400
+_LANE_IN = 0.42
+_SHADES = (charts.FINAL, charts.ODOMETRY, charts.TRUTH, charts.FLAGGED, charts.WHEELS, "#8a949e", "#b7d3ea", "#f0c419")
+
+
+def plan_chart(data: ReplayData) -> Figure:
+    """Draw walls, true path, what perception believed, start, end, goal, contacts and where faults began."""
+    way = data.rows[:, 1:4]
+    figure = charts.new_figure(charts.plan_height_in(np.vstack([way, *data.lines_m])))
+    axes = figure.add_subplot()
+    for line in data.lines_m:
+        axes.plot(line[:, 0], line[:, 1], color=charts.INK, linewidth=0.6, alpha=0.35)
+    rows = charts.thinned(len(way))
+    axes.plot(way[rows, 0], way[rows, 1], color=charts.FINAL, label="true path")
+    if len(data.believed_m):
+        rows = charts.thinned(len(data.believed_m))
+        axes.plot(*data.believed_m[rows, :2].T, "--", color=charts.ODOMETRY, label="path by perception")
+    axes.plot(*way[0, :2], "o", color=charts.FINAL, markersize=6, label="start")
+    axes.plot(*way[-1, :2], "s", color=charts.WHEELS, markersize=6, label="end")
+    if data.goal_m is not None:
+        axes.plot(*data.goal_m[:2], "*", color=charts.TRUTH, markersize=11, label="goal")
+    _marks(axes, [contact["point_m"] for contact in data.verdict["contacts"]], "X", charts.WHEELS, "contact")
+    begun = [fault["began_s"] for fault in data.verdict["faults"] if fault["began_s"] is not None]
+    _marks(axes, [_place_at(data, at_s) for at_s in begun], "v", charts.FLAGGED, "fault begins")
+    plan_axes(axes)
+    charts.legend_above(axes, columns=4)
+    return figure
+
+
+def time_chart(data: ReplayData) -> Figure:
+    """Draw speed, articulation, and where it is known clearance over time; faults shaded."""
+    time_s, clearance_m = data.column("time_s"), data.column("clearance_m")
+    seen = bool(np.isfinite(clearance_m).any())
+    count = 3 if seen else 2
+    figure = charts.new_figure(0.6 + 1.7 * count)
+    figure.subplots_adjust(hspace=0.22)
+    panels = figure.subplots(count, 1, sharex=True)
+    wanted_kmh, speed_kmh = 3.6 * data.column("wanted_mps"), 3.6 * data.column("speed_mps")
+    panels[0].plot(*charts.envelope(time_s, wanted_kmh), color=charts.ODOMETRY, linewidth=1.0, label="commanded")
+    panels[0].plot(*charts.envelope(time_s, speed_kmh), color=charts.FINAL, label="true")
+    panels[0].set_ylabel("speed, km/h")
+    angle_deg = np.degrees(data.column("articulation_rad"))
+    panels[1].plot(*charts.envelope(time_s, angle_deg), color=charts.TRUTH, label="articulation, left +")
+    panels[1].set_ylabel("angle, °")
+    if seen:
+        panels[2].plot(*charts.envelope(time_s, clearance_m), color=charts.WHEELS, label="least distance to a wall")
+        panels[2].set(ylabel="clearance, m", ylim=(0.0, None))
+    for axes in panels:
+        _shade_faults(axes, data)
+        axes.yaxis.set_label_coords(-0.065, 0.5)
+    panels[-1].set_xlabel("time, s")
+    panels[-1].set_xlim(0.0, max(data.verdict["duration_s"], 1.0))
+    charts.legend_above(panels[0])
+    return figure
+
+
+def state_chart(data: ReplayData) -> Figure:
+    """Draw the states of each process as bars over time."""
+    lanes = list(data.changes.items())
+    figure = charts.new_figure(0.8 + _LANE_IN * len(lanes))
+    axes = figure.add_subplot()
+    end_s = max(data.verdict["duration_s"], 1.0)
+    for row, (_, changes) in enumerate(lanes):
+        _lane(axes, row, [((one.t_ns - data.start_ns) / _SECOND_NS, one) for one in changes], end_s)
+    axes.set_yticks(range(len(lanes)), [name for name, _ in lanes])
+    axes.set(xlabel="time, s", xlim=(0.0, end_s), ylim=(len(lanes) - 0.5, -0.5))
+    axes.grid(visible=False)
+    _shade_faults(axes, data)
+    charts.legend_above(axes)
+    return figure
+
+
+def _lane(axes: Axes, row: int, changes: list[tuple[float, Change]], end_s: float) -> None:
+    """Draw the bars of one process; the name of a state stands in those that are wide enough."""
+    names = list(dict.fromkeys(change.state for _, change in changes))
+    ends = [at_s for at_s, _ in changes[1:]] + [end_s]
+    for (at_s, change), until_s in list(zip(changes, ends, strict=True))[:_MOST_BARS]:
+        width_s = max(until_s - at_s, end_s / 800)
+        colour = _SHADES[names.index(change.state) % len(_SHADES)]
+        axes.barh(row, width_s, left=at_s, height=0.7, color=colour, alpha=0.55)
+        if width_s > 0.011 * end_s * len(change.state):
+            axes.text(at_s + 0.5 * width_s, row, change.state, ha="center", va="center", fontsize=7.5)
+
+
+def _shade_faults(axes: Axes, data: ReplayData) -> None:
+    end_s, told = data.verdict["duration_s"], False
+    for fault in data.verdict["faults"]:
+        if fault["began_s"] is not None:
+            until_s = end_s if fault["ended_s"] is None else fault["ended_s"]
+            label = None if told else "fault"
+            axes.axvspan(fault["began_s"], until_s, color=charts.FLAGGED, alpha=0.2, linewidth=0, label=label)
+            told = True
+
+
+def _marks(axes: Axes, points_m: list[FloatArray], marker: str, colour: str, label: str) -> None:
+    if points_m:
+        x, y = np.array(points_m)[:, :2].T
+        axes.plot(x, y, marker, color=colour, markersize=7, label=label)
+
+
+def _place_at(data: ReplayData, at_s: float) -> FloatArray:
+    time_s = data.column("time_s")
+    return np.array([np.interp(at_s, time_s, data.rows[:, k]) for k in (1, 2, 3)])

@@ -1,0 +1,118 @@
+"""A replay on a page: what happened, the way, figures over time, states, faults and what followed, the verdict."""
+
+from __future__ import annotations
+
+import html
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from lhdmap.report import charts, markup, replay_charts
+from lhdmap.report.replay_data import ReplayData
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+PLAN = "The way from above: what truly happened, and where perception believed the machine, placed at the true start."
+TIME = "Speed, joint angle and clearance as they truly were; what was commanded beside it. Stretches with a fault are shaded."
+STATES = (
+    "States of the processes over time, from the journal; journal.jsonl has the cause and the figures of each change."
+)
+SIMULATED = "All of this is simulated: the figures are those of a model, not of a mine."
+_MOST_ROWS = 200
+
+
+def write_replay_report(path: Path, data: ReplayData) -> None:
+    """Write one self-contained HTML page."""
+    path.write_text(render(data), encoding="utf-8")
+
+
+def render(data: ReplayData) -> str:
+    """Return the page as text; all pictures are in it."""
+    with charts.styled():
+        pictures = list(_pictures(data))
+    parts = [
+        markup.section("What happened", markup.cards(_cards(data.verdict)) + markup.paragraph(SIMULATED)),
+        markup.section("Warnings", markup.listed(data.warnings, "warning")),
+        *pictures,
+        markup.section("Contacts", _contacts(data.verdict["contacts"])),
+        markup.section("Faults and what followed", _faults(data.verdict["faults"])),
+        markup.section("Verdict", _verdict(data.verdict)),
+        markup.section("How it was made", _made(data)),
+    ]
+    return markup.document(data.title, "".join(parts))
+
+
+def _cards(verdict: Mapping[str, Any]) -> Iterator[tuple[str, str, str]]:
+    """Yield name, value and meaning of the headline figures."""
+    yield "verdict", "ok" if verdict["ok"] else "not ok", str(verdict["reason"])
+    yield "driven", f"{verdict['distance_m']:.1f} m", f"in {verdict['duration_s']:.1f} s of simulated time"
+    fastest = f"mean of the whole run; at most {verdict['max_speed_kmh']:.1f} km/h"
+    yield "speed", f"{verdict['mean_speed_kmh']:.1f} km/h", fastest
+    yield "contacts", str(len(verdict["contacts"])), "of a body of the machine with a wall or a thing"
+    if verdict["min_clearance_m"] is not None:
+        yield (
+            "clearance",
+            f"{verdict['min_clearance_m']:.2f} m",
+            "least distance of a body from a wall, looked at each 0.1 s",
+        )
+    yield "stops", str(verdict["stops"]), "rests on the way, without those of start and end"
+    yield "assistance", str(verdict["assists"]), f"requests; {verdict['assist_s']:.0f} s until they were answered"
+    yield "faults", str(len(verdict["faults"])), "injected by the scenario"
+
+
+def _pictures(data: ReplayData) -> Iterator[str]:
+    if not len(data.rows):
+        return
+    yield markup.section("Way", _picture(replay_charts.plan_chart(data), PLAN))
+    yield markup.section("Over time", _picture(replay_charts.time_chart(data), TIME))
+    if data.changes:
+        yield markup.section("States", _picture(replay_charts.state_chart(data), STATES))
+
+
+def _picture(figure: Figure, caption: str) -> str:
+    return markup.picture(charts.svg_uri(figure), caption)
+
+
+def _contacts(contacts: Sequence[Mapping[str, Any]]) -> str:
+    rows = [
+        (f"{one['t_s']:.2f}", one["body"], "{:.2f}, {:.2f}, {:.2f}".format(*one["point_m"]), f"{one['depth_m']:.3f}",
+         f"{one['speed_kmh']:.1f}")
+        for one in contacts[:_MOST_ROWS]
+    ]  # fmt: skip
+    return markup.table(("time, s", "body", "where, m", "depth, m", "speed, km/h"), rows) if rows else ""
+
+
+def _faults(faults: Sequence[Mapping[str, Any]]) -> str:
+    rows = [
+        (
+            one["kind"],
+            one["target"] or one["at"],
+            "never" if one["began_s"] is None else f"{one['began_s']:.2f}",
+            "the end" if one["ended_s"] is None else f"{one['ended_s']:.2f}",
+            "; ".join(map(_followed, one["followed"])) or "nothing that the journal knows",
+        )
+        for one in faults
+    ]
+    return markup.table(("fault", "target or place", "from, s", "to, s", "what followed"), rows) if rows else ""
+
+
+def _followed(one: Mapping[str, Any]) -> str:
+    return f"{one['after_s']:+.2f} s {one['process']}: {one['to'] or one['event']}"
+
+
+def _verdict(verdict: Mapping[str, Any]) -> str:
+    rows = [(key, _said(value)) for key, value in verdict.items() if key not in ("contacts", "faults")]
+    return markup.table(("figure of verdict.json", "value"), rows)
+
+
+def _said(value: Any) -> str:
+    if value is None:
+        return "not looked at"
+    return f"{value:.4g}" if isinstance(value, float) else str(value)
+
+
+def _made(data: ReplayData) -> str:
+    parts = markup.table(("", ""), list(data.provenance.items())) if data.provenance else ""
+    settings = html.escape(data.settings_text)
+    return parts + (f"<details><summary>Scenario</summary><pre>{settings}</pre></details>\n" if settings else "")
