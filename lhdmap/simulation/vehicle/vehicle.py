@@ -51,7 +51,7 @@ class Vehicle:
             points = kernel.points_at_rest(row, plant)
             kernel.stand(row, plant, points, self._ground.floor_height(points))
         still = Command(time_ns, 0.0, 0.0, 0.0, 0.0, full_rpm=False, brake=False)
-        return VehicleState(time_ns, *row.tolist(), pending=((time_ns, still),))
+        return VehicleState._make((time_ns, *row.tolist(), ((time_ns, still),)))
 
     def step(self, state: VehicleState, command: Command, dt_s: float) -> VehicleState:
         """Return the state after `dt_s` with a command given now: it counts when its dead time has passed."""
@@ -64,7 +64,7 @@ class Vehicle:
         steps = max(1, math.ceil(dt_s / SUB_STEP_S - 1e-6))
         points = kernel.advance(row, plant, commands, since_s, steps, dt_s / steps, friction)
         kernel.stand(row, plant, points, self._ground.floor_height(points))
-        return VehicleState(end_ns, *row.tolist(), pending)
+        return VehicleState._make((end_ns, *row.tolist(), pending))
 
     def _plant_with(self, load_kg: float) -> Plant:
         if load_kg != self._load_kg:
