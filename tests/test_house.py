@@ -32,6 +32,7 @@ FLOORS = [
     {"trajectory", "runfolder", "machine_sections"},
     {"machine", "mapfolder"},
     {"kinematics"},
+    {"mine"},
     {"scan_matching"},
     {"logs", "proprioception", "odometry", "integration"},
     {"pile", "rockbreaker"},

@@ -64,6 +64,7 @@ def mine_parts(scenario: Scenario) -> Parts:
     legs = _legs(scenario, network, machine, start, settings)
     world = MineWorld(network, machine)
     vehicle = Vehicle(machine, world, seed=scenario.seed)
+    places = _places(network, machine)
     way_m = sum(leg.length_m for leg in legs)
     return Parts(
         machine=machine,
@@ -74,7 +75,8 @@ def mine_parts(scenario: Scenario) -> Parts:
         operator=Operator(legs, machine, settings, seed=scenario.seed),
         bumper=BodyBumper(machine, world),
         changing=world,
-        places=_places(network, machine),
+        places=places,
+        goal_m=places.get(scenario.goal),
         lines_m=_walls(network),
         expected_s=_SLOWER * way_m / (scenario.speed_kmh / 3.6) + 10.0,
     )
@@ -84,7 +86,8 @@ def _legs(
     scenario: Scenario, network: Network, machine: Machine, start: Start, settings: OperatorSettings
 ) -> list[Leg]:
     planner = Planner(network, machine)
-    stops = parse_route(scenario.route, network.plan) if scenario.route else []
+    route = scenario.route or scenario.goal
+    stops = parse_route(route, network.plan) if route else []
     runs = planner.route(start, stops) if stops else planner.teaching(start)
     way_m = sum(abs(run.to_m - run.from_m) for run in runs)
     pose = network.tubes[start.tube].pose(start.at_m, start.facing)

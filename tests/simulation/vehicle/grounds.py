@@ -62,3 +62,9 @@ def drive(
 
 def column(states: list[VehicleState], name: str) -> FloatArray:
     return np.array([getattr(state, name) for state in states])
+
+
+def since_it_counts(states: list[VehicleState]) -> FloatArray:
+    """Return the time of each state after the dead time of what was given at the first, s."""
+    time_s: FloatArray = np.arange(len(states), dtype=float) * STEP_S - 0.25
+    return time_s

@@ -16,7 +16,7 @@ from lhdmap.simulation.vehicle.state import VehicleState
 from lhdmap.simulation.vehicle.tyres import carried_speed, slip_for, tyre_force, wheel_for
 from lhdmap.simulation.vehicle.vehicle import Vehicle
 
-from tests.simulation.vehicle.grounds import STEP_S, Plane, column, command, drive
+from tests.simulation.vehicle.grounds import STEP_S, Plane, column, command, drive, since_it_counts
 
 TOP_MPS = 24.0 / 3.6
 G = 9.81
@@ -42,7 +42,7 @@ def first_order(t: FloatArray, target: float, lag_s: float, limit: float) -> Flo
 def test_speed_follows_a_step_after_the_dead_time(propel: float, load_kg: float, lag_s: float, limit: float) -> None:
     vehicle = Vehicle(STRONG, Plane())
     states = drive(vehicle, at_rest(vehicle, load_kg), command(propel), 10.0)
-    t = np.arange(len(states), dtype=np.float64) * STEP_S - 0.25
+    t = since_it_counts(states)
     wanted = math.copysign(1.0, propel) * first_order(t, abs(propel) * TOP_MPS, lag_s, limit)
     wheel, speed = column(states, "wheel_speed_mps"), column(states, "speed_mps")
     assert np.abs(wheel - wanted).max() < 0.01 * abs(propel) * TOP_MPS
@@ -107,7 +107,7 @@ def test_wheels_lock_where_the_brakes_are_stronger_than_the_floor() -> None:
 def test_wheels_spin_where_the_drive_is_stronger_than_the_floor() -> None:
     vehicle = Vehicle(STRONG, Plane(friction=0.08))
     states = drive(vehicle, at_rest(vehicle), command(0.6), 6.0)
-    t = np.arange(len(states), dtype=np.float64) * STEP_S - 0.25
+    t = since_it_counts(states)
     wheel, speed = column(states, "wheel_speed_mps"), column(states, "speed_mps")
     assert np.abs(wheel - first_order(t, 4.0, 0.5, 1.0)).max() < 0.04  # it runs to what is wanted, held by nothing
     early = (speed[150] - speed[50]) / 1.0

@@ -12,12 +12,12 @@ from hypothesis import strategies as st
 from lhdmap.machine import Machine
 from lhdmap.machine_sections import Steering
 from lhdmap.messages import Command, FloatArray
+from lhdmap.simulation.driving import BOOM_RAD as BOOM_LIFT_RAD
+from lhdmap.simulation.driving import BUCKET_RAD as BUCKET_TILT_RAD
 from lhdmap.simulation.vehicle.state import VehicleState
 from lhdmap.simulation.vehicle.vehicle import Vehicle
 
-from tests.simulation.vehicle.grounds import STEP_S, Plane, column, command, drive
-
-BOOM_LIFT_RAD, BUCKET_TILT_RAD = -0.35, 0.6  # tramming posture
+from tests.simulation.vehicle.grounds import Plane, column, command, drive, since_it_counts
 
 MOST_RPS = math.radians(15.0)
 MOST_RAD = math.radians(40.0)
@@ -30,14 +30,15 @@ def at_rest(vehicle: Vehicle) -> VehicleState:
 def lagged(t: FloatArray, rate: float, lag_s: float = 0.2) -> FloatArray:
     """Angle of a joint whose rate goes to `rate` from nought at t = 0."""
     after = np.maximum(t, 0.0)
-    return rate * (after + lag_s * np.expm1(-after / lag_s))
+    angle: FloatArray = rate * (after + lag_s * np.expm1(-after / lag_s))
+    return angle
 
 
 @pytest.mark.parametrize("rate_rps", [0.1, -0.2])
 def test_the_joint_follows_a_step_after_the_dead_time(rate_rps: float) -> None:
     vehicle = Vehicle(Machine(), Plane())
     states = drive(vehicle, at_rest(vehicle), command(0.2, rate_rps), 2.5)
-    t = np.arange(len(states), dtype=np.float64) * STEP_S - 0.25
+    t = since_it_counts(states)
     assert np.abs(column(states, "articulation_rad") - lagged(t, rate_rps)).max() < 1e-9
     wanted = rate_rps * -np.expm1(-np.maximum(t, 0.0) / 0.2)
     assert np.abs(column(states, "articulation_rate_rps") - wanted).max() < 1e-9
@@ -53,7 +54,7 @@ def test_a_pulse_acts_for_as_long_as_it_was_given() -> None:
 def test_the_rate_is_limited() -> None:
     vehicle = Vehicle(Machine(), Plane())
     states = drive(vehicle, at_rest(vehicle), command(0.0, 3.0), 2.5)
-    t = np.arange(len(states), dtype=np.float64) * STEP_S - 0.25
+    t = since_it_counts(states)
     assert np.abs(column(states, "articulation_rad") - lagged(t, MOST_RPS)).max() < 1e-9
 
 
@@ -86,7 +87,7 @@ def test_boom_and_bucket_move_at_their_rates(rpm: bool, share: float, both: bool
     vehicle = Vehicle(Machine(), Plane())
     tilt, share = (-1.0, 0.6 * share) if both else (0.0, share)
     states = drive(vehicle, at_rest(vehicle), command(lift=1.0, tilt=tilt, rpm=rpm), 4.0)
-    t = np.arange(len(states), dtype=np.float64) * STEP_S - 0.25
+    t = since_it_counts(states)
     assert np.abs(column(states, "boom_rad") - BOOM_LIFT_RAD - lagged(t, 0.16 * share)).max() < 1e-9
     assert np.abs(column(states, "bucket_rad") - BUCKET_TILT_RAD - lagged(t, 0.24 * share * tilt)).max() < 1e-9
 
