@@ -114,11 +114,24 @@ class MineDrive:
         Raises:
             InputError: the operator does not come to the end of his route.
         """
-        history, due, after = History(SECOND_NS // STEP_NS), Due(self._sensors()), 0
-        last = round(_LATE * (self.expected_s + 60.0) * SECOND_NS / STEP_NS)
-        for step in range(last):
+        history, due = History(SECOND_NS // STEP_NS), Due(self._sensors())
+        for _ in self._states():
             history.append(self._row())
             yield from due.read(history, self.world)
+
+    def drive(self) -> list[VehicleState]:
+        """Drive without sensors; return the state each 0.1 s.
+
+        Raises:
+            InputError: as `records`.
+        """
+        return [state for step, state in enumerate(self._states()) if step % _LOOK_STEPS == 0]
+
+    def _states(self) -> Iterator[VehicleState]:
+        """Yield the state at each step, until the operator has rested for a moment at the end of his route."""
+        after = 0
+        for step in range(round(_LATE * (self.expected_s + 60.0) * SECOND_NS / STEP_NS)):
+            yield self.state
             after += self._operator.done
             if after > _REST_STEPS:
                 return

@@ -81,7 +81,7 @@ def test_a_machine_at_a_draw_point_faces_the_pile() -> None:
         ((40, 2), "I1"),
         ((40, 7), "I1"),
         ((41, 9), "B"),
-        ((40, 37), "B"),
+        ((40, 33), "B"),
         ((40, 41), "DP"),
     ],
 )
