@@ -14,7 +14,8 @@ from lhdmap.simulation.vehicle.contact import BodyContact, ContactPiece, Contact
 from lhdmap.simulation.vehicle.state import VehicleState
 
 _KEPT = 128  # pieces of the surface that are ready to be touched
-_ROUND_M = 4.0  # pieces are looked for in boxes of this raster, so that most moments have those of the one before
+_LIMIT_M = 2.0  # clearances are told up to this
+_STAYS_M = 2.0  # pieces are looked for anew when a body has moved so far
 
 
 class Bumper:
@@ -23,24 +24,27 @@ class Bumper:
     def __init__(self, machine: Machine, world: MineWorld) -> None:
         self._bodies, self._world = Bodies(machine), world
         self._pieces: OrderedDict[int | str, ContactPiece] = OrderedDict()
-        self._here: tuple[tuple[float, ...], Contacts] | None = None
+        self._here: tuple[FloatArray, int, Contacts] | None = None
 
     def touching(self, state: VehicleState) -> list[BodyContact]:
         """Return the bodies that are in a wall or a thing, each with its deepest place."""
         boxes = self._bodies.boxes(state)
-        return self._near(boxes, 0.0).touching(boxes)
+        return self._near(boxes).touching(boxes)
 
     def clearance_m(self, state: VehicleState, limit_m: float = 1.0) -> float:
-        """Return the least distance of any body from anything, at most `limit_m`, metres."""
+        """Return the least distance of any body from anything, at most `limit_m` (and 2 m), metres."""
         boxes = self._bodies.boxes(state)
-        return self._near(boxes, limit_m).clearance_m(boxes, limit_m)
+        return self._near(boxes).clearance_m(boxes, min(limit_m, _LIMIT_M))
 
-    def _near(self, boxes: Boxes, more_m: float) -> Contacts:
-        box = _around(boxes, more_m)
-        key = (*box.ravel().tolist(), float(self._world.version))
-        if self._here is None or self._here[0] != key:
-            self._here = (key, Contacts([self._piece(name) for name in self._world.keys_in(box)]))
-        return self._here[1]
+    def _near(self, boxes: Boxes) -> Contacts:
+        """Return what is around; a little more than that, so that it holds for the next metres."""
+        here = self._here
+        if here is None or here[1] != self._world.version or _moved_m(here[0], boxes) > _STAYS_M:
+            keys = self._world.keys_in(_around(boxes, _LIMIT_M + _STAYS_M))
+            self._here = here = (
+                boxes.centre_m, self._world.version, Contacts([self._piece(key) for key in keys])
+            )  # fmt: skip
+        return here[2]
 
     def _piece(self, key: int | str) -> ContactPiece:
         piece = self._pieces.get(key)
@@ -53,8 +57,12 @@ class Bumper:
         return piece
 
 
+def _moved_m(before: FloatArray, boxes: Boxes) -> float:
+    """Return how far the body that has moved farthest is from where it was, about."""
+    return float(np.abs(boxes.centre_m - before).max())
+
+
 def _around(boxes: Boxes, more_m: float) -> FloatArray:
-    """Return the box (2, 3) around boxes and `more_m`, rounded outwards to a raster."""
+    """Return the box (2, 3) around boxes and `more_m`."""
     reach = (np.abs(boxes.axes) * boxes.half_m[:, None, :]).sum(axis=2)
-    low, high = (boxes.centre_m - reach).min(axis=0) - more_m, (boxes.centre_m + reach).max(axis=0) + more_m
-    return np.stack([np.floor(low / _ROUND_M), np.ceil(high / _ROUND_M)]) * _ROUND_M
+    return np.stack([(boxes.centre_m - reach).min(axis=0) - more_m, (boxes.centre_m + reach).max(axis=0) + more_m])

@@ -30,7 +30,7 @@ TILE_M = 100.0
 _WHOLE_PIECES = 120  # of a mine that is one scene: some 1.8 km, 3 million triangles, 400 MiB
 _PIECES = 512  # that are kept: the surface of some 6 km
 _STATION_M = 0.5
-_SCENES = 3  # that are kept: a machine may go to and fro between two
+_SCENES = 2  # that are kept: a machine may go to and fro between two
 
 
 class Thing(NamedTuple):
@@ -168,15 +168,18 @@ class MineWorld:
 
     def _scene(self, tile_m: FloatArray) -> Surface:
         """Return what can be seen from a tile; of a small mine all, which need not be made anew."""
-        reach = self.view_m + 0.5 * TILE_M if len(self._boxes) > _WHOLE_PIECES else np.inf
-        box = np.stack([tile_m - reach, tile_m + reach])
-        inside = frozenset(np.flatnonzero(_overlap(self._boxes, box)).tolist())
+        half = 0.5 * TILE_M + (0.0 if self._pieces is not None else self.view_m)
+        half = half if len(self._boxes) > _WHOLE_PIECES else np.inf
+        box = np.stack([tile_m - half, tile_m + half])
+        here = np.flatnonzero(_overlap(self._boxes, box)).tolist()
+        inside = frozenset(here if self._pieces is None else self._pieces.within(here, self.view_m))
         found = self._scenes.get(inside)
         if found is None:
             while len(self._scenes) >= _SCENES:
                 self._scenes.popitem(last=False)  # the old one goes before the new one takes its memory
             parts = [self.piece(index).mesh for index in sorted(inside)]
-            parts += [thing.mesh for thing in self._things.values() if _overlap(thing.box_m[None], box)[0]]
+            around = box + np.array([[-self.view_m], [self.view_m]])
+            parts += [thing.mesh for thing in self._things.values() if _overlap(thing.box_m[None], around)[0]]
             found = self._scenes[inside] = Surface(_together(parts))
         self._scenes.move_to_end(inside)
         return found

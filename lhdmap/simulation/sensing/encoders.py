@@ -98,4 +98,4 @@ def tilt_bar(settings: PressureSettings, state: FloatArray) -> float:
 
 def true_pose(stamp_ns: int, state: FloatArray, rng: np.random.Generator) -> GroundTruth:
     """Return the exact pose of `base_link` in `map`."""
-    return GroundTruth(stamp_ns, state[:3].copy(), se3.quaternions_from_rpy(state[3:4], state[4:5], state[5:6])[0])
+    return GroundTruth(stamp_ns, state[:3].copy(), se3.quaternion_from_rpy(*state[3:6].tolist()))
