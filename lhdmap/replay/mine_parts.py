@@ -97,10 +97,15 @@ def _state(vehicle: Vehicle, pose: FloatArray, scenario: Scenario) -> VehicleSta
 
 
 def _sensors(scenario: Scenario, machine: Machine, network: Network) -> list[Sensor]:
-    mode = "teleoperated" if scenario.driver == TELEOPERATOR else "manual"
-    return sensors_of(
-        machine, SensorSettings(), seed=scenario.seed, mode=lambda stamp_ns, state: mode, node=_node_of(network)
-    )
+    mode = _mode_of("teleoperated" if scenario.driver == TELEOPERATOR else "manual")
+    return sensors_of(machine, SensorSettings(), seed=scenario.seed, mode=mode, node=_node_of(network))
+
+
+def _mode_of(mode: str) -> Callable[[int, FloatArray], str]:
+    def told(stamp_ns: int, state: FloatArray) -> str:  # noqa: ARG001  # a `Told`
+        return mode
+
+    return told
 
 
 def _node_of(network: Network) -> Callable[[int, FloatArray], str]:
