@@ -13,14 +13,13 @@ from pathlib import Path
 import numpy as np
 
 from lhdmap.geometry import se3
+from lhdmap.machine_sections import Brakes, Drive, Linkage, Spread, Steering
 from lhdmap.messages import FloatArray
 from lhdmap.settings import REQUIRED, check_corners, setting
 from lhdmap.settings_tree import load_tree, part, tree_toml
 
 PAPER = "topological_navigation, section 3.1"
 ASSUMED = "assumed, typical of 10 to 11-t loaders"
-GUIDANCE = "assumed, guidance prototype"
-LOADING = "assumed, loading prototype"
 
 
 @dataclass(frozen=True, slots=True)
@@ -101,107 +100,6 @@ class SensorMount:
         return se3.from_rpy(roll, pitch, yaw, self.position_m)
 
 
-@dataclass(frozen=True, slots=True)
-class Drive:
-    """The hydrostatic drive: the pedal asks for a wheel speed, which the machine comes to as its power and tyres allow."""
-
-    mass_kg: float = setting(30_000.0, unit="kg", source=LOADING, minimum=100.0, doc="Mass of the empty machine.")
-    payload_kg: float = setting(11_000.0, unit="kg", source=PAPER, minimum=0.0, doc="Mass in a full bucket.")
-    power_w: float = setting(150_000.0, unit="W", source=LOADING, minimum=1000.0, doc="Power at the wheels.")
-    rolling_resistance: float = setting(0.035, source=LOADING, minimum=0.0, maximum=0.5, doc="Share of the weight.")
-    dead_time_s: float = setting(
-        0.25, unit="s", source=GUIDANCE, minimum=0.0, maximum=2.0, doc="From a command until it takes effect."
-    )
-    time_constant_s: float = setting(
-        0.5, unit="s", source=GUIDANCE, minimum=0.02, maximum=10.0, doc="Time constant of the wheel speed, empty."
-    )
-    loaded_time_constant_s: float = setting(
-        0.7, unit="s", source=GUIDANCE, minimum=0.02, maximum=10.0, doc="The same with a full bucket."
-    )
-    acceleration_mps2: float = setting(
-        1.0, unit="m/s²", source=GUIDANCE, minimum=0.05, maximum=10.0, doc="Largest acceleration, empty."
-    )
-    loaded_acceleration_mps2: float = setting(
-        0.6, unit="m/s²", source=GUIDANCE, minimum=0.05, maximum=10.0, doc="The same with a full bucket."
-    )
-    slowing_mps2: float = setting(
-        1.5, unit="m/s²", source=GUIDANCE, minimum=0.05, maximum=10.0, doc="Largest deceleration by the drive, empty."
-    )
-    loaded_slowing_mps2: float = setting(
-        1.2, unit="m/s²", source=GUIDANCE, minimum=0.05, maximum=10.0, doc="The same with a full bucket."
-    )
-    slip_slope: float = setting(
-        8.0,
-        source=LOADING,
-        minimum=1.0,
-        maximum=100.0,
-        doc="k of the tyre: force / weight = friction (1 - exp(-k slip)).",
-    )
-
-
-@dataclass(frozen=True, slots=True)
-class Brakes:
-    """The service brakes."""
-
-    deceleration_mps2: float = setting(
-        2.5, unit="m/s²", source=GUIDANCE, minimum=0.1, maximum=10.0, doc="What they give on a level, empty."
-    )
-    loaded_deceleration_mps2: float = setting(
-        2.0, unit="m/s²", source=GUIDANCE, minimum=0.1, maximum=10.0, doc="The same with a full bucket."
-    )
-    ramp_s: float = setting(
-        0.3,
-        unit="s",
-        source=GUIDANCE,
-        minimum=0.0,
-        maximum=5.0,
-        doc="Until they have their full force, after the dead time.",
-    )
-
-
-@dataclass(frozen=True, slots=True)
-class Steering:
-    """The articulation's cylinders: the command is a rate, which they come to with a lag."""
-
-    time_constant_s: float = setting(
-        0.2, unit="s", source=GUIDANCE, minimum=0.01, maximum=5.0, doc="Time constant of the rate."
-    )
-    gain: float = setting(1.0, minimum=0.1, maximum=3.0, doc="Rate over what was asked for: a model error.")
-    dead_zone_dps: float = setting(
-        0.0, unit="deg/s", minimum=0.0, maximum=10.0, doc="Commands up to this rate move nothing."
-    )
-
-
-@dataclass(frozen=True, slots=True)
-class Linkage:
-    """Boom and bucket: rates, limits, and how the bucket's box moves with them."""
-
-    lift_rate_rps: float = setting(
-        0.16, unit="rad/s", source=LOADING, minimum=0.0, maximum=2.0, doc="Rate of the boom."
-    )
-    tilt_rate_rps: float = setting(
-        0.24, unit="rad/s", source=LOADING, minimum=0.0, maximum=2.0, doc="Rate of the bucket."
-    )
-    both_share: float = setting(
-        0.6, source=LOADING, minimum=0.1, maximum=1.0, doc="Share of its rate that each has where both move."
-    )
-    idle_share: float = setting(0.6, source=LOADING, minimum=0.1, maximum=1.0, doc="Share of the rates below full rpm.")
-    time_constant_s: float = setting(0.2, unit="s", source=LOADING, minimum=0.01, maximum=5.0, doc="Lag of the rates.")
-    lift_limits_rad: tuple[float, float] = setting(
-        (-0.45, 0.75), unit="rad", source=LOADING, doc="Least and largest angle of the boom."
-    )
-    tilt_limits_rad: tuple[float, float] = setting(
-        (-0.9, 0.65), unit="rad", source=LOADING, doc="Least (dumped) and largest (racked) angle of the bucket."
-    )
-    pivot_m: tuple[float, float] = setting(
-        (-0.3, 1.45), unit="m", source=LOADING, doc="Boom's pivot, x and z in base_link."
-    )
-    boom_m: float = setting(
-        2.2, unit="m", source=LOADING, minimum=0.5, maximum=6.0, doc="From there to the bucket's pin."
-    )
-    body: str = setting("boom_and_bucket", doc="Body that moves with boom and bucket.")
-
-
 def _default_bodies() -> dict[str, BodyBox]:
     return {
         "front_frame": BodyBox("base_link", (-1.5, -1.225, 0.0), (1.0, 1.225, 1.7)),
@@ -221,14 +119,15 @@ def _default_mounts() -> dict[str, SensorMount]:
 
 @dataclass(frozen=True, slots=True)
 class Machine:
-    """A machine: its dimensions, the boxes of its bodies and the mounts of its sensors, both by name."""
+    """A machine: dimensions, what moves it, the boxes of its bodies and the mounts of its sensors, both by name."""
 
     name: str = setting("lhd_11t", doc="Name of the machine.")
     dimensions: Dimensions = part(Dimensions)
     drive: Drive = part(Drive)
-    brakes: Brakes = part(Brakes)
     steering: Steering = part(Steering)
+    brakes: Brakes = part(Brakes)
     linkage: Linkage = part(Linkage)
+    spread: Spread = part(Spread)
     bodies: dict[str, BodyBox] = part(_default_bodies, key="body")
     mounts: dict[str, SensorMount] = part(_default_mounts, key="mount")
 
@@ -241,8 +140,9 @@ class Machine:
 def load_machine(path: Path | None = None) -> Machine:
     """Return the machine that a TOML file describes, or the default 11-t loader where `path` is None.
 
-    A file has `name`, one `[dimensions]`, and a `[body.NAME]` and `[mount.NAME]` for each box and sensor; a part that
-    is left out keeps the default's values, bodies and mounts are replaced as a whole.
+    A file has `name`, one `[dimensions]`, `[drive]`, `[steering]`, `[brakes]`, `[linkage]`, `[spread]`, and a
+    `[body.NAME]` and `[mount.NAME]` for each box and sensor; a part that is left out keeps the default's values, bodies
+    and mounts are replaced as a whole.
 
     Raises:
         InputError: the file cannot be read or is not TOML.

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from lhdmap.cli.console import Console
 from lhdmap.cli.options import add_output, suggest
+from lhdmap.cli.simulate_mine import add_mine, refuse_others, run_mine
 from lhdmap.errors import UsageError
 from lhdmap.outputs import free_files
 from lhdmap.settings import figure, near_names, nearest
@@ -18,7 +19,7 @@ if TYPE_CHECKING:
     from lhdmap.messages import Record
     from lhdmap.simulation.scenario import DriftScenario
 
-BUILT_IN = ("drift", "pile", "grizzly")
+BUILT_IN = ("drift", "pile", "mine", "grizzly")
 FILES = ("log", "truth", "scenario", "mesh", "pile")
 DUST_SHARE, MIXED_PIXEL_SHARE, DROP_OUT_SHARE = 0.03, 0.5, 0.01
 
@@ -27,7 +28,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command's arguments; an option that is not given keeps the scenario's value."""
     suggest(
         parser.add_argument(
-            "scenario", metavar="SCENARIO", help="'drift', 'pile', 'grizzly' (a cloud, not a log), or a scenario file"
+            "scenario",
+            metavar="SCENARIO",
+            help="'drift', 'pile', 'mine' (with a PLAN), 'grizzly' (a cloud, not a log), or a scenario file",
         ),
         *BUILT_IN,
         "files",
@@ -47,6 +50,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--planar", action="store_true", help="2D world: level scanners, flat floor, upright walls, no inclinometer"
     )
+    add_mine(parser)
     _add_pile(parser.add_argument_group("pile: a drift that ends in one"))
     _add_drive(parser.add_argument_group("drift and drive"))
     _add_sensors(parser.add_argument_group("sensors"))
@@ -96,8 +100,11 @@ def _add_sensors(group: Any) -> None:
 
 def run(arguments: argparse.Namespace, console: Console) -> int:
     """Simulate and write; return the exit code."""
+    refuse_others(arguments)
     if arguments.scenario == "grizzly":
         return _run_grizzly(arguments, console)
+    if arguments.scenario == "mine":
+        return run_mine(arguments, console, _scanner_values(arguments))
     from lhdmap.simulation.drive import simulate_drift
 
     if arguments.scenario != "pile" and (arguments.variant or arguments.flat_floor):

@@ -80,6 +80,15 @@ def quaternions_from_rpy(roll_rad: FloatArray, pitch_rad: FloatArray, yaw_rad: F
     )
 
 
+def quaternion_from_rpy(roll_rad: float, pitch_rad: float, yaw_rad: float) -> FloatArray:
+    """Return the quaternion x y z w, shape (4,), of one roll, pitch and yaw."""
+    cr, sr = math.cos(0.5 * roll_rad), math.sin(0.5 * roll_rad)
+    cp, sp = math.cos(0.5 * pitch_rad), math.sin(0.5 * pitch_rad)
+    cy, sy = math.cos(0.5 * yaw_rad), math.sin(0.5 * yaw_rad)
+    x, y = sr * cp * cy - cr * sp * sy, cr * sp * cy + sr * cp * sy
+    return np.array([x, y, cr * cp * sy - sr * sp * cy, cr * cp * cy + sr * sp * sy])
+
+
 def rpy_from_quaternions(quaternions_xyzw: FloatArray) -> FloatArray:
     """Return roll, pitch, yaw, shape (N, 3), of quaternions x y z w, shape (N, 4)."""
     x, y, z, w = np.moveaxis(np.asarray(quaternions_xyzw, dtype=float), -1, 0)

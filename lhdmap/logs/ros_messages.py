@@ -113,11 +113,10 @@ def _point_cloud(cloud: PointCloud) -> Any:
 
 
 def _imu(inclination: Inclination) -> Any:
-    roll, pitch, yaw = (np.array([value]) for value in (inclination.roll_rad, inclination.pitch_rad, 0.0))
     rate, acceleration = inclination.angular_velocity_rps, inclination.acceleration_mps2
     return _T["sensor_msgs/msg/Imu"](
         header=_header(inclination.stamp_ns, inclination.frame_id),
-        orientation=_quaternion(se3.quaternions_from_rpy(roll, pitch, yaw)[0]),
+        orientation=_quaternion(se3.quaternion_from_rpy(inclination.roll_rad, inclination.pitch_rad, 0.0)),
         orientation_covariance=_NO_COVARIANCE_3,
         angular_velocity=_vector(np.zeros(3) if rate is None else rate),
         angular_velocity_covariance=_UNKNOWN if rate is None else _NO_COVARIANCE_3,
@@ -194,10 +193,9 @@ def _transforms(mounts: Mount | list[Mount]) -> Any:
 
 
 def _transform(mount: Mount) -> Any:
-    roll, pitch, yaw = (np.array([angle]) for angle in se3.to_rpy(mount.T_parent_child))
     pose = _T["geometry_msgs/msg/Transform"](
         translation=_vector(mount.T_parent_child[:3, 3]),
-        rotation=_quaternion(se3.quaternions_from_rpy(roll, pitch, yaw)[0]),
+        rotation=_quaternion(se3.quaternion_from_rpy(*se3.to_rpy(mount.T_parent_child))),
     )
     header = _header(mount.stamp_ns, mount.parent_frame)
     return _T["geometry_msgs/msg/TransformStamped"](header=header, child_frame_id=mount.child_frame, transform=pose)

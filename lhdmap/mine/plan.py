@@ -14,7 +14,7 @@ ASSUMED = "lhdmap: usual in drifts for 10-t loaders"
 KINDS = ("draw_point", "dump", "park", "turning_bay", "passing_bay", "niche", "refuge")
 PILES = ("normal", "skewed", "bulging", "asymmetric", "concave", "too_shallow", "wall", "hang_up", "boulder", "spill")
 LENGTH_M = {
-    "draw_point": 16.0,
+    "draw_point": 20.0,
     "dump": 12.0,
     "park": 13.0,
     "turning_bay": 15.0,

@@ -134,14 +134,18 @@ class Planner:
         """
         runs, states = self._begin(start)
         for number, stop in enumerate(stops):
-            reached = self._reaches(stop, last=number == len(stops) - 1)
-            found = self._search(states, reached)
+            last = number == len(stops) - 1
+            reached = self._reaches(stop, first=number == 0, last=last)
+            wanted = {state: first for state, first in states.items() if state.gear == stop.gear}
+            found = self._search(wanted if number == 0 else states, reached) or self._search(states, reached)
+            if found is None and last:  # a ring has no end
+                found = self._search(states, self._reaches(stop, first=number == 0, last=False))
             if found is None:
                 raise UsageError(
                     f"no way to '{stop.name}'{' in reverse' if stop.gear < 0 else ''}: no turn that leads there is wide enough"
                 )
             state, driven = found
-            runs = [*runs, *self._named(driven, stop)]
+            runs = [*runs, *self._named(self._short_of_node(state, driven) if last else driven, stop)]
             states = {state: ()}
         return _trimmed(self.network, _joined(runs))
 
@@ -187,8 +191,9 @@ class Planner:
                 direction = start.facing * gear
                 lead = start.at_m if gear > 0 else start.at_m - start.facing * self._wheelbase_m
                 end = self._end(edge, direction, gear)
-                if (end - lead) * direction > 0.0:
-                    states[_State(index, direction, gear, False)] = (Run(edge.tube, lead, end, gear),)
+                if (end - lead) * direction > -self._wheelbase_m:
+                    run = Run(edge.tube, lead, end, gear)
+                    states[_State(index, direction, gear, False)] = (run,) if (end - lead) * direction > 0.0 else ()
             break
         return [], states
 
@@ -249,13 +254,11 @@ class Planner:
             other = (
                 self._end(edge, -state.direction, -state.gear) if self._is_dead_end(edge, -state.direction) else begin
             )
-            if (back - other) * state.direction > 0.0:
-                way = (back - other) * state.direction * (1.0 if state.gear < 0 else self._reverse)
-                yield _Step(
-                    way + _INVERSION_M,
-                    _State(state.edge, -state.direction, -state.gear, False),
-                    (Run(edge.tube, back, other, -state.gear),),
-                )
+            way = (back - other) * state.direction  # not positive: the rear axle is still in the turn
+            if way > 0.0 or not self._is_dead_end(edge, -state.direction):
+                cost = max(way, 0.0) * (1.0 if state.gear < 0 else self._reverse) + _INVERSION_M
+                runs = (Run(edge.tube, back, other, -state.gear),) if way > 0.0 else ()
+                yield _Step(cost, _State(state.edge, -state.direction, -state.gear, False), runs)
 
     def _is_dead_end(self, edge: Edge, direction: int) -> bool:
         return self.network.nodes[edge.end if direction > 0 else edge.start].degree == 1
@@ -268,7 +271,20 @@ class Planner:
         ahead = ((first - begin)[:2] ** 2).sum() <= ((last - begin)[:2] ** 2).sum()
         return Run(turn.tube, 0.0, tube.length_m, gear) if ahead else Run(turn.tube, tube.length_m, 0.0, gear)
 
-    def _reaches(self, stop: Stop, *, last: bool) -> Callable[[_Step], bool]:
+    def _short_of_node(self, state: _State, runs: list[Run]) -> list[Run]:
+        """Return runs that end before the drift that theirs runs into: with the bumper before its walls."""
+        edge = self.network.edges[state.edge]
+        node = self.network.nodes[edge.end if state.direction > 0 else edge.start]
+        if node.degree < 2 or not runs:
+            return runs
+        others = [branch for branch in node.branches if branch.tube != edge.tube]
+        half_m = max((self.network.tubes[one.tube].half_width_m(one.s_m) for one in others), default=0.0)
+        back_m = half_m + overhang_m(self.machine, state.gear)
+        last = runs[-1]
+        to_m = last.to_m - state.direction * min(back_m, 0.9 * abs(last.to_m - last.from_m))
+        return [*runs[:-1], last._replace(to_m=to_m)]
+
+    def _reaches(self, stop: Stop, *, first: bool, last: bool) -> Callable[[_Step], bool]:
         """Return what tells whether a step reaches an element of a route."""
         network = self.network
         place = next((one for one in network.plan.places if one.name == stop.name), None)
@@ -278,7 +294,7 @@ class Planner:
                 not step.state.entering
                 and network.edges[step.state.edge].tube == tube
                 and step.state.gear == stop.gear
-                and any(run.tube == tube and run.gear == stop.gear for run in step.runs)
+                and any(self._through_drift(run, step.state, tube, stop.gear, first) for run in step.runs)
                 and (not last or self._is_last(step.state))
             )
         if place.kind in (*BLIND, "passing_bay"):
@@ -302,15 +318,16 @@ class Planner:
             < 0.01
         )
 
+    def _through_drift(self, run: Run, state: _State, tube: int, gear: int, first: bool) -> bool:
+        """Return whether a run goes through an edge of a drift; the first of a drive may begin within it."""
+        return run.tube == tube and run.gear == gear and (first or self._covered(state.edge, run))
+
     def _is_last(self, state: _State) -> bool:
         """Return whether the tube does not go on behind this edge."""
         edge = self.network.edges[state.edge]
-        s = edge.end_m if state.direction > 0 else edge.start_m
-        return not any(
-            other.tube == edge.tube and abs((other.start_m if state.direction > 0 else other.end_m) - s) < 8.0
-            for other in self.network.edges
-            if other is not edge
-        )
+        node, s = (edge.end, edge.end_m) if state.direction > 0 else (edge.start, edge.start_m)
+        came = Branch(edge.tube, s, -state.direction)
+        return not any(branch.tube == edge.tube and branch != came for branch in self.network.nodes[node].branches)
 
     def _named(self, runs: list[Run], stop: Stop) -> list[Run]:
         """Return runs whose last one stops at the place that the route names."""

@@ -13,10 +13,11 @@ from lhdmap.machine import Machine
 from lhdmap.messages import FloatArray
 from lhdmap.mine.network import Branch, Edge, Network, Node
 from lhdmap.mine.plan import BLIND, LENGTH_M, PlacePlan
-from lhdmap.mine.stands import place_end, place_pose
+from lhdmap.mine.stands import kept_free_m, place_end, place_pose
 
 _STATION_M = 0.25
-_STAND_M = 12.0  # so far from the end of a drift one is at the place there
+_STAND_M = 12.0  # so far from the end of a drift one is at the place there,
+_STANDING_M = 5.0  # and where base_link of a machine is that stands there
 _LEVELS_M = 3.0
 _ANGLE_RAD = math.radians(9.0)  # arms that are so nearly one line have no corner between them
 
@@ -231,4 +232,5 @@ class Directory:
         if place.side != "end" or place.kind in BLIND:
             return -1, 0.0, 0.0, place.name
         tube, end_m, _ = place_end(self._network, place)
-        return tube, end_m - _STAND_M, end_m + _STAND_M, place.name
+        reach_m = max(_STAND_M, kept_free_m(self._network, tube, end_m) + _STANDING_M)
+        return tube, end_m - reach_m, end_m + reach_m, place.name

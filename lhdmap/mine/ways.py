@@ -18,6 +18,8 @@ from lhdmap.mine.stands import overhang_m
 STEP_M = 0.05
 _SMOOTH_M = 2.0  # curvature changes over about this way, as steering does
 _OFFSET_OVER_M = 3.0
+_SEARCHED_M = 15.0
+_BEYOND_M = 5.0
 
 
 class Leg(NamedTuple):
@@ -42,17 +44,55 @@ class Leg(NamedTuple):
         return STEP_M * (len(self.x_m) - 1)
 
 
-def legs_of(network: Network, runs: list[Run], machine: Machine, *, wander: FloatArray | None = None) -> list[Leg]:
-    """Return the legs of a route; `wander` (N, 2) is a lateral offset (m, m) by driven way that is added to it."""
+def legs_of(
+    network: Network,
+    runs: list[Run],
+    machine: Machine,
+    *,
+    start: FloatArray | None = None,
+    wander: FloatArray | None = None,
+) -> list[Leg]:
+    """Return the legs of a route.
+
+    `start` is x, y, z, heading (4,) of the machine's `base_link` before; `wander` (N, 2) a lateral offset (m, m) by driven
+    way that is added. After a change of gear the other axle leads, which stands a wheelbase back on the way that it came.
+    """
     legs, driven_m = [], 0.0
+    wheelbase_m = machine.dimensions.wheelbase_m
+    at = None if start is None else _axles(start, wheelbase_m)
     for group in _groups(runs):
         points = _points(network, group)
-        if points is None:
+        if points is not None and at is not None:
+            points = _from(points, at[0] if group[0].gear > 0 else at[1])
+        if points is None or len(points) < 3:
             continue
+        at = _ends(points, group[0].gear, wheelbase_m)
         leg = _leg(points, group[0].gear, machine, group[-1].stop, wander, driven_m)
         legs.append(leg)
         driven_m += leg.length_m
     return legs
+
+
+def _axles(pose: FloatArray, wheelbase_m: float) -> tuple[FloatArray, FloatArray]:
+    """Return where front and rear axle of a straight machine are, both (2,)."""
+    return pose[:2], pose[:2] - wheelbase_m * np.array([math.cos(pose[3]), math.sin(pose[3])])
+
+
+def _ends(points: FloatArray, gear: int, wheelbase_m: float) -> tuple[FloatArray, FloatArray]:
+    """Return where front and rear axle are at the end of a way of the leading one."""
+    way = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(points[:, :2], axis=0).T))])
+    before = way[-1] - wheelbase_m
+    trailing = np.array([np.interp(before, way, column) for column in points[:, :2].T])
+    if before < 0.0:
+        back = points[0, :2] - points[1, :2]
+        trailing = points[0, :2] - before * back / np.hypot(*back)
+    return (points[-1, :2], trailing) if gear > 0 else (trailing, points[-1, :2])
+
+
+def _from(points: FloatArray, place_m: FloatArray) -> FloatArray:
+    """Return a way from where it is nearest to a place (2,)."""
+    near = np.hypot(*(points[: round(_SEARCHED_M / STEP_M), :2] - place_m).T)
+    return points[int(np.argmin(near)) :]
 
 
 def _groups(runs: list[Run]) -> Iterator[list[Run]]:
@@ -84,22 +124,43 @@ def _points(network: Network, runs: list[Run]) -> FloatArray | None:
 
 
 def _leg(points: FloatArray, gear: int, machine: Machine, stop: str, wander: FloatArray | None, driven_m: float) -> Leg:
-    points = _smoothed(_resampled(points), _SMOOTH_M)
+    points = _resampled(points)
+    count, more = len(points), round(_BEYOND_M / STEP_M)
+    points = _smoothed(_extended(points, more), _SMOOTH_M)
     heading, curvature = _direction(points)
     offset = _smooth_values(_swing_out(curvature, machine, gear), _OFFSET_OVER_M)
     if wander is not None:
-        way = driven_m + STEP_M * np.arange(len(points))
-        ends = np.minimum(STEP_M * np.arange(len(points)), STEP_M * np.arange(len(points))[::-1])
-        offset = offset + np.interp(way, *wander.T) * np.clip(ends / 5.0, 0.0, 1.0)
-    points = points.copy()
+        way = STEP_M * (np.arange(len(points)) - more)
+        ends = np.clip(np.minimum(way, STEP_M * count - way) / 5.0, 0.0, 1.0)
+        offset = offset + np.interp(driven_m + way, *wander.T) * ends
     points[:, 0] -= offset * np.sin(heading)
     points[:, 1] += offset * np.cos(heading)
-    points = _resampled(points)
+    points = _resampled(points[more : more + count])
     heading, curvature = _direction(points)
     front, rear = machine.dimensions.joint_to_front_axle_m, machine.dimensions.joint_to_rear_axle_m
     lead, trail = (front, rear) if gear > 0 else (rear, front)
     bend = articulation_along_path(curvature, STEP_M, lead, trail)
     return Leg(gear, points[:, 0], points[:, 1], points[:, 2], heading, curvature, bend, stop)
+
+
+def _extended(points: FloatArray, more: int) -> FloatArray:
+    """Return a way that goes on at both ends, by `more` steps, as it bends there: what is smoothed keeps its bend."""
+    after = _arc_on(points, more)
+    before = _arc_on(points[::-1], more)
+    return np.concatenate([before[::-1], points, after])
+
+
+def _arc_on(points: FloatArray, more: int) -> FloatArray:
+    """Return the next steps of a way, shape (more, 3), by the bend and the grade of its last metre."""
+    last = points[-min(len(points), round(1.0 / STEP_M) + 1) :]
+    steps = np.diff(last[:, :2], axis=0)
+    headings = np.unwrap(np.arctan2(steps[:, 1], steps[:, 0]))
+    turn = float(np.polyfit(np.arange(len(headings)), headings, 1)[0]) if len(headings) > 2 else 0.0
+    heading = float(headings[-1]) + turn * np.arange(1, more + 1)
+    length = float(np.hypot(*steps[-1]))
+    climb = float(last[-1, 2] - last[0, 2]) / max(len(last) - 1, 1)
+    ahead = np.stack([length * np.cos(heading), length * np.sin(heading), np.full(more, climb)], axis=1)
+    return points[-1] + np.cumsum(ahead, axis=0)
 
 
 def _swing_out(curvature_pm: FloatArray, machine: Machine, gear: int) -> FloatArray:

@@ -30,9 +30,11 @@ def parts_of(scenario: Scenario) -> Parts:
         UsageError: there is no such place or route, or this version does not replay the kind.
         ConfigError: there is no such mine.
     """
-    if scenario.kind != "tram" or scenario.mission or scenario.goal:
-        what = f"kind = '{scenario.kind}'" + (" with a goal" if scenario.goal else "")
-        raise UsageError(f"{what}: this version replays kind = 'tram' along a route that an operator drives")
+    if scenario.kind != "tram" or scenario.mission:
+        what = f"kind = '{scenario.kind}'" + (" with a mission" if scenario.mission else "")
+        raise UsageError(
+            f"{what}: this version replays kind = 'tram', to a goal or along a route that an operator drives"
+        )
     from lhdmap.replay.mine_parts import mine_parts  # what a mine needs takes a second to load
 
     return mine_parts(scenario)

@@ -11,6 +11,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from lhdmap.simulation.history import START_NS
+
 _DIGITS = 9  # of a figure: more than matters, fewer than what another processor may round otherwise
 
 
@@ -38,7 +40,7 @@ class Journal:
     """Writes events as they come; none is kept. `now_ns` is the time of the engine."""
 
     def __init__(self, path: Path | None = None) -> None:
-        self.now_ns, self.lines = 0, 0
+        self.now_ns, self.lines = START_NS, 0
         self.listeners: list[Listener] = []
         self._hash = hashlib.sha256()
         self._file = None if path is None else path.open("wb")

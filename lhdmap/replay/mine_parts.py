@@ -19,13 +19,12 @@ from lhdmap.replay.faults import Position
 from lhdmap.replay.parts import Parts, Touch
 from lhdmap.replay.scenario import TELEOPERATOR, Scenario
 from lhdmap.simulation.history import START_NS, Column
+from lhdmap.simulation.mine_world.bumper import Bumper
 from lhdmap.simulation.mine_world.world import MineWorld
 from lhdmap.simulation.operator import Operator, OperatorSettings, wander_of
 from lhdmap.simulation.sensing.sections import SensorSettings
 from lhdmap.simulation.sensing.sensor import Sensor
 from lhdmap.simulation.sensing.suite import sensors_of
-from lhdmap.simulation.vehicle.bodies import Bodies
-from lhdmap.simulation.vehicle.contact import Contact
 from lhdmap.simulation.vehicle.state import VehicleState
 from lhdmap.simulation.vehicle.vehicle import Vehicle
 
@@ -39,16 +38,16 @@ class BodyBumper:
     """What the boxes of a machine touch in a mine."""
 
     def __init__(self, machine: Machine, world: MineWorld) -> None:
-        self._bodies, self._contact = Bodies(machine), Contact(world)
+        self._bumper = Bumper(machine, world)
 
     def touching(self, state: VehicleState) -> Sequence[Touch]:
         """Return the bodies that are in a wall."""
-        found = self._contact.touching(self._bodies.at(state))
+        found = self._bumper.touching(state)
         return [Touch(one.body, _point(one.point_m), one.depth_m) for one in found]
 
     def clearance_m(self, state: VehicleState) -> float:
         """Return the least distance of any body from a wall, at most 1 m."""
-        return self._contact.clearance_m(self._bodies.at(state), _LEAST_CLEAR_M)
+        return self._bumper.clearance_m(state, _LEAST_CLEAR_M)
 
 
 def mine_parts(scenario: Scenario) -> Parts:
@@ -64,7 +63,8 @@ def mine_parts(scenario: Scenario) -> Parts:
     settings = OperatorSettings(speed_kmh=scenario.speed_kmh, wander_m=scenario.wander_m)
     legs = _legs(scenario, network, machine, start, settings)
     world = MineWorld(network, machine)
-    vehicle = Vehicle(machine, world)
+    vehicle = Vehicle(machine, world, seed=scenario.seed)
+    places = _places(network, machine)
     way_m = sum(leg.length_m for leg in legs)
     return Parts(
         machine=machine,
@@ -75,7 +75,8 @@ def mine_parts(scenario: Scenario) -> Parts:
         operator=Operator(legs, machine, settings, seed=scenario.seed),
         bumper=BodyBumper(machine, world),
         changing=world,
-        places=_places(network, machine),
+        places=places,
+        goal_m=places.get(scenario.goal),
         lines_m=_walls(network),
         expected_s=_SLOWER * way_m / (scenario.speed_kmh / 3.6) + 10.0,
     )
@@ -85,10 +86,12 @@ def _legs(
     scenario: Scenario, network: Network, machine: Machine, start: Start, settings: OperatorSettings
 ) -> list[Leg]:
     planner = Planner(network, machine)
-    stops = parse_route(scenario.route, network.plan) if scenario.route else []
+    route = scenario.route or scenario.goal
+    stops = parse_route(route, network.plan) if route else []
     runs = planner.route(start, stops) if stops else planner.teaching(start)
     way_m = sum(abs(run.to_m - run.from_m) for run in runs)
-    return legs_of(network, runs, machine, wander=wander_of(settings, way_m, scenario.seed))
+    pose = network.tubes[start.tube].pose(start.at_m, start.facing)
+    return legs_of(network, runs, machine, start=pose, wander=wander_of(settings, way_m, scenario.seed))
 
 
 def _state(vehicle: Vehicle, pose: FloatArray, scenario: Scenario) -> VehicleState:

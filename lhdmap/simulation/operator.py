@@ -73,7 +73,7 @@ class Operator:
         self._front_m, self._rear_m = size.joint_to_front_axle_m, size.joint_to_rear_axle_m
         self._top_mps, self._rate_rps = size.max_speed_kmh / 3.6, math.radians(size.max_articulation_rate_dps)
         self._delay_s = machine.drive.dead_time_s + period_s
-        self._lag_s = machine.drive.time_constant_s
+        self._lag_s = machine.drive.lag_s
         self._given: deque[float] = deque([0.0] * max(round(self._delay_s / period_s), 1))
         rng = np.random.default_rng([seed, 78])
         self._phase = rng.uniform(0.0, 2 * np.pi, 2)

@@ -91,7 +91,9 @@ def rays_of(
     """Return rays (N, 6), origin less `origin_m` and unit direction in `map`, and ranges to the own body (N,)."""
     rays = np.empty((sweep.times_s.size, 6), dtype=np.float32)
     blocked = np.empty(len(rays), dtype=np.float32)
-    fill_rays(history.rows, history.split(stamp_ns), history.rate_hz, tuple(sweep), tuple(rig), origin_m, rays, blocked)
+    parts = (rig.T_parent_sensor, rig.on_rear, rig.joint_m, rig.front_boxes_m, rig.rear_boxes_m)
+    beams = (sweep.directions, sweep.times_s)
+    fill_rays(history.rows, history.split(stamp_ns), history.rate_hz, beams, parts, origin_m, rays, blocked)
     return rays, blocked
 
 
@@ -124,7 +126,7 @@ def measured(
     ranges = exact_m.astype(float)
     if settings.mixed_pixel_share > 0.0:
         ranges = _mixed(ranges, settings.mixed_pixel_share, rng)
-    if settings.dust_share > 0.0:
+    if dust.any():
         near = 0.5 + rng.exponential(3.0, ranges.shape)
         ranges = np.where((rng.random(ranges.shape) < dust[:, None]) & (near < ranges), near, ranges)
     if settings.noise_m > 0.0:

@@ -39,6 +39,10 @@ class View(Protocol):
         """Return what rays from a point (3,) of `map` meet, to cast them against."""
         ...
 
+    def dust(self, position_m: FloatArray) -> float:
+        """Return the share of beams (0 to 1) that dust returns to a scanner at a point (3,)."""
+        ...
+
 
 class Surroundings(Ground, View, Protocol):
     """A world to drive and look around in."""

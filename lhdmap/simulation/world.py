@@ -9,7 +9,6 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from lhdmap.errors import ConfigError
 from lhdmap.kinematics import articulation_along_path
@@ -29,7 +28,8 @@ from lhdmap.simulation.scenario import DriftScenario, flattened
 from lhdmap.simulation.timetable import timetable
 
 _PIECE_M = 30.0
-_PLACE_STEP = 20  # of the centre line's samples, to find a place on it
+_TILE_M = 60.0  # a drift that is no longer than what is seen from such a stretch is one tile
+_PLACE_STEP = 50  # of the centre line's samples, to find a place on it
 FRONT = "lidar_front"
 _VIEW_M = 0.25  # how far a scanner's height is above the bucket: it is mounted where its view is free
 BEHIND_M, _AHEAD_M = 14.0, 20.0  # drift behind the machine's start and ahead of its end
@@ -46,9 +46,10 @@ class DriftWorld:
         self.crossing = self._make_crossing()
         self.pile = self._make_pile()
         self.history = self._make_history()
-        self._places = cKDTree(self._line_points())
+        self._line_points = self._points_on_line()
         reach_m = min(self.scenario.sensors.reach_m, 85.0) + 15.0
-        self.surface = TiledSurface(self.mesh_between, reach_m, tile_m=40.0 if self.pile is None else 1e6)
+        whole = self.pile is not None or self.drift.line.length_m <= 2.0 * reach_m + _TILE_M
+        self.surface = TiledSurface(self.mesh_between, reach_m, tile_m=1e6 if whole else _TILE_M)
 
     def rng(self, name: str) -> np.random.Generator:
         """Return the source of chance of the part `name`: independent of all others and of the order of use."""
@@ -98,7 +99,7 @@ class DriftWorld:
         rows[:, Column.WHEEL_SPEED] *= slip_factors(self.scenario.wheels, time_s, self.rng("slip"))
         return History(TABLE_RATE_HZ, rows)
 
-    def _line_points(self) -> FloatArray:
+    def _points_on_line(self) -> FloatArray:
         line = self.drift.line
         return np.stack([line.x_m, line.y_m, line.z_m], axis=1)[::_PLACE_STEP]
 
@@ -128,7 +129,13 @@ class DriftWorld:
 
     def place_m(self, position_m: FloatArray) -> float:
         """Return the place along the drift that is nearest to a point (3,), metres."""
-        return float(self.drift.line.s_m[_PLACE_STEP * int(self._places.query(position_m)[1])])
+        offsets = self._line_points - position_m
+        nearest = int(np.einsum("ij,ij->i", offsets, offsets).argmin())
+        return float(self.drift.line.s_m[_PLACE_STEP * nearest])
+
+    def dust(self, position_m: FloatArray) -> float:  # noqa: ARG002  # it is nowhere
+        """Return the share of beams that dust returns at a place: it hangs nowhere, clouds come with time."""
+        return 0.0
 
     def near(self, position_m: FloatArray) -> Surface:
         """Return the surface that rays from a point (3,) near the centre line meet."""

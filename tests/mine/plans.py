@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from typing import Any
+
 from lhdmap.mine.network import Network, make_network
 from lhdmap.mine.plan import MinePlan
 from lhdmap.settings_tree import tree_from
@@ -15,16 +18,16 @@ TEE = {
 }
 
 
-def plan_of(table: dict[str, object], **more: object) -> MinePlan:
+def plan_of(table: dict[str, Any], **more: Any) -> MinePlan:
     """Return the plan of a table as in a TOML file."""
     return tree_from(MinePlan, {**table, **more})
 
 
-def network_of(table: dict[str, object], **more: object) -> Network:
+def network_of(table: dict[str, Any], **more: Any) -> Network:
     """Return the network of such a table."""
     return make_network(plan_of(table, **more))
 
 
-def lines(*drifts: tuple[str, list[list[float]]]) -> dict[str, object]:
+def lines(*drifts: tuple[str, Sequence[Sequence[float]]]) -> dict[str, Any]:
     """Return a plan of drifts with these centre lines alone."""
     return {"drift": [{"name": name, "line_m": line} for name, line in drifts]}

@@ -60,6 +60,7 @@ def test_a_biarc_leads_from_pose_to_pose(x: float, y: float, start: float, end: 
     turned = math.remainder(float(line.heading_rad[-1]) - end, 2 * math.pi)
     assert turned == pytest.approx(0.0, abs=1e-6)
     assert line.heading_rad[0] == pytest.approx(start, abs=1e-9)
+    assume(np.abs(line.curvature_pm).max() < 10.0)  # else an arc is shorter than a step
     steps = np.hypot(np.diff(line.x_m), np.diff(line.y_m))
     assert steps == pytest.approx(np.diff(line.s_m), rel=3e-2, abs=1e-6)
 

@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 import pytest
 from lhdmap.errors import ConfigError
+from lhdmap.mine.network import Network
 from lhdmap.mine.plan import find_plan, load_plan
 
 from tests.mine.plans import TEE, lines, network_of
 
 
-def degrees(network: object) -> list[int]:
-    return sorted(node.degree for node in network.nodes)  # type: ignore[attr-defined]
+def degrees(network: Network) -> list[int]:
+    return sorted(node.degree for node in network.nodes)
 
 
 def test_a_tee_has_one_intersection_and_three_dead_ends() -> None:
@@ -35,7 +37,7 @@ def test_a_tee_has_one_intersection_and_three_dead_ends() -> None:
         (lines(("A", [[0, 0, 0], [60, 0, 0], [60, 60, 0], [0, 60, 0], [0, 0, 0]])), [2]),
     ],
 )  # fmt: skip
-def test_lines_join_where_they_meet_in_space(table: dict[str, object], found: list[int]) -> None:
+def test_lines_join_where_they_meet_in_space(table: dict[str, Any], found: list[int]) -> None:
     assert degrees(network_of(table)) == found
 
 
@@ -83,7 +85,7 @@ def test_a_junction_that_is_none_is_refused() -> None:
         network_of(TEE, junction=[{"at": [10, 0, 0]}])
 
 
-def place(**values: object) -> list[dict[str, object]]:
+def place(**values: Any) -> list[dict[str, Any]]:
     return [{"drift": "A", "at_m": 20.0, "name": "P", **values}]
 
 
@@ -114,7 +116,7 @@ def test_a_passing_bay_widens_its_drift() -> None:
         ({"kind": "niche", "site": "left"}, "unknown setting 'site'; did you mean 'side'"),
     ],
 )
-def test_wrong_places_are_refused(values: dict[str, object], told: str) -> None:
+def test_wrong_places_are_refused(values: dict[str, Any], told: str) -> None:
     with pytest.raises(ConfigError, match=told.replace("(", r"\(")):
         network_of(TEE, place=place(**values))
 

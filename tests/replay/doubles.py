@@ -71,6 +71,10 @@ class Corridor:
         self._base, self.appeared = parts, {}  # type: list[Mesh], dict[str, Mesh]
         self._surface: Surface | None = None
 
+    def dust(self, position_m: FloatArray) -> float:
+        """Return that none hangs anywhere."""
+        return 0.0
+
     def near(self, position_m: FloatArray) -> Surface:
         if self._surface is None:
             self._surface = Surface(_together([*self._base, *self.appeared.values()]))

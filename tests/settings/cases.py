@@ -128,6 +128,7 @@ _SETTINGS = {
     "integration.range_min_m": Case("tilted", 3.0),
     "integration.range_max_m": Case("tilted", 5.0),
     "integration.min_hits": Case("tilted", 8),
+    "integration.normal_min_neighbours": Case("tilted", 20),
     "trust.tilted_unlevelled_walk": Case("unlevelled"),
     "smoothing.realign": Case("tilted"),
     "smoothing.node_m": Case("tilted"),

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
+import numpy as np
 import pytest
 from lhdmap.cli.main import main
 from lhdmap.errors import ConfigError, InputError
@@ -108,3 +109,26 @@ def test_wrong_use_is_exit_code_2_and_writes_nothing(
     assert main(["simulate", *words, *QUICK]) == 2
     assert capsys.readouterr().err.startswith("lhdmap: ")
     assert list(tmp_path.iterdir()) == []
+
+
+def test_faults_of_a_file_are_in_the_log_and_in_the_scenario_beside_it(tmp_path: Path) -> None:
+    from lhdmap.logs.source import LogSource
+
+    faults = tmp_path / "faults.toml"
+    faults.write_text('[[fault]]\nat_s = 1.0\nkind = "dead"\ntarget = "/inclinometer"\nduration_s = 0.5\n')
+    first, again = tmp_path / "faulty.mcap", tmp_path / "again.mcap"
+    assert main(["simulate", "drift", *QUICK, "--faults", str(faults), "-o", str(first)]) == 0
+    with LogSource(first) as source:
+        stamps = np.array([message.stamp_ns for _, message in source.messages(["inclinometer"])])
+    assert np.flatnonzero(np.diff(stamps) > 10_000_001).tolist() == [99]
+    assert stamps[100] - stamps[99] == pytest.approx(510_000_000, abs=1)
+    assert main(["simulate", str(tmp_path / "faulty.scenario.toml"), "--quiet", "-o", str(again)]) == 0
+    assert again.read_bytes() == first.read_bytes()
+
+
+def test_a_fault_of_a_sensor_that_is_not_there_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    faults = tmp_path / "faults.toml"
+    faults.write_text('[[fault]]\nkind = "dead"\ntarget = "/lidar/rear/scan"\n')
+    assert main(["simulate", "drift", *QUICK, "--faults", str(faults), "-o", str(tmp_path / "x.mcap")]) == 2
+    assert "no sensor writes to target '/lidar/rear/scan'" in capsys.readouterr().err
+    assert list(tmp_path.iterdir()) == [faults]

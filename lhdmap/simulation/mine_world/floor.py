@@ -16,7 +16,7 @@ from lhdmap.messages import FloatArray
 from lhdmap.mine.network import Network
 from lhdmap.mine.plan import FloorPlan
 
-_STATION_M = 0.25
+_STATION_M = 0.5
 _CELL_M = 4.0
 _BEYOND_M = 1.0  # a drift's floor counts so far beyond its wall
 _OTHER_LEVEL_M = 2.6  # stations this far above or below a point are another level's

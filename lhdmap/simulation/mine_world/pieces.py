@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import functools
+import heapq
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -38,6 +40,8 @@ class Pieces:
         self._network, self._floor = network, Floor(network, network.plan.floor, network.plan.seed)
         self.all = _pieces(network)
         self.boxes_m = np.stack([piece.box_m for piece in self.all])
+        self._middles = self.boxes_m.mean(axis=1)
+        self._adjacent = _adjacent(self.all)
         self._drift = functools.lru_cache(maxsize=None)(self._make_drift)
         self._volume = functools.lru_cache(maxsize=64)(self._make_volume)
 
@@ -48,6 +52,21 @@ class Pieces:
             skin_of(self._drift(piece.tube), piece.first, piece.last), [self._volume(*one) for one in piece.neighbours]
         )
         return Skin(without_unused(skin.mesh), skin.floor)
+
+    def within(self, here: Sequence[int], reach_m: float) -> set[int]:
+        """Return the pieces that lie within a way through the mine of some of them: rock hides the others."""
+        ways = dict.fromkeys(here, 0.0)
+        queue = [(0.0, index) for index in here]
+        while queue:
+            way, index = heapq.heappop(queue)
+            if way > ways[index]:
+                continue
+            for other in self._adjacent[index]:
+                further = way + float(np.linalg.norm(self._middles[other] - self._middles[index]))
+                if further <= reach_m + PIECE_M and further < ways.get(other, np.inf):
+                    ways[other] = further
+                    heapq.heappush(queue, (further, other))
+        return set(ways)
 
     def floor_height(self, points_m: FloatArray) -> FloatArray:
         """Return the floor's height (N,) under points (N, 3); their z says which level."""
@@ -84,6 +103,28 @@ def _pieces(network: Network) -> list[Piece]:
             box[1, 2] += float(one.heights_m[:, 1].max()) - reach + _BESIDE_M
             found.append(Piece(tube, first, last, box, _neighbours(part, rows[near], tube)))
     return found
+
+
+def _adjacent(pieces: list[Piece]) -> list[list[int]]:
+    """Return of each piece those that it opens into: before and behind it, and those that cut it."""
+    by_tube: dict[int, list[int]] = {}
+    for index, piece in enumerate(pieces):
+        by_tube.setdefault(piece.tube, []).append(index)
+    found: list[set[int]] = [set() for _ in pieces]
+    for index, piece in enumerate(pieces):
+        own = by_tube[piece.tube]
+        place = own.index(index)
+        near = {*own[max(place - 1, 0) : place], *own[place + 1 : place + 2]}
+        for tube, _, _ in piece.neighbours:
+            near |= {k for k in by_tube[tube] if _boxes_overlap(pieces[k].box_m, piece.box_m)}
+        for other in near:
+            found[index].add(other)
+            found[other].add(index)
+    return [sorted(one) for one in found]
+
+
+def _boxes_overlap(a: FloatArray, b: FloatArray) -> bool:
+    return bool(((a[0] < b[1]) & (a[1] > b[0])).all())
 
 
 def _stations(network: Network, tube: int) -> FloatArray:

@@ -9,13 +9,13 @@ from typing import NamedTuple, Protocol, TypeVar
 
 import numpy as np
 import numpy.typing as npt
+from scipy.spatial import KDTree
 
 from lhdmap.errors import ConfigError
 from lhdmap.machine import Machine
 from lhdmap.messages import FloatArray
 from lhdmap.mine.network import Network
 from lhdmap.mine.plan import DustPlan, PlacePlan, WetPlan
-from lhdmap.mine.polyline import on_line
 from lhdmap.mine.stands import PIT_M, place_end
 from lhdmap.simulation.drift import FloorHeight, Mesh
 from lhdmap.simulation.mine_world.hollow import Skin
@@ -26,15 +26,19 @@ from lhdmap.simulation.raycast import Layered, Surface
 from lhdmap.simulation.surroundings import Rays
 
 Zone = TypeVar("Zone", WetPlan, DustPlan)
-TILE_M = 60.0
-_SCENES = 3  # that are kept: a machine may go to and fro between two
+TILE_M = 100.0
+_WHOLE_PIECES = 120  # of a mine that is one scene: some 1.8 km, 3 million triangles, 400 MiB
+_PIECES = 512  # that are kept: the surface of some 6 km
+_STATION_M = 0.5
+_SCENES = 2  # that are kept: a machine may go to and fro between two
 
 
 class Thing(NamedTuple):
-    """Something that stands in the mine: its mesh, and the box around it (2, 3)."""
+    """Something that stands in the mine: its mesh, the box around it (2, 3), and which of its kind it is."""
 
     mesh: Mesh
     box_m: FloatArray
+    version: int = 0
 
 
 class Skins(Protocol):
@@ -62,8 +66,10 @@ class MineWorld:
         self._pieces = None if network.plan.surface.file else Pieces(network)
         self._skins: Skins = SurveyedSkins(network) if self._pieces is None else self._pieces
         self._boxes = self._skins.boxes_m
-        self.piece = functools.lru_cache(maxsize=4096)(self._make_piece)
+        self._line = functools.lru_cache(maxsize=None)(self._make_line)
+        self.piece = functools.lru_cache(maxsize=_PIECES)(self._make_piece)
         self._scenes: OrderedDict[frozenset[int], Surface] = OrderedDict()
+        self._here: tuple[tuple[float, ...], Surface] | None = None
         self._things: dict[str, Thing] = {}
         self._passing: dict[str, tuple[Thing, Surface]] = {}
         self._version = 0
@@ -75,8 +81,10 @@ class MineWorld:
 
     def near(self, position_m: FloatArray) -> Rays:
         """Return what rays from a point (3,) of `map` meet."""
-        tile = (np.floor(position_m[:2] / TILE_M) + 0.5) * TILE_M
-        scene = self._scene(tile, float(position_m[2]))
+        tile = tuple(((np.floor(position_m / TILE_M) + 0.5) * TILE_M).tolist())
+        if self._here is None or self._here[0] != tile:
+            self._here = (tile, self._scene(np.array(tile)))
+        scene = self._here[1]
         return scene if not self._passing else Layered(scene, [surface for _, surface in self._passing.values()])
 
     def floor_height(self, points_m: FloatArray) -> FloatArray:
@@ -90,25 +98,34 @@ class MineWorld:
 
     def friction(self, position_m: FloatArray) -> float:
         """Return the friction of tyres on the floor at a point (3,)."""
-        wet = self._wet_at(position_m)
-        return self.network.plan.floor.friction if wet is None else wet.friction
+        plan = self.network.plan
+        return min((zone.friction for zone in self._zones_at(plan.wet, position_m)), default=plan.floor.friction)
 
     def dust(self, position_m: FloatArray) -> float:
         """Return the share of beams that dust returns to a scanner at a point (3,)."""
         return max((one.share for one in self._zones_at(self.network.plan.dust, position_m)), default=0.0)
 
-    def walls(self, box_m: FloatArray) -> Iterator[tuple[int | str, Mesh]]:
-        """Yield what bodies within a box (2, 3) may touch: each with a key under which it stays the same, and its walls.
+    def keys_in(self, box_m: FloatArray) -> list[int | str]:
+        """Return keys of the pieces and things that overlap a box (2, 3); what has a key stays as it is."""
+        things = {**self._things, **{name: thing for name, (thing, _) in self._passing.items()}}
+        pieces: list[int | str] = list(np.flatnonzero(_overlap(self._boxes, box_m)).tolist())
+        return pieces + [
+            f"{name}#{thing.version}" for name, thing in things.items() if _overlap(thing.box_m[None], box_m)[0]
+        ]
 
-        Floors are not in it; wheels stand on them.
-        """
-        for index in np.flatnonzero(_overlap(self._boxes, box_m)).tolist():
-            skin = self.piece(index)
-            if not skin.floor.all():
-                yield index, Mesh(skin.mesh.vertices_m, skin.mesh.triangles[~skin.floor])
-        for name, thing in {**self._things, **{k: v for k, (v, _) in self._passing.items()}}.items():
-            if _overlap(thing.box_m[None], box_m)[0]:
-                yield f"{name} {self._version}", thing.mesh
+    def solid(self, key: int | str) -> tuple[Mesh, npt.NDArray[np.bool_] | None]:
+        """Return the mesh behind a key, and which of its triangles are floor (None: none)."""
+        if isinstance(key, int):
+            skin = self.piece(key)
+            return skin.mesh, skin.floor
+        name = key.rpartition("#")[0]
+        thing = self._passing[name][0] if name in self._passing else self._things[name]
+        return thing.mesh, None
+
+    @property
+    def version(self) -> int:
+        """Goes up whenever something appears, goes or changes."""
+        return self._version
 
     # What changes.
 
@@ -120,14 +137,15 @@ class MineWorld:
 
     def stand(self, name: str, mesh: Mesh) -> None:
         """Put something into the mine that stays for long (scenes are made anew)."""
-        self._things[name] = _thing(mesh)
         self._version += 1
+        self._things[name] = _thing(mesh, self._version)
         self._scenes.clear()
+        self._here = None
 
     def appear(self, name: str, mesh: Mesh) -> None:
         """Put something into the mine that comes and goes: a person, an obstacle."""
-        self._passing[name] = (_thing(mesh), Surface(mesh))
         self._version += 1
+        self._passing[name] = (_thing(mesh, self._version), Surface(mesh))
 
     def vanish(self, name: str) -> None:
         """Take away what has appeared."""
@@ -148,17 +166,20 @@ class MineWorld:
         pit = None if self._pieces is None else self._pits.get(self._pieces.all[index].tube)
         return skin if pit is None else _opened(skin, *pit)
 
-    def _scene(self, tile_m: FloatArray, z_m: float) -> Surface:
-        reach = self.view_m + 0.75 * TILE_M
-        centre = np.array([*tile_m, z_m])
-        box = np.stack([centre - reach, centre + reach])
-        inside = frozenset(np.flatnonzero(_overlap(self._boxes, box)).tolist())
+    def _scene(self, tile_m: FloatArray) -> Surface:
+        """Return what can be seen from a tile; of a small mine all, which need not be made anew."""
+        half = 0.5 * TILE_M + (0.0 if self._pieces is not None else self.view_m)
+        half = half if len(self._boxes) > _WHOLE_PIECES else np.inf
+        box = np.stack([tile_m - half, tile_m + half])
+        here = np.flatnonzero(_overlap(self._boxes, box)).tolist()
+        inside = frozenset(here if self._pieces is None else self._pieces.within(here, self.view_m))
         found = self._scenes.get(inside)
         if found is None:
             while len(self._scenes) >= _SCENES:
                 self._scenes.popitem(last=False)  # the old one goes before the new one takes its memory
             parts = [self.piece(index).mesh for index in sorted(inside)]
-            parts += [thing.mesh for thing in self._things.values() if _overlap(thing.box_m[None], box)[0]]
+            around = box + np.array([[-self.view_m], [self.view_m]])
+            parts += [thing.mesh for thing in self._things.values() if _overlap(thing.box_m[None], around)[0]]
             found = self._scenes[inside] = Surface(_together(parts))
         self._scenes.move_to_end(inside)
         return found
@@ -179,22 +200,25 @@ class MineWorld:
         index, _, _ = place_end(self.network, place)
         return pile_of(self.network, place, self._pieces.drift(index), self.machine, taken_m)
 
-    def _wet_at(self, position_m: FloatArray) -> WetPlan | None:
-        return next(iter(self._zones_at(self.network.plan.wet, position_m)), None)
-
     def _zones_at(self, zones: Sequence[Zone], position_m: FloatArray) -> list[Zone]:
+        """Return the zones that a point is in."""
         found = []
         for zone in zones:
             tube = self.network.tubes[self.network.tube(zone.drift)]
-            s = float(on_line(tube.line, position_m)[0])
-            apart = float(np.linalg.norm(tube.pose(s)[:3] - position_m))
+            apart, station = self._line(zone.drift).query(position_m)
+            s = float(station) * _STATION_M
             if zone.from_m <= s <= zone.to_m and apart < tube.half_width_m(s) + 3.0:
                 found.append(zone)
         return found
 
+    def _make_line(self, drift: str) -> KDTree:
+        """Return a tree of points each `_STATION_M` on the centre line of a drift."""
+        tube = self.network.tubes[self.network.tube(drift)]
+        return KDTree(tube.line.at(np.arange(0.0, tube.length_m, _STATION_M))[:, :3])
 
-def _thing(mesh: Mesh) -> Thing:
-    return Thing(mesh, np.stack([mesh.vertices_m.min(axis=0), mesh.vertices_m.max(axis=0)]))
+
+def _thing(mesh: Mesh, version: int = 0) -> Thing:
+    return Thing(mesh, np.stack([mesh.vertices_m.min(axis=0), mesh.vertices_m.max(axis=0)]), version)
 
 
 def _overlap(boxes_m: FloatArray, box_m: FloatArray) -> npt.NDArray[np.bool_]:

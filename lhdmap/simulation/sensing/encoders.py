@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import NamedTuple
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -19,7 +19,8 @@ _STALLED_MPS = 0.05
 _AT_REST_MPS = 1e-6
 
 
-class JointEncoders(NamedTuple):
+@dataclass(frozen=True, slots=True)
+class JointEncoders:
     """Angles and rates of articulation, boom and bucket, with white noise."""
 
     noise_rad: float
@@ -40,7 +41,8 @@ class JointEncoders(NamedTuple):
         return Joints(stamp_ns, positions, speeds)
 
 
-class DriveLineSpeed(NamedTuple):
+@dataclass(frozen=True, slots=True)
+class DriveLineSpeed:
     """Speed of the drive line with an error of scale, and white noise while it turns."""
 
     scale: float
@@ -59,7 +61,8 @@ def drive_line_speed(settings: WheelSettings, seed: int) -> DriveLineSpeed:
     return DriveLineSpeed(1.0 + sign * settings.scale_error, settings.noise_mps)
 
 
-class PressureGauge(NamedTuple):
+@dataclass(frozen=True, slots=True)
+class PressureGauge:
     """A pressure (bar) of a state, with white noise."""
 
     bar_of: Callable[[PressureSettings, FloatArray], float]
@@ -95,4 +98,4 @@ def tilt_bar(settings: PressureSettings, state: FloatArray) -> float:
 
 def true_pose(stamp_ns: int, state: FloatArray, rng: np.random.Generator) -> GroundTruth:
     """Return the exact pose of `base_link` in `map`."""
-    return GroundTruth(stamp_ns, state[:3].copy(), se3.quaternions_from_rpy(state[3:4], state[4:5], state[5:6])[0])
+    return GroundTruth(stamp_ns, state[:3].copy(), se3.quaternion_from_rpy(*state[3:6].tolist()))

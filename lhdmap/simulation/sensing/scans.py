@@ -38,7 +38,8 @@ class Scanner:
         stamp_ns, due_ns = self.beat.stamp_ns, self.next_ns
         time_s = np.array([(stamp_ns - START_NS) / SECOND_NS])
         exact = obstructed(self.exact_m(history, world, stamp_ns)[None], time_s, self._settings)
-        dust = np.array([self._dust.share(float(time_s[0]))])
+        hanging = world.dust(history.state(stamp_ns)[:3])
+        dust = np.array([max(self._dust.share(float(time_s[0])), hanging)])
         ranges = measured(exact, self._settings, dust, self._chance.of(self.beat.index))[0]
         self.beat.advance()
         return [Record(self.topic, due_ns, self._scan(stamp_ns, ranges))]

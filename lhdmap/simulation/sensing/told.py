@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from typing import NamedTuple
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -18,7 +18,8 @@ Told = Callable[[int, FloatArray], str]
 """A text for a stamp and the machine's state at it, shape (17,); empty for nothing to say."""
 
 
-class Words(NamedTuple):
+@dataclass(frozen=True, slots=True)
+class Words:
     """Texts that something else knows; `Sampled` asks for them."""
 
     told: Told

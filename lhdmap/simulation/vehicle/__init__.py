@@ -1,1 +1,1 @@
-"""The machine as it moves: stepped by commands, over the floor of a world, with bodies that may touch its walls."""
+"""The machine that is stepped: drive, brakes, steering, boom and bucket on a floor, and the contact of its bodies."""

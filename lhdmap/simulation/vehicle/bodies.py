@@ -1,70 +1,108 @@
-"""The machine's bodies as boxes in space: those of both frames, and boom and bucket where their joints have moved them."""
+"""Where the bodies of a machine are: its boxes in `map`, the bucket's where boom and bucket hold it."""
 
 from __future__ import annotations
 
 import math
 from typing import NamedTuple
 
+import numba as nb
 import numpy as np
 
-from lhdmap.geometry import se3
-from lhdmap.kinematics import T_base_rear
-from lhdmap.machine import BodyBox, Machine
+from lhdmap.machine import Machine
+from lhdmap.machine_sections import Linkage
 from lhdmap.messages import FloatArray
-from lhdmap.simulation.vehicle.state import BOOM_LIFT_RAD, BUCKET_TILT_RAD, VehicleState
-
-_FLOOR_M = 0.15  # what of a body is lower is not tested: it stands on the floor, and small stones pass under it
+from lhdmap.simulation.vehicle.state import VehicleState
 
 
 class Boxes(NamedTuple):
-    """Boxes in `map`: names, middles (B, 3), axes as rows (B, 3, 3), half sizes (B, 3); metres."""
+    """Oriented boxes in `map`: names, centres (K, 3), axes as columns (K, 3, 3), half lengths along them (K, 3), m."""
 
     names: tuple[str, ...]
-    middle_m: FloatArray
+    centre_m: FloatArray
     axes: FloatArray
     half_m: FloatArray
 
-    @property
-    def around_m(self) -> FloatArray:
-        """The box around all, along the axes of `map`, shape (2, 3)."""
-        reach = np.abs(self.axes * self.half_m[:, :, None]).sum(axis=1)
-        return np.stack([(self.middle_m - reach).min(axis=0), (self.middle_m + reach).max(axis=0)])
-
 
 class Bodies:
-    """The boxes of a machine in any state."""
+    """The boxes of a machine: fixed to the front or the rear body, but for the bucket's."""
 
     def __init__(self, machine: Machine) -> None:
-        self._machine = machine
-        self._parts = [(name, body) for name, body in machine.bodies.items()]
-        low_high = np.array([[_raised(body), body.max_m] for _, body in self._parts], dtype=float)
-        self._middle_m, self._half_m = low_high.mean(axis=1), 0.5 * (low_high[:, 1] - low_high[:, 0])
+        size = machine.dimensions
+        self._linkage = machine.linkage
+        self._joint_m = (size.joint_to_front_axle_m, size.joint_to_rear_axle_m)
+        self._names = tuple(machine.bodies)
+        bodies = machine.bodies.values()
+        self._front = np.array([body.frame == "base_link" for body in bodies])
+        self._corners = np.array([(body.min_m, body.max_m) for body in bodies], dtype=float).reshape(-1, 2, 3)
+        self._buckets = [i for i, name in enumerate(self._names) if "bucket" in name and self._front[i]]
+        self._posture = (self._linkage.boom_min_rad, self._linkage.bucket_max_rad)
+        self._held = self._corners
 
-    def at(self, state: VehicleState) -> Boxes:
+    def corners(self, boom_rad: float, bucket_rad: float) -> FloatArray:
+        """Return the lower and upper corner of each box in the frame of its body, shape (K, 2, 3), m.
+
+        The bucket's box stays upright: it has its file's size in tramming posture, and each side moves as far as
+        that side of the bucket's outline. It has the whole bucket in it in any posture, not the arms of a raised boom.
+        """
+        if (boom_rad, bucket_rad) != self._posture:
+            self._posture, self._held = (boom_rad, bucket_rad), self._corners.copy()
+            self._held[self._buckets] += _moved_sides(self._linkage, boom_rad, bucket_rad)
+        return self._held
+
+    def boxes(self, state: VehicleState) -> Boxes:
         """Return the boxes in `map`."""
-        T_map_base = se3.from_rpy(state.roll_rad, state.pitch_rad, state.yaw_rad, (state.x_m, state.y_m, state.z_m))
-        T_of = {"base_link": T_map_base, "rear_link": T_map_base @ T_base_rear(state.articulation_rad, self._machine)}
-        middles, axes = np.empty((len(self._parts), 3)), np.empty((len(self._parts), 3, 3))
-        for k, (name, body) in enumerate(self._parts):
-            T = T_of[body.frame]
-            if name == self._machine.linkage.body:
-                T = T @ self._T_base_bucket(state)
-            middles[k], axes[k] = T[:3, :3] @ self._middle_m[k] + T[:3, 3], T[:3, :3].T
-        return Boxes(tuple(name for name, _ in self._parts), middles, axes, self._half_m)
-
-    def _T_base_bucket(self, state: VehicleState) -> FloatArray:  # noqa: N802  # frames in the name
-        """Return how boom and bucket have moved from the tramming posture: with the pin, and turned about it."""
-        arm = self._machine.linkage
-        x, z = arm.pivot_m
-        tramming, now = BOOM_LIFT_RAD - 0.472, state.boom_rad - 0.472  # the boom's own angle, loading prototype
-        pin = np.array([x + arm.boom_m * math.cos(tramming), 0.0, z + arm.boom_m * math.sin(tramming)])
-        moved = np.array([x + arm.boom_m * math.cos(now), 0.0, z + arm.boom_m * math.sin(now)])
-        turn = (state.bucket_rad - BUCKET_TILT_RAD) + 0.5 * (state.boom_rad - BOOM_LIFT_RAD)
-        T = se3.from_rpy(0.0, -turn, 0.0, (0.0, 0.0, 0.0))
-        T[:3, 3] = moved - T[:3, :3] @ pin
-        return T
+        corners = self.corners(state.boom_rad, state.bucket_rad)
+        centre, axes, half = _placed(np.array(state[1:8]), self._joint_m, self._front, corners)
+        return Boxes(self._names, centre, axes, half)
 
 
-def _raised(body: BodyBox) -> tuple[float, float, float]:
-    x, y, z = body.min_m
-    return x, y, max(z, _FLOOR_M)
+def body_boxes(machine: Machine, state: VehicleState) -> Boxes:
+    """Return the boxes of all bodies of `machine` in `map`; `Bodies` is for many states."""
+    return Bodies(machine).boxes(state)
+
+
+def bucket_outline(linkage: Linkage, boom_rad: float, bucket_rad: float) -> FloatArray:
+    """Return pin, lip, heel and upper edge of the bucket as x, z in `base_link`, shape (4, 2), m."""
+    lifted, tilted = boom_rad - linkage.boom_min_rad, bucket_rad - linkage.bucket_max_rad
+    arm = linkage.boom_angle_rad + lifted
+    angle = linkage.bucket_angle_rad + tilted + linkage.boom_to_bucket * lifted
+    pin = np.array(linkage.pivot_m) + linkage.boom_m * np.array([math.cos(arm), math.sin(arm)])
+    c, s = math.cos(angle), math.sin(angle)
+    points = np.array([(0.0, 0.0), linkage.lip_m, linkage.heel_m, linkage.top_m])
+    return pin + points @ np.array([[c, s], [-s, c]])
+
+
+def _moved_sides(linkage: Linkage, boom_rad: float, bucket_rad: float) -> FloatArray:
+    """Return how far the sides of the bucket's box are from where they are when tramming, shape (2, 3), m."""
+    now = bucket_outline(linkage, boom_rad, bucket_rad)
+    tramming = bucket_outline(linkage, linkage.boom_min_rad, linkage.bucket_max_rad)
+    moved = np.zeros((2, 3))
+    moved[0, ::2] = now.min(axis=0) - tramming.min(axis=0)
+    moved[1, ::2] = now.max(axis=0) - tramming.max(axis=0)
+    return moved
+
+
+@nb.njit(cache=True, nogil=True)
+def _placed(
+    pose: FloatArray, joint_m: tuple[float, float], front: FloatArray, corners: FloatArray
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return centres, axes and half lengths of boxes; `pose` is x, y, z, roll, pitch, yaw, articulation."""
+    cr, sr, cp, sp = math.cos(pose[3]), math.sin(pose[3]), math.cos(pose[4]), math.sin(pose[4])
+    cy, sy, cb, sb = math.cos(pose[5]), math.sin(pose[5]), math.cos(pose[6]), math.sin(pose[6])
+    x_axis = (cy * cp, sy * cp, -sp)
+    y_axis = (cy * sp * sr - sy * cr, sy * sp * sr + cy * cr, cp * sr)
+    z_axis = (cy * sp * cr + sy * sr, sy * sp * cr - cy * sr, cp * cr)
+    rear_x, rear_y = -joint_m[0] - joint_m[1] * cb, joint_m[1] * sb
+    count = len(corners)
+    centre, axes, half = np.empty((count, 3)), np.empty((count, 3, 3)), np.empty((count, 3))
+    for b in range(count):
+        c, s, ahead, left = (1.0, 0.0, 0.0, 0.0) if front[b] else (cb, sb, rear_x, rear_y)
+        for k in range(3):
+            axes[b, k, 0] = c * x_axis[k] - s * y_axis[k]
+            axes[b, k, 1] = s * x_axis[k] + c * y_axis[k]
+            axes[b, k, 2] = z_axis[k]
+            half[b, k] = 0.5 * (corners[b, 1, k] - corners[b, 0, k])
+            centre[b, k] = pose[k] + ahead * x_axis[k] + left * y_axis[k]
+            for j in range(3):
+                centre[b, k] += axes[b, k, j] * 0.5 * (corners[b, 0, j] + corners[b, 1, j])
+    return centre, axes, half

@@ -1,4 +1,4 @@
-"""`Vehicle.step(state, command, dt_s)`: the machine a moment later, on the floor of a world."""
+"""The machine that is stepped: commands in, state out."""
 
 from __future__ import annotations
 
@@ -9,22 +9,27 @@ import numpy as np
 from lhdmap.machine import Machine
 from lhdmap.messages import Command, FloatArray
 from lhdmap.simulation.surroundings import Ground
-from lhdmap.simulation.vehicle import motion
-from lhdmap.simulation.vehicle.state import BOOM_LIFT_RAD, BUCKET_TILT_RAD, VehicleState
+from lhdmap.simulation.vehicle import kernel
+from lhdmap.simulation.vehicle.plant import Plant, drawn_errors, plant_of
+from lhdmap.simulation.vehicle.state import VehicleState
 
-_FOOTPRINT_M = 0.25  # half length and width of the patch under a tyre that carries it
-_PATCH = np.array([[a, b] for a in (-1.0, 0.0, 1.0) for b in (-1.0, 0.0, 1.0)]) * _FOOTPRINT_M
-_FRICTION_EVERY_M = 0.5
+SUB_STEP_S = 0.001
+_LEAST_FRICTION = 1e-3
+
+Pending = tuple[tuple[int, Command], ...]
 
 
 class Vehicle:
-    """A machine over a floor. Each step follows from state and command alone; what the world is asked for is kept nearby."""
+    """A machine on a floor; it has no state of its own, so that any state can be stepped again.
 
-    def __init__(self, machine: Machine, ground: Ground) -> None:
+    `seed` decides how far this machine is from its file (`[spread]`).
+    """
+
+    def __init__(self, machine: Machine, ground: Ground, *, seed: int = 0) -> None:
         self.machine, self._ground = machine, ground
+        self._errors = drawn_errors(machine.spread, seed)
+        self._plant, self._load_kg = plant_of(machine, 0.0, self._errors), 0.0
         self._dead_ns = round(machine.drive.dead_time_s * 1e9)
-        self._parameters = (-1.0, motion.parameters(machine, 0.0))
-        self._friction = (np.full(3, np.inf), 0.6)
 
     def at_rest(
         self,
@@ -33,102 +38,61 @@ class Vehicle:
         yaw_rad: float,
         *,
         near_z_m: float,
-        time_ns: int,
         articulation_rad: float = 0.0,
         load_kg: float = 0.0,
-    ) -> VehicleState:
-        """Return the state of a machine that stands, near a height that says which level it is on."""
-        z, roll, pitch = self._attitude(x_m, y_m, near_z_m, yaw_rad, articulation_rad)
-        none = Command(time_ns, 0.0, 0.0, 0.0, 0.0, False, True)
-        return VehicleState(
-            time_ns, x_m, y_m, z, roll, pitch, yaw_rad, articulation_rad, 0.0, 0.0, 0.0, 0.0, 1.0,
-            BOOM_LIFT_RAD, 0.0, BUCKET_TILT_RAD, 0.0, load_kg, 0.0, (), none,
-        )  # fmt: skip
-
-    def step(self, state: VehicleState, command: Command | None, dt_s: float) -> VehicleState:
-        """Return the state `dt_s` later; a command takes effect after the dead time, None goes on with the last one."""
-        pending = state.pending if command is None else (*state.pending, (state.time_ns + self._dead_ns, command))
-        now_ns, end_ns = state.time_ns, state.time_ns + round(dt_s * 1e9)
-        values = _values(state)
-        ground = np.array([-state.pitch_rad, self._friction_at(state.position_m)])
-        parameters = self._parameters_for(state.load_kg)
-        active = state.command
-        while True:
-            while pending and pending[0][0] <= now_ns:
-                active, pending = pending[0][1], pending[1:]
-            until_ns = min(end_ns, pending[0][0]) if pending else end_ns
-            if until_ns > now_ns:
-                motion.advance(values, _told(active), parameters, ground, (until_ns - now_ns) * 1e-9)
-            now_ns = until_ns
-            if now_ns >= end_ns:
-                break
-        return self._moved(state, values, end_ns, pending, active)
-
-    def _moved(
-        self,
-        state: VehicleState,
-        values: FloatArray,
         time_ns: int,
-        pending: tuple[tuple[int, Command], ...],
-        active: Command,
     ) -> VehicleState:
-        x, y, yaw, bend, bend_rate, speed, wheel, traction, brake, boom, boom_rate, bucket, bucket_rate = (
-            values.tolist()
-        )
-        z, roll, pitch = self._attitude(x, y, state.z_m, yaw, bend)
-        return VehicleState(
-            time_ns, x, y, z, roll, pitch, yaw, bend, bend_rate, speed, wheel, traction, brake,
-            boom, boom_rate, bucket, bucket_rate, state.load_kg, state.curl, pending, active,
-        )  # fmt: skip
+        """Return the machine standing at a place, in tramming posture, held by its drive; `near_z_m` says on which level."""
+        linkage, plant = self.machine.linkage, self._plant_with(load_kg)
+        row = np.zeros(len(VehicleState._fields) - 2)
+        row[:7] = x_m, y_m, near_z_m, 0.0, 0.0, yaw_rad, articulation_rad
+        row[10:12], row[15] = (linkage.boom_min_rad, linkage.bucket_max_rad), load_kg
+        for _ in range(3):  # z of the points says which level: from the plane that was found
+            points = kernel.points_at_rest(row, plant)
+            kernel.stand(row, plant, points, self._ground.floor_height(points))
+        still = Command(time_ns, 0.0, 0.0, 0.0, 0.0, full_rpm=False, brake=False)
+        return VehicleState._make((time_ns, *row.tolist(), ((time_ns, still),)))
 
-    def _parameters_for(self, load_kg: float) -> FloatArray:
-        if self._parameters[0] != load_kg:
-            self._parameters = (load_kg, motion.parameters(self.machine, load_kg))
-        return self._parameters[1]
+    def step(self, state: VehicleState, command: Command, dt_s: float) -> VehicleState:
+        """Return the state after `dt_s` with a command given now: it counts when its dead time has passed."""
+        now_ns = state.time_ns
+        end_ns = now_ns + round(dt_s * 1e9)
+        pending = _queued(state.pending, now_ns, now_ns + self._dead_ns, command)
+        commands, since_s = _in_force(pending, now_ns, end_ns)
+        plant, row = self._plant_with(state.load_kg), np.array(state[1:-1])
+        friction = max(self._ground.friction(row[:3]), _LEAST_FRICTION)
+        steps = max(1, math.ceil(dt_s / SUB_STEP_S - 1e-6))
+        points = kernel.advance(row, plant, commands, since_s, steps, dt_s / steps, friction)
+        kernel.stand(row, plant, points, self._ground.floor_height(points))
+        return VehicleState._make((end_ns, *row.tolist(), pending))
 
-    def _friction_at(self, position_m: FloatArray) -> float:
-        """Return the friction here; within half a metre of where it was asked for last, that of there."""
-        cell = np.round(position_m / _FRICTION_EVERY_M)
-        if not np.array_equal(cell, self._friction[0]):
-            self._friction = (cell, self._ground.friction(cell * _FRICTION_EVERY_M))
-        return self._friction[1]
-
-    def _attitude(self, x: float, y: float, z: float, yaw: float, bend: float) -> tuple[float, float, float]:
-        """Return height, roll and pitch: those of the plane through both front wheels and the middle of the rear axle."""
-        size = self.machine.dimensions
-        half, s, c = 0.5 * size.track_m, math.sin(bend), math.cos(bend)
-        rear_x = -size.joint_to_front_axle_m - size.joint_to_rear_axle_m * c
-        rear_y = size.joint_to_rear_axle_m * s
-        wheels = np.array(
-            [[0.0, half], [0.0, -half], [rear_x + half * s, rear_y + half * c], [rear_x - half * s, rear_y - half * c]]
-        )
-        patches = (wheels[:, None, :] + _PATCH).reshape(-1, 2)
-        cy, sy = math.cos(yaw), math.sin(yaw)
-        points = np.empty((len(patches), 3))
-        points[:, 0] = x + cy * patches[:, 0] - sy * patches[:, 1]
-        points[:, 1] = y + sy * patches[:, 0] + cy * patches[:, 1]
-        points[:, 2] = z
-        left, right, back_left, back_right = self._ground.floor_height(points).reshape(4, -1).mean(axis=1).tolist()
-        height, cross = 0.5 * (left + right), (left - right) / size.track_m
-        slope = (0.5 * (back_left + back_right) - height - cross * rear_y) / rear_x
-        pitch = -math.atan(slope)
-        return height, math.atan(cross * math.cos(pitch)), pitch
+    def _plant_with(self, load_kg: float) -> Plant:
+        if load_kg != self._load_kg:
+            self._plant, self._load_kg = plant_of(self.machine, load_kg, self._errors), load_kg
+        return self._plant
 
 
-def _values(state: VehicleState) -> FloatArray:
-    return np.array(
-        [
-            state.x_m, state.y_m, state.yaw_rad, state.articulation_rad, state.articulation_rate_rps, state.speed_mps,
-            state.wheel_speed_mps, state.traction_mps2, state.brake, state.boom_rad, state.boom_rate_rps, state.bucket_rad,
-            state.bucket_rate_rps,
-        ]
-    )  # fmt: skip
+def _queued(pending: Pending, now_ns: int, counts_ns: int, command: Command) -> Pending:
+    """Return the command in force and those to come; one that says the same as the one before it is none."""
+    first = 0
+    while first + 1 < len(pending) and pending[first + 1][0] <= now_ns:
+        first += 1
+    kept = pending[first:] if first else pending
+    return kept if kept[-1][1][1:] == command[1:] else (*kept, (counts_ns, command))
 
 
-def _told(command: Command) -> FloatArray:
-    return np.array(
-        [
-            command.propel, command.steering_rate_rps, command.tilt, command.lift, float(command.full_rpm),
-            float(command.brake),
-        ]
-    )  # fmt: skip
+def _in_force(pending: Pending, now_ns: int, end_ns: int) -> tuple[FloatArray, FloatArray]:
+    """Return the commands that count during a step, shape (K, 6), and from when (K,), s; the first from before."""
+    due = [one for one in pending if one[0] < end_ns]
+    since = np.array([(one[0] - now_ns) * 1e-9 for one in due])
+    return np.array([_within(one[1]) for one in due]), since
+
+
+def _within(command: Command) -> tuple[float, ...]:
+    """Return a command as numbers, within its range; what is no number is none."""
+    _, propel, steering, tilt, lift, full_rpm, brake = command
+    return _share(propel), (steering if math.isfinite(steering) else 0.0), _share(tilt), _share(lift), full_rpm, brake
+
+
+def _share(value: float) -> float:
+    return min(max(value, -1.0), 1.0) if math.isfinite(value) else 0.0

@@ -66,10 +66,14 @@ def check(world: MineWorld, within_m: float) -> None:
     rays[:, :3] = np.array([20.0, 0.0, 1.5]) - scene.origin_m
     rays[:, 4] = [1.0, -1.0]
     assert scene.cast(rays) == pytest.approx(HALF_M, abs=within_m)
-    walls = list(world.walls(np.array([[15.0, -3.0, -1.0], [25.0, 3.0, 5.0]])))
-    assert walls
-    for _, mesh in walls:
-        assert mesh.vertices_m[mesh.triangles].mean(axis=1)[:, 2].min() > -within_m
+    keys = world.keys_in(np.array([[15.0, -3.0, -1.0], [25.0, 3.0, 5.0]]))
+    assert keys
+    for key in keys:
+        mesh, floor = world.solid(key)
+        middles = mesh.vertices_m[mesh.triangles].mean(axis=1)
+        assert floor is not None
+        assert np.abs(middles[floor, 2]).max(initial=0.0) < within_m
+        assert middles[~floor, 2].min(initial=1.0) > -within_m
 
 
 def test_a_mesh(tmp_path: Path) -> None:

@@ -3,16 +3,21 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 import pytest
 from lhdmap.machine import Machine
-from lhdmap.messages import FloatArray
+from lhdmap.messages import FloatArray, LaserScan
 from lhdmap.mine.network import Network, make_network
 from lhdmap.mine.plan import find_plan, load_plan
+from lhdmap.simulation.history import Column, History
 from lhdmap.simulation.mine_world.hollow import Volume
 from lhdmap.simulation.mine_world.world import MineWorld
+from lhdmap.simulation.scanner import rig_of
+from lhdmap.simulation.sensing.scans import Scanner
+from lhdmap.simulation.sensing.sections import ScannerSettings
 from scipy.spatial import KDTree
 
 from tests.mine.plans import TEE, lines, network_of
@@ -21,7 +26,7 @@ MACHINE = Machine()
 FINE = {"mesh_m": 0.12}
 
 
-def world_of(table: dict[str, object], **more: object) -> MineWorld:
+def world_of(table: dict[str, Any], **more: Any) -> MineWorld:
     return MineWorld(network_of(table, walls=FINE, **more), MACHINE)
 
 
@@ -204,12 +209,14 @@ def test_water_is_slippery_and_dust_hangs_where_the_plan_says() -> None:
 
 def test_what_bodies_may_touch_is_near_them(tee: MineWorld) -> None:
     box = np.array([[18.0, -3.0, 0.0], [26.0, 3.0, 3.0]])
-    meshes = dict(tee.walls(box))
-    assert 0 < len(meshes) < 4
-    for mesh in meshes.values():
-        normal = np.cross(
-            *(mesh.vertices_m[mesh.triangles[:, k]] - mesh.vertices_m[mesh.triangles[:, 0]] for k in (1, 2))
-        )
+    keys = tee.keys_in(box)
+    assert 0 < len(keys) < 4
+    for key in keys:
+        mesh, floor = tee.solid(key)
+        assert floor is not None
+        mesh = mesh._replace(triangles=mesh.triangles[~floor])
+        a, b, c = (mesh.vertices_m[mesh.triangles[:, k]] for k in range(3))
+        normal = np.cross(b - a, c - a)
         level = np.abs(normal[:, 2]) > 0.95 * np.linalg.norm(normal, axis=1)
         assert (mesh.vertices_m[mesh.triangles].mean(axis=1)[level, 2] > 1.5).all()  # roof, no floor
 
@@ -221,3 +228,28 @@ def test_a_mine_of_five_kilometres_is_there_at_once() -> None:
     world = MineWorld(network, MACHINE)
     assert sum(edge.length_m for edge in network.edges) > 5000.0
     assert look(world, (100.0, 0.0), np.array([math.pi / 2]))[0] == pytest.approx(2.25, abs=0.6)
+
+
+def test_dust_that_hangs_in_a_drift_is_what_scanners_see_there() -> None:
+    zone = {"drift": "A", "from_m": 10.0, "to_m": 20.0, "share": 0.3}
+    world = world_of(TEE, dust=[zone])
+    near = [_share_nearer(world, x) for x in (5.0, 15.0)]
+    assert near[0] == 0.0
+    assert 0.05 < near[1] < 0.3  # dust behind a wall is not seen
+
+
+def _share_nearer(world: MineWorld, x_m: float) -> float:
+    """Return the share of beams of some scans that are much shorter than without dust."""
+    scans = []
+    for where in (world, MineWorld(network_of(TEE, walls=FINE), MACHINE)):
+        history = History(100.0)
+        row = np.zeros(len(Column))
+        row[:3] = x_m, 0.0, float(world.floor_height(np.array([[x_m, 0.0, 0.0]]))[0])
+        for _ in range(30):
+            history.append(row)
+        sensor = Scanner(
+            "front", ScannerSettings(noise_m=0.0), rig_of(MACHINE, MACHINE.mounts["lidar_front"], occlusion=False), 1
+        )
+        records = [record for _ in range(6) for record in sensor.read(history, where)]
+        scans.append(np.array([record.message.ranges_m for record in records if isinstance(record.message, LaserScan)]))
+    return float((scans[0] < scans[1] - 0.05).mean())

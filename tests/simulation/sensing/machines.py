@@ -21,6 +21,10 @@ class Room:
     def __init__(self, range_m: float = 5.0) -> None:
         self._range_m, self.casts = range_m, 0
 
+    def dust(self, position_m: FloatArray) -> float:  # it is nowhere
+        """Return the share of beams that dust returns at a place: it hangs nowhere, clouds come with time."""
+        return 0.0
+
     def near(self, position_m: FloatArray) -> Surface:
         return self  # type: ignore[return-value]  # all that scanners ask of a surface
 

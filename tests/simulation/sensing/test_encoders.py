@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 from lhdmap.messages import FloatArray
+from lhdmap.simulation.history import Column
 from lhdmap.simulation.sensing.encoders import (
     JointEncoders,
     PressureGauge,
@@ -62,9 +63,10 @@ def test_joint_encoders_follow_the_joints() -> None:
 
 def bar(gauge: Any, **columns: float) -> float:
     """Return what a gauge without noise shows of a state."""
-    constant = {name: (lambda t, v=value: v + 0.0 * t) for name, value in columns.items()}
-    sensor = Sampled("lift_pressure", Beat(20.0), PressureGauge(gauge, QUIET), 1)
-    message: Any = readings(sensor, history(1.0, **constant))[3].message
+    past = history(1.0)
+    for name, value in columns.items():
+        past.rows[:, Column[name]] = value
+    message: Any = readings(Sampled("lift_pressure", Beat(20.0), PressureGauge(gauge, QUIET), 1), past)[3].message
     return float(message.pressure_pa) / 1e5
 
 

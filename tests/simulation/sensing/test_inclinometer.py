@@ -49,7 +49,7 @@ def test_it_lags_by_its_lag_whatever_the_rate_of_the_history(kind: str, rate_hz:
 @pytest.mark.parametrize("rate_hz", [100.0, 1000.0])
 def test_a_first_order_lag_answers_a_step_with_its_time_constant(rate_hz: float) -> None:
     settings = InclinometerSettings(noise_deg=0.0, lag_s=0.1)
-    _, shown = pitches(settings, history(3.0, rate_hz, PITCH=lambda t: 1.0 * (t >= 1.0)))
+    _, shown = pitches(settings, history(3.0, rate_hz, PITCH=lambda t: np.where(t >= 1.0, 1.0, 0.0)))
     answer = 1.0 - np.exp(-np.array([0.1, 0.3, 0.5]) / 0.1)
     assert shown[[90, 110, 130, 150, 300]] == pytest.approx([0.0, *answer, 1.0], abs=0.02)
     assert shown[[110, 130, 150]] == pytest.approx(1.0 - (1.0 - answer) * math.exp(-0.5 / rate_hz / 0.1), abs=2e-3)

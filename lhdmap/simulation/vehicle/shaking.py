@@ -1,0 +1,27 @@
+"""Vibration of the front body by engine and road: a sum of tones, so that any moment of it is known without the ones before."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from lhdmap.messages import FloatArray
+
+_TONES = 12
+_BAND_HZ = (4.0, 9.0)
+
+
+class Shaking:
+    """Roll and pitch (rad) that are added at any time; `size_rad` is their standard deviation."""
+
+    def __init__(self, size_rad: float, seed: int) -> None:
+        rng = np.random.default_rng([seed, 6])
+        self._omega = 2 * math.pi * rng.uniform(*_BAND_HZ, (2, _TONES))
+        self._phase = rng.uniform(0.0, 2 * math.pi, (2, _TONES))
+        self._amplitude = size_rad * math.sqrt(2.0 / _TONES)
+
+    def at(self, time_s: float) -> FloatArray:
+        """Return roll and pitch, shape (2,)."""
+        angles: FloatArray = self._amplitude * np.sin(self._omega * time_s + self._phase).sum(axis=1)
+        return angles
