@@ -225,6 +225,12 @@ class RecordingWriter:
         self._stream.log(entity, self._rr.SeriesLines(colors=rgba, names=name, widths=1.5), static=True)
         self._stream.send_columns(entity, [self._times(stamps_ns)], self._rr.Scalars.columns(scalars=values))
 
+    def add_steps(self, entity: str, stamps_ns: Stamps, values: FloatArray, rgba: int, name: str) -> None:
+        """Record values that each hold until the next one: stamps (M,), values (M,)."""
+        self.add_curve(entity, stamps_ns, values, rgba, name)
+        steps = self._rr.SeriesLines.from_fields(interpolation_mode="StepAfter", aggregation_policy="Off")
+        self._stream.log(entity, steps, static=True)
+
     def add_diagnostics(self, found: Diagnostics) -> None:
         """Record the standard deviations that the information stands for, residual and flags."""
         stamps = found.stamp_ns

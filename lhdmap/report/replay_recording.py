@@ -89,6 +89,7 @@ class ReplayRecording:
         if len(data.lines_m):
             lines = rr.LineStrips3D(list(data.lines_m), colors=_GREY, radii=rr.Radius.ui_points(1.0))
             self._writer.add_shape("map/walls", lines)
+            self._writer.widen(np.concatenate(list(data.lines_m)))
             self._writer.explain("grey lines", "the mine's plan")
         spots = [contact["point_m"] for contact in data.verdict["contacts"]]
         if spots:
@@ -102,13 +103,8 @@ class ReplayRecording:
         for (process, changes), rgba in zip(data.changes.items(), _COLOURS * 10, strict=False):
             names = list(dict.fromkeys(change.state for change in changes))
             steps = [float(names.index(change.state)) for change in changes]
-            stamps, values = [], []
-            for (at, _, _), before, now in zip(changes, [steps[0], *steps], steps, strict=False):
-                stamps += [at, at]
-                values += [before, now]
-            stamps.append(max(end_ns, stamps[-1]))
-            values.append(steps[-1])
-            self._writer.add_curve(f"state/{process}", np.array(stamps), np.array(values), rgba, process)
+            stamps = np.array([*(change.t_ns for change in changes), max(end_ns, changes[-1].t_ns + 1)])
+            self._writer.add_steps(f"state/{process}", stamps, np.array([*steps, steps[-1]]), rgba, process)
             self._writer.explain(f"state of {process}", ", ".join(f"{k} {name}" for k, name in enumerate(names)))
 
 
