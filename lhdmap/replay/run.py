@@ -109,6 +109,8 @@ class _Replay:
         if request.recording:
             path = self._folder.path / RECORDING
             self._recording = ReplayRecording(path, request.name, START_NS, machine, request.live_port)
+            expected_s = self._parts.expected_s or request.scenario.limits.time_s
+            self._recording.begin(self._parts.lines_m, expected_s)
         film = Film(machine, self._recording, live=request.live_port is not None)
         journal.listeners.append(film.take)
         return film

@@ -24,7 +24,7 @@ from lhdmap.mapfolder import Diagnostics
 from lhdmap.messages import Float32Array, FloatArray
 from lhdmap.names import in_utf8, shown
 from lhdmap.report.recording_end import load_quietly, write_out
-from lhdmap.report.recording_layout import RUN_CURVES, blueprint, whole_of
+from lhdmap.report.recording_layout import RUN_CURVES, Curves, blueprint, whole_of
 from lhdmap.settings import setting
 from lhdmap.trajectory import Trajectory
 
@@ -225,6 +225,12 @@ class RecordingWriter:
         self._stream.log(entity, self._rr.SeriesLines(colors=rgba, names=name, widths=1.5), static=True)
         self._stream.send_columns(entity, [self._times(stamps_ns)], self._rr.Scalars.columns(scalars=values))
 
+    def add_steps(self, entity: str, stamps_ns: Stamps, values: FloatArray, rgba: int, name: str) -> None:
+        """Record values that each hold until the next one: stamps (M,), values (M,)."""
+        self.add_curve(entity, stamps_ns, values, rgba, name)
+        steps = self._rr.SeriesLines.from_fields(interpolation_mode="StepAfter", aggregation_policy="Off")
+        self._stream.log(entity, steps, static=True)
+
     def add_diagnostics(self, found: Diagnostics) -> None:
         """Record the standard deviations that the information stands for, residual and flags."""
         stamps = found.stamp_ns
@@ -251,14 +257,19 @@ class RecordingWriter:
             words = "\n".join(["| drawn | what it is |", "| --- | --- |", *self._legend])
             self.add_shape("legend", self._rr.TextDocument(words, media_type="text/markdown"))
         used = tuple(view for view in self.curves if any(self._has(entity) for entity in view[1]))
-        self._stream.send_blueprint(
-            blueprint(self._bounds, self._end_ns - self._start_ns, used, legend=bool(self._legend))
-        )
+        self._lay_out(used, self._end_ns - self._start_ns)
         try:
             write_out(self._stream, self._path)
         except InputError:
             self._failed = True
             raise
+
+    def lay_out(self, duration_s: float) -> None:
+        """Lay the viewer out for what is to come, for those who follow while it is written."""
+        self._lay_out(self.curves, round(1e9 * duration_s))
+
+    def _lay_out(self, used: Curves, duration_ns: int) -> None:
+        self._stream.send_blueprint(blueprint(self._bounds, duration_ns, used, legend=bool(self._legend)))
 
     def _has(self, pattern: str) -> bool:
         """Return whether a curve of this entity, or below it (`…/**`), was recorded."""

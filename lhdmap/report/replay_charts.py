@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 _SECOND_NS = 1e9
 _MOST_BARS = 400
-_LANE_IN = 0.42
+_LANE_IN, _NAMES_IN = 0.42, 1.15
 _SHADES = (charts.FINAL, charts.ODOMETRY, charts.TRUTH, charts.FLAGGED, charts.WHEELS, "#8a949e", "#b7d3ea", "#f0c419")
 
 
@@ -41,7 +41,7 @@ def plan_chart(data: ReplayData) -> Figure:
     begun = [fault["began_s"] for fault in data.verdict["faults"] if fault["began_s"] is not None]
     _marks(axes, [_place_at(data, at_s) for at_s in begun], "v", charts.FLAGGED, "fault begins")
     plan_axes(axes)
-    charts.legend_above(axes, columns=4)
+    charts.legend_above(axes, columns=7)
     return figure
 
 
@@ -76,6 +76,7 @@ def state_chart(data: ReplayData) -> Figure:
     """Draw the states of each process as bars over time."""
     lanes = list(data.changes.items())
     figure = charts.new_figure(0.8 + _LANE_IN * len(lanes))
+    figure.subplots_adjust(left=_NAMES_IN / charts.WIDTH_IN)
     axes = figure.add_subplot()
     end_s = max(data.verdict["duration_s"], 1.0)
     for row, (_, changes) in enumerate(lanes):

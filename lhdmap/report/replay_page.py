@@ -86,15 +86,16 @@ def _contacts(contacts: Sequence[Mapping[str, Any]]) -> str:
 def _faults(faults: Sequence[Mapping[str, Any]]) -> str:
     rows = [
         (
-            one["kind"],
-            one["target"] or one["at"],
             "never" if one["began_s"] is None else f"{one['began_s']:.2f}",
             "the end" if one["ended_s"] is None else f"{one['ended_s']:.2f}",
+            one["kind"],
+            one["target"] or one["at"],
             "; ".join(map(_followed, one["followed"])) or "nothing that the journal knows",
         )
         for one in faults
     ]
-    return markup.table(("fault", "target or place", "from, s", "to, s", "what followed"), rows) if rows else ""
+    head = ("from, s", "to, s", "fault", "target or place", "what followed")
+    return markup.table(head, rows, numbers_from=0, numbers_to=4) if rows else ""
 
 
 def _followed(one: Mapping[str, Any]) -> str:

@@ -5,6 +5,7 @@ Entities: `map/base_link/…` (the machine as it truly is), `map/scan/…`, `map
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -29,17 +30,28 @@ _CURVES = (
 
 
 class ReplayRecording:
-    """Takes rows in batches, scans and texts as they come; `close` adds what is known at the end."""
+    """Takes rows in batches, scans and texts as they come; `begin` comes first, `close` adds what is known at the end."""
 
     def __init__(self, path: Path, title: str, start_ns: int, machine: Machine, live_port: int | None = None) -> None:
         self._writer = RecordingWriter(path, title, start_ns, live_port=live_port)
         self._writer.curves = REPLAY_CURVES
-        self._machine, self._start_ns = machine, start_ns
-        self._began = False
+        self._machine, self._start_ns, self._live = machine, start_ns, live_port is not None
+
+    def begin(self, lines_m: Sequence[FloatArray], expected_s: float) -> None:
+        """Record the machine's bodies and the walls as lines (N, 3); viewers that follow get their layout."""
+        import rerun as rr
+
+        self._writer.add_bodies(self._machine)
+        if len(lines_m):
+            lines = rr.LineStrips3D(list(lines_m), colors=_GREY, radii=rr.Radius.ui_points(1.0))
+            self._writer.add_shape("map/walls", lines)
+            self._writer.widen(np.concatenate(list(lines_m)))
+            self._writer.explain("grey lines", "the mine's plan")
+        if self._live:
+            self._writer.lay_out(expected_s)
 
     def add_rows(self, rows: FloatArray, attitudes_rad: FloatArray) -> None:
         """Record rows (M, 9) of `replay_data.COLUMNS`, with roll and pitch (M, 2)."""
-        self._begin()
         stamps_ns = self._start_ns + np.round(1e9 * rows[:, 0]).astype(np.int64)
         quaternions = _quaternions(rows, attitudes_rad)
         self._writer.add_moving("map/base_link", stamps_ns, rows[:, 1:4], quaternions)
@@ -73,11 +85,6 @@ class ReplayRecording:
             self._add_states(data)
         self._writer.close()
 
-    def _begin(self) -> None:
-        if not self._began:
-            self._began = True
-            self._writer.add_bodies(self._machine)
-
     def _add_paths(self, data: ReplayData) -> None:
         import rerun as rr
 
@@ -86,10 +93,6 @@ class ReplayRecording:
         self._writer.add_path("true", _trajectory(positions), _TRUE)
         if len(data.believed_m):
             self._writer.add_path("believed", _trajectory(data.believed_m), _BELIEVED)
-        if len(data.lines_m):
-            lines = rr.LineStrips3D(list(data.lines_m), colors=_GREY, radii=rr.Radius.ui_points(1.0))
-            self._writer.add_shape("map/walls", lines)
-            self._writer.explain("grey lines", "the mine's plan")
         spots = [contact["point_m"] for contact in data.verdict["contacts"]]
         if spots:
             points = rr.Points3D(spots, colors=_RED, radii=rr.Radius.ui_points(6.0))
@@ -102,13 +105,8 @@ class ReplayRecording:
         for (process, changes), rgba in zip(data.changes.items(), _COLOURS * 10, strict=False):
             names = list(dict.fromkeys(change.state for change in changes))
             steps = [float(names.index(change.state)) for change in changes]
-            stamps, values = [], []
-            for (at, _, _), before, now in zip(changes, [steps[0], *steps], steps, strict=False):
-                stamps += [at, at]
-                values += [before, now]
-            stamps.append(max(end_ns, stamps[-1]))
-            values.append(steps[-1])
-            self._writer.add_curve(f"state/{process}", np.array(stamps), np.array(values), rgba, process)
+            stamps = np.array([*(change.t_ns for change in changes), max(end_ns, changes[-1].t_ns + 1)])
+            self._writer.add_steps(f"state/{process}", stamps, np.array([*steps, steps[-1]]), rgba, process)
             self._writer.explain(f"state of {process}", ", ".join(f"{k} {name}" for k, name in enumerate(names)))
 
 
