@@ -17,7 +17,8 @@ from lhdmap.machine import Machine
 from lhdmap.messages import FloatArray
 from lhdmap.mine.network import Network, make_network
 from lhdmap.mine.plan import find_plan, load_plan
-from lhdmap.mine.routes import Planner, start_of
+from lhdmap.mine.route import start_of
+from lhdmap.mine.routes import Planner
 from lhdmap.mine.ways import legs_of
 from lhdmap.simulation.mine_world.world import MineWorld
 

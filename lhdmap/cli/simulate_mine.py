@@ -81,9 +81,7 @@ def run_mine(arguments: argparse.Namespace, console: Console, scanner: dict[str,
     from lhdmap.machine import load_machine
     from lhdmap.mine.network import make_network
     from lhdmap.mine.plan import find_plan, load_plan
-    from lhdmap.simulation.mesh_file import write_ply
     from lhdmap.simulation.mine_drive import simulate_mine
-    from lhdmap.simulation.mine_world.world import MineWorld
 
     if not arguments.plan:
         raise UsageError("lhdmap simulate mine PLAN: a plan file was wanted, or ring, level, decline, narrow")
@@ -91,15 +89,15 @@ def run_mine(arguments: argparse.Namespace, console: Console, scanner: dict[str,
     machine = load_machine(Path(arguments.machine) if arguments.machine else None)
     settings = _settings(arguments, scanner)
     log = arguments.output or Path(f"{network.plan.name}_seed{settings.seed}.mcap")
-    if arguments.mesh is not None:
-        write_ply(arguments.mesh, MineWorld(network, machine).meshes())
     way = f"route {settings.route}" if settings.route else "a teaching drive through all of it"
     console.note(f"simulating mine '{network.plan.name}': {way} at {figure(settings.operator.speed_kmh)} km/h")
 
     def progress(records: Iterator[Record], duration_s: float) -> Iterator[Record]:
         return _shown(records, console, duration_s)
 
-    drive = simulate_mine(network, machine, settings, log, progress=progress, force=arguments.force)
+    drive = simulate_mine(
+        network, machine, settings, log, mesh_path=arguments.mesh, progress=progress, force=arguments.force
+    )
     for contact in drive.contacts:
         console.warn(f"the machine touched something: {contact}")
     values = {

@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from lhdmap.messages import FloatArray
-from lhdmap.mine.centre_line import STEP_M, CentreLine
+from lhdmap.mine.centre_line import STEP_M, CentreLine, along_arc
 
 _DETOUR = 6.0  # times the distance
 
@@ -38,10 +38,9 @@ def biarc(start: FloatArray, end: FloatArray) -> CentreLine:
         (~on_second, a, start[3], lines[0][1], s),
         (on_second, middle, first_end, lines[1][1], s - lengths[0]),
     ):
-        half = 0.5 * k * way[on]
-        chord = way[on] * np.sinc(half / math.pi)
-        x[on], y[on] = origin[0] + chord * np.cos(h0 + half), origin[1] + chord * np.sin(h0 + half)
-        heading[on], curvature_pm[on] = h0 + k * way[on], k
+        place = (float(origin[0]), float(origin[1]))
+        x[on], y[on], heading[on] = along_arc(place, h0, k, way[on])
+        curvature_pm[on] = k
     share = s / total
     z = start[2] + (end[2] - start[2]) * share * share * (3.0 - 2.0 * share)
     return CentreLine(s, x, y, z, heading, curvature_pm)

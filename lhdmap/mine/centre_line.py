@@ -58,6 +58,16 @@ def centre_line(pieces: Pieces, length_m: float, transition_m: float, start: Sta
     return CentreLine(s, x, y, start.z_m + _integral(grade), heading, curvature)
 
 
+def along_arc(
+    origin_m: tuple[float, float], heading_rad: float, curvature_pm: float, way_m: FloatArray
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return x, y, heading, each (N,), after a way on an arc (curvature 0: a straight) from a point and heading."""
+    half = 0.5 * curvature_pm * way_m
+    chord = way_m * np.sinc(half / np.pi)
+    middle = heading_rad + half
+    return origin_m[0] + chord * np.cos(middle), origin_m[1] + chord * np.sin(middle), middle + half
+
+
 def beside(line: CentreLine, offset_m: FloatArray) -> CentreLine:
     """Return the path `offset_m`, shape (N,), to the left of the line, sampled by its own arc length.
 

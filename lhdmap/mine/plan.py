@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from lhdmap.errors import ConfigError
+from lhdmap.errors import ConfigError, InputError
 from lhdmap.resources import resource
 from lhdmap.settings import REQUIRED, Profile, nearest, setting
 from lhdmap.settings_tree import load_tree, part
@@ -252,11 +252,14 @@ def find_plan(name: str) -> Path:
     """Return the file of a plan: a path, or the name of one that ships.
 
     Raises:
-        ConfigError: there is no such file or name.
+        InputError: there is no such file.
+        ConfigError: there is no such name.
     """
     path, known = Path(name), shipped_plans()
     if path.is_file():
         return path
     if name in known:
         return known[name]
+    if path.suffix == ".toml":
+        raise InputError(f"{path}: no such file; a mine plan was wanted")
     raise ConfigError(f"mine '{name}': no such file, and no plan of that name ships{nearest(name, known)}")

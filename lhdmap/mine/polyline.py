@@ -9,7 +9,7 @@ import numpy as np
 
 from lhdmap.errors import ConfigError
 from lhdmap.messages import FloatArray
-from lhdmap.mine.centre_line import STEP_M, CentreLine
+from lhdmap.mine.centre_line import STEP_M, CentreLine, along_arc
 
 _GRADE_OVER_M = 6.0  # a change of grade is spread over this way
 _SHARE = 0.48  # of a straight piece that the arc at one of its ends may take
@@ -28,11 +28,7 @@ class _Piece(NamedTuple):
 
     def at(self, way_m: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Return x, y, heading after a way (N,) on it."""
-        heading = self.heading_rad + self.curvature_pm * way_m
-        half = 0.5 * self.curvature_pm * way_m
-        chord = way_m * np.sinc(half / math.pi)
-        middle = self.heading_rad + half
-        return self.x_m + chord * np.cos(middle), self.y_m + chord * np.sin(middle), heading
+        return along_arc((self.x_m, self.y_m), self.heading_rad, self.curvature_pm, way_m)
 
 
 def rounded_line(points_m: FloatArray, bend_radius_m: float, name: str) -> CentreLine:

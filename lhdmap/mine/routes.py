@@ -9,18 +9,16 @@ from __future__ import annotations
 import functools
 import heapq
 import itertools
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from typing import NamedTuple
-
-import numpy as np
 
 from lhdmap.errors import UsageError
 from lhdmap.machine import Machine
 from lhdmap.mine.network import Branch, Edge, Network, Turn
-from lhdmap.mine.plan import BLIND, MinePlan, PlacePlan
-from lhdmap.mine.polyline import on_line
+from lhdmap.mine.plan import BLIND
+from lhdmap.mine.route import Start, Stop
+from lhdmap.mine.runs import Run, joined, trimmed
 from lhdmap.mine.stands import kept_free_m, overhang_m, place_end, stand_at
-from lhdmap.settings import nearest
 
 _INVERSION_M = 20.0  # what an inversion is worth, as a way
 _REVERSE = 2.5  # a way in reverse against one forwards
@@ -29,68 +27,6 @@ _AT_NODE_M = 13.0  # so near a node a turn may leave an edge, or come into it
 _TEACHING_REVERSE = 8.0  # a teaching drive goes forwards where it can
 LEAST_RADIUS_M = 5.0
 """Turns of a smaller radius are not driven (guidance prototype, tightest bends)."""
-
-
-class Stop(NamedTuple):
-    """One element of a route: a drift to drive through or a place to come to, and in which gear (1, -1; 0: either)."""
-
-    name: str
-    gear: int
-
-
-class Run(NamedTuple):
-    """A way along a tube, of the leading axle: from and to (m), and the gear; `stop` names the place that it ends at."""
-
-    tube: int
-    from_m: float
-    to_m: float
-    gear: int
-    stop: str = ""
-
-
-class Start(NamedTuple):
-    """Where a machine stands at first: tube, arc length of its front axle (m), which way it faces (1: along, -1: against)."""
-
-    tube: int
-    at_m: float
-    facing: int
-
-
-def parse_route(text: str, plan: MinePlan) -> list[Stop]:
-    """Return the elements of `T1,T2,-T3,DP1`.
-
-    Raises:
-        UsageError: a name is not in the plan.
-    """
-    known = [drift.name for drift in plan.drifts] + [place.name for place in plan.places]
-    stops = []
-    for word in (part.strip() for part in text.split(",")):
-        name = word.removeprefix("-")
-        if name not in known:
-            raise UsageError(f"route {text}: '{name}' is no drift or place of mine '{plan.name}'{nearest(name, known)}")
-        stops.append(Stop(name, -1 if word.startswith("-") else 1))
-    return stops
-
-
-def start_of(network: Network, machine: Machine, name: str | None) -> Start:
-    """Return where a drive begins: at a place, at the start of a drift, or, without a name, where one parks or T1 begins.
-
-    Raises:
-        UsageError: the name is not in the plan.
-    """
-    plan = network.plan
-    if name is None:
-        park = next((place for place in plan.places if place.kind == "park"), None)
-        name = plan.drifts[0].name if park is None else park.name
-    place = next((one for one in plan.places if one.name == name), None)
-    if place is not None:
-        return Start(*stand_at(network, place, machine))
-    if name not in [drift.name for drift in plan.drifts]:
-        known = [drift.name for drift in plan.drifts] + [one.name for one in plan.places]
-        raise UsageError(f"start '{name}' is no drift or place of mine '{plan.name}'{nearest(name, known)}")
-    tube = network.tube(name)
-    behind = PlacePlan(drift=name, kind="park", side="end", at_m=0.0, name="")
-    return Start(*stand_at(network, behind, machine))._replace(tube=tube)
 
 
 class _State(NamedTuple):
@@ -116,6 +52,7 @@ class Planner:
     def __init__(self, network: Network, machine: Machine) -> None:
         self.network, self.machine = network, machine
         self._wheelbase_m, self._reverse = machine.dimensions.wheelbase_m, _REVERSE
+        self.left_out: list[str] = []
         self._turns: dict[tuple[int, Branch], list[Turn]] = {}
         for turn in network.turns:
             if turn.tube < 0 or turn.radius_m >= LEAST_RADIUS_M:
@@ -147,10 +84,10 @@ class Planner:
             state, driven = found
             runs = [*runs, *self._named(self._short_of_node(state, driven) if last else driven, stop)]
             states = {state: ()}
-        return _trimmed(self.network, _joined(runs))
+        return trimmed(self.network, joined(runs))
 
     def teaching(self, start: Start) -> list[Run]:
-        """Return the runs of a drive through every edge that can be reached, each time the nearest that is left."""
+        """Return the runs of a drive through every edge that can be reached, each time the nearest; `left_out` are the others."""
         self._reverse = _TEACHING_REVERSE
         runs, states = self._begin(start)
         left = {index for index, edge in enumerate(self.network.edges) if not self._blind(edge)}
@@ -162,7 +99,8 @@ class Planner:
             runs += driven
             left -= {k for k in left for run in driven if self._covered(k, run)}
             states = {state: ()}
-        return _trimmed(self.network, _joined(runs))
+        self.left_out = sorted({self.network.tubes[self.network.edges[k].tube].name for k in left})
+        return trimmed(self.network, joined(runs))
 
     def _blind(self, edge: Edge) -> bool:
         place = self.network.tubes[edge.tube].place
@@ -367,41 +305,3 @@ class Planner:
                 if step.state not in done:
                     heapq.heappush(queue, (*following, ()))
         return None
-
-
-def _joined(runs: Iterable[Run]) -> list[Run]:
-    """Return runs of which those that go on in the same tube are one."""
-    joined: list[Run] = []
-    for run in runs:
-        before = joined[-1] if joined else None
-        if before is not None and not before.stop and before.tube == run.tube and before.gear == run.gear:
-            joined[-1] = before._replace(to_m=run.to_m, stop=run.stop)
-        else:
-            joined.append(run)
-    return joined
-
-
-def _trimmed(network: Network, runs: list[Run]) -> list[Run]:
-    """Return runs that end and begin where the turns between them do; who stands in a turn begins there."""
-    trimmed: list[Run | None] = list(runs)
-    for k, run in enumerate(runs):
-        turn = network.tubes[run.tube]
-        if turn.kind != "turn":
-            continue
-        for near in (k - 1, k + 1):
-            other = trimmed[near] if 0 <= near < len(runs) else None
-            if other is None or other.gear != run.gear or network.tubes[other.tube].kind == "turn":
-                continue
-            line, sign = network.tubes[other.tube].line, 1.0 if other.to_m > other.from_m else -1.0
-            cut_m = float(on_line(line, turn.pose(run.from_m if near < k else run.to_m)[:3])[0])
-            shorter = other._replace(to_m=cut_m) if near < k else other._replace(from_m=cut_m)
-            if (shorter.to_m - shorter.from_m) * sign > 0.0:
-                trimmed[near] = shorter
-                continue
-            there = other.from_m if near < k else other.to_m
-            at_m = float(on_line(turn.line, line.at(np.array([there]))[0, :3])[0])
-            trimmed[near] = None
-            mine = trimmed[k] or run
-            stop = mine.stop or other.stop
-            trimmed[k] = mine._replace(from_m=at_m) if near < k else mine._replace(to_m=at_m, stop=stop)
-    return [run for run in trimmed if run is not None]

@@ -12,7 +12,7 @@ from lhdmap.kinematics import articulation_along_path
 from lhdmap.machine import Machine
 from lhdmap.messages import FloatArray
 from lhdmap.mine.network import Network
-from lhdmap.mine.routes import Run
+from lhdmap.mine.runs import Run
 from lhdmap.mine.stands import overhang_m
 
 STEP_M = 0.05

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
@@ -11,20 +12,21 @@ from lhdmap.machine import Machine, load_machine
 from lhdmap.messages import FloatArray
 from lhdmap.mine.network import Network, make_network
 from lhdmap.mine.plan import find_plan, load_plan
-from lhdmap.mine.routes import Planner, Start, parse_route, start_of
+from lhdmap.mine.route import start_of
 from lhdmap.mine.stands import place_pose
 from lhdmap.mine.topology import Directory
-from lhdmap.mine.ways import Leg, legs_of
 from lhdmap.replay.faults import Position
 from lhdmap.replay.parts import Parts, Touch
 from lhdmap.replay.scenario import TELEOPERATOR, Scenario
-from lhdmap.simulation.history import START_NS, Column
+from lhdmap.simulation.history import START_NS
+from lhdmap.simulation.mine_drive import node_of, planned
 from lhdmap.simulation.mine_world.bumper import Bumper
 from lhdmap.simulation.mine_world.world import MineWorld
-from lhdmap.simulation.operator import Operator, OperatorSettings, wander_of
+from lhdmap.simulation.operator import Operator, OperatorSettings
 from lhdmap.simulation.sensing.sections import SensorSettings
 from lhdmap.simulation.sensing.sensor import Sensor
 from lhdmap.simulation.sensing.suite import sensors_of
+from lhdmap.simulation.vehicle.shaking import VIBRATION_DEG, Shaking
 from lhdmap.simulation.vehicle.state import VehicleState
 from lhdmap.simulation.vehicle.vehicle import Vehicle
 
@@ -61,7 +63,7 @@ def mine_parts(scenario: Scenario) -> Parts:
     network = make_network(load_plan(find_plan(scenario.mine)))
     start = start_of(network, machine, scenario.start or None)
     settings = OperatorSettings(speed_kmh=scenario.speed_kmh, wander_m=scenario.wander_m)
-    legs = _legs(scenario, network, machine, start, settings)
+    legs = planned(network, machine, start, scenario.route or scenario.goal, settings, scenario.seed)
     world = MineWorld(network, machine)
     vehicle = Vehicle(machine, world, seed=scenario.seed)
     places = _places(network, machine)
@@ -74,24 +76,13 @@ def mine_parts(scenario: Scenario) -> Parts:
         sensors=_sensors(scenario, machine, network),
         operator=Operator(legs, machine, settings, seed=scenario.seed),
         bumper=BodyBumper(machine, world),
+        shaking=Shaking(math.radians(VIBRATION_DEG), scenario.seed),
         changing=world,
         places=places,
         goal_m=places.get(scenario.goal),
         lines_m=_walls(network),
         expected_s=_SLOWER * way_m / (scenario.speed_kmh / 3.6) + 10.0,
     )
-
-
-def _legs(
-    scenario: Scenario, network: Network, machine: Machine, start: Start, settings: OperatorSettings
-) -> list[Leg]:
-    planner = Planner(network, machine)
-    route = scenario.route or scenario.goal
-    stops = parse_route(route, network.plan) if route else []
-    runs = planner.route(start, stops) if stops else planner.teaching(start)
-    way_m = sum(abs(run.to_m - run.from_m) for run in runs)
-    pose = network.tubes[start.tube].pose(start.at_m, start.facing)
-    return legs_of(network, runs, machine, start=pose, wander=wander_of(settings, way_m, scenario.seed))
 
 
 def _state(vehicle: Vehicle, pose: FloatArray, scenario: Scenario) -> VehicleState:
@@ -101,22 +92,12 @@ def _state(vehicle: Vehicle, pose: FloatArray, scenario: Scenario) -> VehicleSta
 
 def _sensors(scenario: Scenario, machine: Machine, network: Network) -> list[Sensor]:
     mode = _mode_of("teleoperated" if scenario.driver == TELEOPERATOR else "manual")
-    return sensors_of(machine, SensorSettings(), seed=scenario.seed, mode=mode, node=_node_of(network))
+    return sensors_of(machine, SensorSettings(), seed=scenario.seed, mode=mode, node=node_of(Directory(network)))
 
 
 def _mode_of(mode: str) -> Callable[[int, FloatArray], str]:
     def told(stamp_ns: int, state: FloatArray) -> str:  # noqa: ARG001  # a `Told`
         return mode
-
-    return told
-
-
-def _node_of(network: Network) -> Callable[[int, FloatArray], str]:
-    """Return what tells the name of the node that a machine is in: the teaching drive's `/operation/node`."""
-    directory = Directory(network)
-
-    def told(stamp_ns: int, state: FloatArray) -> str:  # noqa: ARG001  # a `Told`
-        return directory.at(state[[Column.X, Column.Y, Column.Z]]).node
 
     return told
 

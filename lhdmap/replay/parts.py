@@ -14,6 +14,7 @@ from lhdmap.replay.faults import Position
 from lhdmap.simulation.drift import Mesh
 from lhdmap.simulation.sensing.sensor import Sensor
 from lhdmap.simulation.surroundings import View
+from lhdmap.simulation.vehicle.shaking import Shaking
 
 
 class State(Protocol):
@@ -120,6 +121,7 @@ class Parts:
         goal_m: where the drive must end.
         lines_m: walls or centre lines (N, 3) to draw.
         expected_s: about how long it will take.
+        shaking: vibration that the sensors feel.
         settings: of the perception.
     """
 
@@ -135,4 +137,5 @@ class Parts:
     goal_m: Position | None = None
     lines_m: Sequence[FloatArray] = ()
     expected_s: float | None = None
+    shaking: Shaking | None = None
     settings: Settings = field(default_factory=Settings)

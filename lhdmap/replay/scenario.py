@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from lhdmap.errors import ConfigError, UsageError
+from lhdmap.errors import ConfigError, InputError, UsageError
 from lhdmap.replay.link import LINK, LinkSettings
 from lhdmap.resources import resource
 from lhdmap.roles import ROLES
@@ -107,7 +107,8 @@ def find_scenario(word: str) -> Path:
     """Return the file of a scenario: a path, or the name of one that ships.
 
     Raises:
-        UsageError: there is none.
+        InputError: there is no such file.
+        UsageError: there is no such name.
     """
     path = Path(word)
     if path.is_file():
@@ -115,6 +116,8 @@ def find_scenario(word: str) -> Path:
     shipped = shipped_scenarios()
     if word in shipped:
         return shipped[word]
+    if path.suffix == ".toml":
+        raise InputError(f"{path}: no such file; a scenario file was wanted")
     raise UsageError(f"'{word}': a scenario file or the name of one that ships was wanted{nearest(word, shipped)}")
 
 
@@ -131,14 +134,15 @@ def load_scenario(path: Path, **over: Any) -> Scenario:
         ConfigError: a key or a value in it is wrong.
     """
     scenario = load_tree(Scenario, path, "scenario file")
-    beside: dict[str, Any] = {key: _beside(path, getattr(scenario, key)) for key in ("mine", "machine", "map")}
+    beside: dict[str, Any] = {key: _beside(path, getattr(scenario, key)) for key in ("mine", "machine")}
+    beside["map"] = _beside(path, scenario.map, folder=True)
     return replace(scenario, **beside, **over)
 
 
-def _beside(path: Path, name: str) -> str:
-    """Return a name, or the path of what is beside the scenario under it."""
+def _beside(path: Path, name: str, *, folder: bool = False) -> str:
+    """Return a name, or the path of the file (or folder) that is beside the scenario under it."""
     there = path.parent / name
-    return str(there) if name and there.exists() else name
+    return str(there) if name and (there.is_dir() if folder else there.is_file()) else name
 
 
 def scenario_toml(scenario: Scenario) -> str:

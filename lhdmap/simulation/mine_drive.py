@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import json
 import math
+import warnings
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -14,16 +15,18 @@ from typing import Any
 
 import numpy as np
 
-from lhdmap.errors import InputError, UsageError
+from lhdmap.errors import InputError, LhdmapWarning, UsageError
 from lhdmap.machine import Machine
 from lhdmap.messages import FloatArray, GroundTruth, Record
 from lhdmap.mine.network import Network
-from lhdmap.mine.routes import Planner, Start, parse_route, start_of
+from lhdmap.mine.route import Start, parse_route, start_of
+from lhdmap.mine.routes import Planner
 from lhdmap.mine.topology import Directory, topology_json
 from lhdmap.mine.ways import Leg, legs_of
 from lhdmap.outputs import OutputFiles
 from lhdmap.roles import ROLES
 from lhdmap.simulation.history import SECOND_NS, START_NS, Column, History
+from lhdmap.simulation.mesh_file import write_ply
 from lhdmap.simulation.mine_world.bumper import Bumper
 from lhdmap.simulation.mine_world.world import MineWorld
 from lhdmap.simulation.operator import Operator, OperatorSettings, wander_of
@@ -31,7 +34,7 @@ from lhdmap.simulation.sensing.faults import FaultSettings, with_faults
 from lhdmap.simulation.sensing.sections import SensorSettings
 from lhdmap.simulation.sensing.sensor import Due, Sensor
 from lhdmap.simulation.sensing.suite import sensors_of
-from lhdmap.simulation.vehicle.shaking import Shaking
+from lhdmap.simulation.vehicle.shaking import VIBRATION_DEG, Shaking
 from lhdmap.simulation.vehicle.state import VehicleState
 from lhdmap.simulation.vehicle.vehicle import Vehicle
 from lhdmap.trajectory import Trajectory, write_tum
@@ -42,7 +45,6 @@ _LOOK_STEPS = 10
 _REST_STEPS = 100
 _SLOWER = 1.6  # a drive with its bends and rests takes so much longer than its way at full speed
 _LATE = 4.0  # times the expected duration: he will not arrive any more
-_VIBRATION_DEG = 0.02
 
 Progress = Callable[[Iterator[Record], float], Iterator[Record]]
 
@@ -59,7 +61,7 @@ class MineDriveSettings:
     operator: OperatorSettings = field(default_factory=OperatorSettings)
     sensors: SensorSettings = field(default_factory=SensorSettings)
     faults: tuple[FaultSettings, ...] = ()
-    vibration_deg: float = _VIBRATION_DEG
+    vibration_deg: float = VIBRATION_DEG
 
 
 @dataclass(frozen=True, slots=True)
@@ -89,7 +91,7 @@ class MineDrive:
         """
         self.network, self.machine, self.settings = network, machine, settings
         start = start_of(network, machine, settings.start or None)
-        self.legs = planned(network, machine, start, settings)
+        self.legs = planned(network, machine, start, settings.route, settings.operator, settings.seed)
         self.world = MineWorld(network, machine, view_m=settings.sensors.scanner.max_range_m + 5.0)
         self.directory = Directory(network)
         self._vehicle = Vehicle(machine, self.world, seed=settings.seed)
@@ -141,20 +143,14 @@ class MineDrive:
             f"the operator is stuck in '{where.node}' at {where.at_m:.0f} m, on leg {self._operator.leg + 1}"
         )
 
-    def where(self, _stamp_ns: int, state: FloatArray) -> str:
-        """Return the name of the node that a machine is in."""
-        return self.directory.at(state[[Column.X, Column.Y, Column.Z]]).node
-
     def _sensors(self) -> list[Sensor]:
         settings = self.settings
-        node = self.where if settings.names else None
+        node = node_of(self.directory) if settings.names else None
         sensors = sensors_of(self.machine, settings.sensors, seed=settings.seed, node=node, truth=True)
         return with_faults(sensors, settings.faults, seed=settings.seed)
 
     def _row(self) -> FloatArray:
-        row = self.state.row()
-        row[[Column.ROLL, Column.PITCH]] += self._shaking.at((self.state.time_ns - START_NS) * 1e-9)
-        return row
+        return self._shaking.onto(self.state.row(), (self.state.time_ns - START_NS) / SECOND_NS)
 
     def _advance(self, step: int) -> None:
         if step % _COMMAND_STEPS == 0:
@@ -176,22 +172,38 @@ class MineDrive:
                 self.contacts.append(told)
 
 
-def planned(network: Network, machine: Machine, start: Start, settings: MineDriveSettings) -> list[Leg]:
-    """Return the legs of a route, or of a teaching drive through every drift where there is none.
+def planned(
+    network: Network, machine: Machine, start: Start, route: str, operator: OperatorSettings, seed: int
+) -> list[Leg]:
+    """Return the legs of a route, or of a teaching drive through every drift where it is empty.
+
+    Warns of drifts that a teaching drive cannot reach.
 
     Raises:
-        UsageError: the route is not in the plan, or there is no way.
+        UsageError: the route is not in the plan, there is no way, or none to drive.
     """
     planner = Planner(network, machine)
-    stops = parse_route(settings.route, network.plan) if settings.route else []
-    runs = planner.route(start, stops) if stops else planner.teaching(start)
+    runs = planner.route(start, parse_route(route, network.plan)) if route else planner.teaching(start)
     way_m = sum(abs(run.to_m - run.from_m) for run in runs)
-    wander = wander_of(settings.operator, way_m, settings.seed)
     pose = network.tubes[start.tube].pose(start.at_m, start.facing)
-    legs = legs_of(network, runs, machine, start=pose, wander=wander)
+    legs = legs_of(network, runs, machine, start=pose, wander=wander_of(operator, way_m, seed))
     if not legs:
-        raise UsageError(f"route {settings.route}: the machine is there already, a way to drive was wanted")
+        where = (
+            f"route {route}: the machine is there already" if route else "the machine fills the drift that it stands in"
+        )
+        raise UsageError(f"{where}; a way to drive was wanted")
+    if not route and planner.left_out:
+        warnings.warn(f"no way leads to {', '.join(planner.left_out)}: not driven through", LhdmapWarning, stacklevel=2)
     return legs
+
+
+def node_of(directory: Directory) -> Callable[[int, FloatArray], str]:
+    """Return what tells the node that a machine is in for a stamp and its state (17,): the operator's `/operation/node`."""
+
+    def told(_stamp_ns: int, state: FloatArray) -> str:
+        return directory.at(state[[Column.X, Column.Y, Column.Z]]).node
+
+    return told
 
 
 def simulate_mine(
@@ -200,10 +212,13 @@ def simulate_mine(
     settings: MineDriveSettings,
     path: Path,
     *,
+    mesh_path: Path | None = None,
     progress: Progress | None = None,
     force: bool = False,
 ) -> SimulatedMineDrive:
     """Simulate a drive into the log `path`; beside it `.truth.tum`, `.topology.json` and `.nodes.csv` (contract: mine plans).
+
+    `mesh_path` takes the mine's surface (PLY, in `map`).
 
     Raises:
         UsageError: a file exists already (without `force`), the log's name does not end in .mcap, or there is no such route.
@@ -214,7 +229,9 @@ def simulate_mine(
     truth_file, topology_file = path.with_suffix(".truth.tum"), path.with_suffix(".topology.json")
     nodes_file = path.with_suffix(".nodes.csv")
     drive = MineDrive(network, machine, settings)
-    with OutputFiles(truth_file, topology_file, nodes_file, path, force=force) as files:
+    with OutputFiles(truth_file, topology_file, nodes_file, mesh_path, path, force=force) as files:
+        if mesh_path is not None:
+            write_ply(files.at(mesh_path), drive.world.meshes())
         table = topology_json(network, machine)
         files.at(topology_file).write_text(json.dumps(table, indent=1) + "\n", encoding="utf-8")
         messages, truth = _written(drive, files.at(path), files.at(nodes_file), progress)

@@ -10,7 +10,9 @@ from lhdmap.errors import UsageError
 from lhdmap.machine import Machine
 from lhdmap.mine.network import Network, make_network
 from lhdmap.mine.plan import find_plan, load_plan
-from lhdmap.mine.routes import Planner, Run, Start, parse_route, start_of
+from lhdmap.mine.route import Start, parse_route, start_of
+from lhdmap.mine.routes import Planner
+from lhdmap.mine.runs import Run
 from lhdmap.mine.ways import STEP_M, Leg, legs_of
 
 from tests.mine.plans import TEE, network_of

@@ -11,17 +11,20 @@ from pathlib import Path
 import numpy as np
 import pytest
 from lhdmap.cli.main import main
+from lhdmap.errors import LhdmapWarning, UsageError
 from lhdmap.logs.source import LogSource
 from lhdmap.machine import Machine
 from lhdmap.messages import GroundTruth, LaserScan, Message, Tachometer, Text
 from lhdmap.mine.network import Network, make_network
 from lhdmap.mine.plan import find_plan, load_plan
+from lhdmap.simulation.history import Column
 from lhdmap.simulation.mine_drive import MineDrive, MineDriveSettings, SimulatedMineDrive, simulate_mine
 from lhdmap.simulation.operator import OperatorSettings
 from lhdmap.simulation.sensing.faults import FaultSettings
+from lhdmap.simulation.vehicle.shaking import VIBRATION_DEG, Shaking
 from lhdmap.trajectory import read_tum
 
-from tests.mine.plans import TEE, network_of
+from tests.mine.plans import TEE, lines, network_of
 
 MACHINE = Machine()
 DRAW_POINT = [{"drift": "B", "kind": "draw_point", "side": "end", "name": "DP"}]
@@ -170,3 +173,46 @@ def test_the_command_writes_log_truth_nodes_and_topology(tmp_path: Path, capsys:
     assert values["contacts"] == []
     files = {path.name for path in tmp_path.iterdir()}
     assert files == {"short.toml", "out.mcap", "out.truth.tum", "out.topology.json", "out.nodes.csv"}
+
+
+def test_drifts_that_no_way_leads_to_are_told() -> None:
+    apart = lines(("A", [[0, 0, 0], [60, 0, 0]]), ("B", [[0, 40, 0], [60, 40, 0]]))
+    with pytest.warns(LhdmapWarning, match="no way leads to B: not driven through"):
+        MineDrive(network_of(apart, walls={"mesh_m": 0.3}), MACHINE, MineDriveSettings())
+
+
+def test_a_drift_that_the_machine_fills_is_refused() -> None:
+    with pytest.raises(UsageError, match="the machine fills the drift"):
+        MineDrive(network_of(lines(("A", [[0, 0, 0], [9, 0, 0]]))), MACHINE, MineDriveSettings())
+
+
+def test_the_mesh_goes_where_the_log_goes(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    plan = tmp_path / "short.toml"
+    plan.write_text(
+        '[walls]\nmesh_m = 0.3\n[[drift]]\nname = "A"\nline_m = [[0, 0, 0], [25, 0, 0]]\n', encoding="utf-8"
+    )
+    words = [
+        "simulate",
+        "mine",
+        str(plan),
+        "--route",
+        "A",
+        "-o",
+        str(tmp_path / "a.mcap"),
+        "--mesh",
+        str(tmp_path / "a.ply"),
+    ]
+    assert main(words) == 0
+    assert main(words) == 2
+    assert main([*words, "--force"]) == 0
+    assert (tmp_path / "a.ply").read_bytes().startswith(b"ply")
+    assert "exists already" in capsys.readouterr().err
+
+
+def test_vibration_has_its_size_and_its_band() -> None:
+    shaking = Shaking(math.radians(VIBRATION_DEG), 3)
+    rolls = np.array([shaking.onto(np.zeros(len(Column)), 0.01 * k)[Column.ROLL] for k in range(20_000)])
+    assert np.degrees(rolls.std()) == pytest.approx(VIBRATION_DEG, rel=0.1)
+    power = np.abs(np.fft.rfft(rolls)) ** 2
+    frequency = np.fft.rfftfreq(len(rolls), 0.01)
+    assert power[(frequency > 3.9) & (frequency < 9.1)].sum() > 0.99 * power.sum()

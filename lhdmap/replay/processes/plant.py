@@ -65,7 +65,8 @@ class Plant(Process):
     def _seen(self, at_ns: int) -> Iterator[Outgoing]:
         """Yield what there is to see of the state at a time: the truth, and readings that are complete by then."""
         state = self._state
-        self.history.append(state.row())
+        row, shaking = state.row(), self._parts.shaking
+        self.history.append(row if shaking is None else shaking.onto(row, (at_ns - START_NS) / SECOND_NS))
         yield Outgoing(STATE, state, at_ns)
         for record in self._due.read(self.history, self._parts.world):
             yield Outgoing(record.topic, record.message, record.log_time_ns)

@@ -146,6 +146,7 @@ class _Distorted:
         return self._sensor.next_ns
 
     def read(self, history: History, world: View) -> list[Record]:
+        """Return what is left of the reading that is due."""
         now_ns = self._sensor.next_ns
         records = self._sensor.read(history, world)
         self._index += 1
@@ -184,6 +185,7 @@ class _Frozen:
         return self._sensor.next_ns
 
     def read(self, history: History, world: View) -> list[Record]:
+        """Return what is left of the reading that is due."""
         frozen = self._window.holds(self._sensor.next_ns)
         records = self._sensor.read(history, world)
         if not frozen or not self._held:
@@ -209,6 +211,7 @@ class _Delayed:
         return min(self._sensor.next_ns, self._late[0][0]) if self._late else self._sensor.next_ns
 
     def read(self, history: History, world: View) -> list[Record]:
+        """Return what is left of the reading that is due."""
         now_ns = self._sensor.next_ns
         if self._late and self._late[0][0] <= now_ns:
             return [heapq.heappop(self._late)[2]]

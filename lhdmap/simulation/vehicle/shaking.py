@@ -7,9 +7,12 @@ import math
 import numpy as np
 
 from lhdmap.messages import FloatArray
+from lhdmap.simulation.history import Column
 
 _TONES = 12
 _BAND_HZ = (4.0, 9.0)
+VIBRATION_DEG = 0.02
+"""Standard deviation where nothing else is said, as in the drift scenario."""
 
 
 class Shaking:
@@ -25,3 +28,8 @@ class Shaking:
         """Return roll and pitch, shape (2,)."""
         angles: FloatArray = self._amplitude * np.sin(self._omega * time_s + self._phase).sum(axis=1)
         return angles
+
+    def onto(self, row: FloatArray, time_s: float) -> FloatArray:
+        """Return a row (17,) of a `History` with it; the row is changed."""
+        row[[Column.ROLL, Column.PITCH]] += self.at(time_s)
+        return row
