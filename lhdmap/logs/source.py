@@ -33,7 +33,8 @@ class LogSource:
 
     After entering, `roles` says which topic plays which role (of all files together), `start_ns` and `end_ns` which log
     times are covered, `survey` what was found in a quick look: sensors that say nothing have lost their roles.
-    `warnings` and `damage` fill while reading. `force`: a log that the survey calls unusable is used nevertheless.
+    `warnings` and `damage` fill while reading. `force`: a log that the survey calls unusable is used nevertheless. `survey`: of
+    the same log, where it was opened before: it is not looked through again.
     """
 
     def __init__(
@@ -42,6 +43,7 @@ class LogSource:
         overrides: Mapping[str, str] | None = None,
         *,
         force: bool = False,
+        survey: Survey | None = None,
     ) -> None:
         listed = [paths] if isinstance(paths, (str, Path)) else list(paths)
         if not listed:
@@ -50,6 +52,7 @@ class LogSource:
         self.roles: dict[str, str] = {}
         self._overrides = dict(overrides or {})
         self._force = force
+        self._known = survey
         self.survey = Survey()
         self._readers: list[LogReader] = []
         self._stack = ExitStack()
@@ -81,7 +84,7 @@ class LogSource:
 
     def _look_through(self) -> None:
         """Take the survey and act on it."""
-        self.survey = survey = take_survey(self._readers, self.roles)
+        self.survey = survey = self._known or take_survey(self._readers, self.roles)
         if survey.fatal and not self._force:
             first = survey.fatal[0]
             where = f"{first.topic}: " if first.topic else ""

@@ -45,6 +45,18 @@ class View(NamedTuple):
     levelled: bool = True
 
 
+class _Judged(NamedTuple):
+    """A match in the body's axes.
+
+    `information` (3,): what the scan tells along, across and of the heading, the others unknown; `weak`: whether that is too
+    little of one; `covariance` (3, 3): of the pose against the local map.
+    """
+
+    information: FloatArray
+    weak: bool
+    covariance: FloatArray
+
+
 _PLAIN = View()
 Placement = FloatArray | Callable[[], FloatArray]
 
@@ -94,7 +106,7 @@ class PlanarOdometry:
         self._motion.predict(dt_s)
         self.wheels.fuse(wheels, dt_s)
         if not self._rate.due(dt_s, self._motion.velocity) and not self._clock.bunched:
-            return self._step(scan, None)
+            return self._skipped(scan)
         if not isinstance(T_level_sensor, np.ndarray):
             T_level_sensor = T_level_sensor()
         floor_m = self._settings.min_height_m if T_level_sensor[2, 3] > 2.0 * self._settings.min_height_m else -math.inf
@@ -106,15 +118,16 @@ class PlanarOdometry:
             matched = self._matcher.step(points, mount)
         else:
             matched = self._matcher.step(points, mount, self._behind(view, floor_m), view.rise)
-        held = matched.support > _WALLS_ALONE and not self._weak(self._information(matched))
+        judged = self._judged(matched)
+        held = matched.support > _WALLS_ALONE and not judged.weak
         self.wheels.learn(self._motion.pose, matched, held=held and not matched.lost)
-        against_map = body_information(self._motion.P[:3, :3], self._motion.state[2])
-        self._error = self._errors.of(self._motion.pose, matched, against_map, levelled=view.levelled)
-        return self._step(scan, matched)
+        self._error = self._errors.of(self._motion.pose, matched, judged.covariance, levelled=view.levelled)
+        return self._step(scan, matched, judged)
 
-    def _information(self, matched: Matched) -> FloatArray:
-        """Return what the scan tells along, across and of the heading, shape (3,), in the body's axes."""
-        return marginal_information(body_information(matched.information, self._motion.state[2]))
+    def _judged(self, matched: Matched) -> _Judged:
+        heading_rad = self._motion.state[2]
+        information = marginal_information(body_information(matched.information, heading_rad))
+        return _Judged(information, self._weak(information), body_information(self._motion.P[:3, :3], heading_rad))
 
     def _behind(self, view: View, floor_m: float) -> Behind:
         """Return the rear scanner's hits; at rest they add nothing."""
@@ -140,37 +153,36 @@ class PlanarOdometry:
         """What the motion model believes of the stamps."""
         return self._clock
 
-    def _step(self, scan: LaserScan, matched: Matched | None) -> OdometryStep:
-        pose, velocity = self._motion.pose, self._motion.velocity
-        stamp_ns, time_ns = scan.stamp_ns, scan.stamp_ns + half_sweep_ns(scan)
-        covariance = body_information(self._motion.P[:3, :3], pose[2])
-        if matched is None:
-            return OdometryStep(
-                stamp_ns,
-                time_ns,
-                pose,
-                covariance,
-                velocity,
-                np.zeros(3),
-                math.nan,
-                math.nan,
-                False,
-                "",
-                False,
-                False,
-                self.wheels.use,
-            )
-        information = self._information(matched)
-        weak = self._weak(information) or matched.lost or matched.doubtful
+    def _skipped(self, scan: LaserScan) -> OdometryStep:
+        pose = self._motion.pose
+        return OdometryStep(
+            scan.stamp_ns,
+            scan.stamp_ns + half_sweep_ns(scan),
+            pose,
+            body_information(self._motion.P[:3, :3], pose[2]),
+            self._motion.velocity,
+            np.zeros(3),
+            math.nan,
+            math.nan,
+            False,
+            "",
+            False,
+            False,
+            self.wheels.use,
+        )
+
+    def _step(self, scan: LaserScan, matched: Matched, judged: _Judged) -> OdometryStep:
+        information, covariance = judged.information, judged.covariance
+        weak = judged.weak or matched.lost or matched.doubtful
         substitute = ("wheels" if self.wheels.use.used else "motion") if weak else ""
         if weak:
             covariance = inflated(covariance, int(np.argmin(information[:2])), self._settings.weak_inflation)
         return OdometryStep(
-            stamp_ns,
-            time_ns,
-            pose,
+            scan.stamp_ns,
+            scan.stamp_ns + half_sweep_ns(scan),
+            self._motion.pose,
             covariance,
-            velocity,
+            self._motion.velocity,
             information,
             matched.residual_m,
             matched.support,

@@ -23,6 +23,7 @@ _USUAL_LEVER_M, _LEAST_LEVER_M, _LONGEST_LEVER_M = 5.0, 3.0, 50.0
 _LEVER_POWER = 1.5
 _OF_PAIRS = 0.24  # share of noise where scans are compared in pairs: each link of the chain adds its error
 _SECOND = 2
+_NOTHING = np.zeros((3, 3))
 _LITTLE = np.diag([1e-3, 1e-3, 1e-3])  # information of no scan
 _SWAY = np.diag(
     [0.0, 0.0035**2, 0.0]
@@ -46,14 +47,15 @@ class StepErrors:
         """
         s, before = self._settings, pose if self._pose is None else self._pose
         self._scans += 1
-        start = np.zeros((3, 3))
+        start = _NOTHING
         if self._scans == _SECOND:  # placed against one scan: so is the heading of all that follows
-            start[2, 2] = math.radians(s.start_deg) ** 2
+            start = np.diag([0.0, 0.0, math.radians(s.start_deg) ** 2])
         forward_m, aside_m, _ = se2.between(before, pose).tolist()
         way_m = math.hypot(forward_m, aside_m)
-        grown = np.maximum(np.diag(covariance) - self._variance, 0.0)
-        self._pose, self._variance = pose, np.diag(covariance).copy()
+        variance, self._variance = self._variance, covariance.diagonal().copy()
+        self._pose = pose
         if matched.lost:  # nothing holds the pose: what the motion is off stays
+            grown = np.maximum(self._variance - variance, 0.0)
             return StepError(start + np.diag(grown), np.zeros(3), covariance)
         seen = _seen(matched, float(pose[2]))
         self.noise = seen.noise
@@ -89,14 +91,20 @@ class _Seen(NamedTuple):
 
 
 def _seen(matched: Matched, heading_rad: float) -> _Seen:
-    information = body_information(matched.information, heading_rad)
-    noise = _OF_PAIRS * information if matched.noise is None else body_information(matched.noise, heading_rad)
+    noise = _OF_PAIRS * matched.information if matched.noise is None else matched.noise
+    return _Seen(*_told(matched.information, noise, heading_rad))
+
+
+@nb.njit(cache=True)
+def _told(H_map: FloatArray, noise_map: FloatArray, heading_rad: float) -> tuple[float, float, float, float]:
+    """Return the fields of `_Seen` from information and noise (3, 3) in the map's axes."""
+    information, noise = body_information(H_map, heading_rad), body_information(noise_map, heading_rad)
     alone = np.linalg.inv(information + _LITTLE)
-    return _Seen(
-        min(float(np.trace(alone @ noise)), _MOST_NOISE),
-        min(float(noise[0, 0] / (information[0, 0] + _LITTLE[0, 0])), _MOST_NOISE),
-        math.sqrt(float(alone[1, 1] / alone[2, 2])),
-        float(alone[0, 0]),
+    return (
+        min(np.trace(alone @ noise), _MOST_NOISE),
+        min(noise[0, 0] / (information[0, 0] + _LITTLE[0, 0]), _MOST_NOISE),
+        math.sqrt(alone[1, 1] / alone[2, 2]),
+        alone[0, 0],
     )
 
 

@@ -229,7 +229,7 @@ class MappingPipeline:
         speed_mps = float(step.velocity[0])
         match_, flags = (step.residual_m, step.support), (step.degenerate, step.lost)
         wheels = step.wheels, self._slip(time_ns, wheel_mps, math.nan if step.degenerate else speed_mps)
-        std = np.sqrt(np.diag(step.error.covariance)) if isinstance(step, OdometryStep) else _NOT_KNOWN
+        std = step.error.deviations if isinstance(step, OdometryStep) else _NOT_KNOWN
         self.records.add_processed(stamp_ns, match_, (step.information, std), step.substitute, flags, wheels)
         self.records.add_motion(time_ns, speed_mps, wheel_mps, self.wheels.articulation_at(time_ns))
 

@@ -15,6 +15,7 @@ from lhdmap.config import Settings, settings_toml
 from lhdmap.errors import InputError
 from lhdmap.integration.cloud import Cloud
 from lhdmap.logs.source import LogSource
+from lhdmap.logs.survey import Survey
 from lhdmap.machine import Machine
 from lhdmap.messages import FloatArray, Joints, LaserScan, PointCloud
 from lhdmap.names import name_of
@@ -112,7 +113,7 @@ class Outcome:
         rows = ways.rows
         if ways.moved:
             pipeline.sweeps.forget()  # two clouds at a time would take twice the memory
-        sweeps = integrate_again(inputs, pipeline, rows) if ways.moved else pipeline.sweeps
+        sweeps = integrate_again(inputs, pipeline, rows, source.survey) if ways.moved else pipeline.sweeps
         self.cloud: Cloud = sweeps.cloud()
         of_sweeps = sweeps.warnings
         sweeps.forget()
@@ -193,15 +194,17 @@ class Outcome:
         return bounded(data)
 
 
-def integrate_again(inputs: Inputs, pipeline: MappingPipeline, rows: Rows) -> SweepIntegration:
+def integrate_again(
+    inputs: Inputs, pipeline: MappingPipeline, rows: Rows, survey: Survey | None = None
+) -> SweepIntegration:
     """Read the scans once more and integrate them at their final poses: closed loops have moved them, or they are given.
 
-    Sweeps before the first pose or after the last are left out.
+    Sweeps before the first pose or after the last are left out. `survey`: of these logs, where one was taken.
     """
     sweeps = SweepIntegration(inputs.settings, pipeline.machine, pipeline.mounts, None)
     wheels = WheelOdometry(inputs.settings.wheels, pipeline.machine or Machine())
     track, times, sweep_times = FinalTrack(rows), map(int, pipeline.records.times_ns), SweepTimes()
-    with LogSource(list(inputs.logs), inputs.topics, force=inputs.force) as source:
+    with LogSource(list(inputs.logs), inputs.topics, force=inputs.force, survey=survey) as source:
         for role, message in source.messages(
             [role for role in ("front", "rear", "points", "joints") if role in source.roles]
         ):

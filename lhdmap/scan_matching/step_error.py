@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+import numba as nb
 import numpy as np
 
 from lhdmap.geometry import se2
@@ -30,11 +31,23 @@ class StepError(NamedTuple):
         """What the step adds to the error of the way, shape (3, 3): without jitter."""
         return self.walk + np.outer(self.pull, self.pull)
 
+    @property
+    def deviations(self) -> FloatArray:
+        """What of it stands on the diagonal, as standard deviations, shape (3,): asked for at each scan."""
+        return np.sqrt(self.walk.diagonal() + self.pull * self.pull)
+
     def then(self, step: FloatArray, after: StepError) -> StepError:
         """Return the error of this step and the next one, `step` (3,), together."""
-        carried = se2.adjoint(se2.inverse(step))
-        walk = carried @ self.walk @ carried.T + after.walk
-        return StepError(walk, carried @ self.pull + after.pull, after.jitter)
+        return StepError(*_added(self.walk, self.pull, step, after.walk, after.pull), after.jitter)
+
+
+@nb.njit(cache=True)
+def _added(
+    walk: FloatArray, pull: FloatArray, step: FloatArray, next_walk: FloatArray, next_pull: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Return walk and pull of a step, carried on by the next one, `step` (3,), and with its own added."""
+    carried = se2.adjoint(se2.inverse(step))
+    return carried @ walk @ carried.T + next_walk, carried @ pull + next_pull
 
 
 NO_ERROR = StepError(np.zeros((3, 3)), np.zeros(3), np.zeros((3, 3)))

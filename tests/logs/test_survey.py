@@ -111,6 +111,21 @@ def test_wheels_that_say_the_same_for_ever_are_left_out(
         assert role not in source.roles
 
 
+def test_a_log_that_is_opened_again_is_not_looked_through_again(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    log = drives.write(tmp_path / "log.mcap", change=MEANT["millimetres"][0], others=_stuck_tachometer(0.0))
+    with LogSource(log) as first:
+        meant = list(first.messages())
+    monkeypatch.setattr("lhdmap.logs.source.take_survey", lambda *_: pytest.fail("looked through again"))
+    with LogSource(log, survey=first.survey) as again:
+        assert again.roles == first.roles
+        for (role, message), (other_role, other) in zip(again.messages(), meant, strict=True):
+            assert role == other_role
+            if isinstance(message, LaserScan) and isinstance(other, LaserScan):
+                np.testing.assert_array_equal(message.ranges_m, other.ranges_m)
+
+
 def test_a_sensor_that_is_frozen_askew_is_left_out_and_one_at_zero_is_not(tmp_path: Path) -> None:
     def tilted(roll_rad: float) -> Callable[[int], list[tuple[str, Message]]]:
         def at(k: int) -> list[tuple[str, Message]]:

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from lhdmap import trajectory
 from lhdmap.config import Settings
+from lhdmap.logs.survey import Survey
 from lhdmap.messages import LaserScan
 from lhdmap.pipeline import outcome
 from lhdmap.pipeline.build import BuildRequest, build_map
@@ -86,9 +87,11 @@ def test_both_clouds_are_not_held_at_a_time(
 ) -> None:
     left, again = [], outcome.integrate_again
 
-    def watched(inputs: outcome.Inputs, pipeline: MappingPipeline, rows: Rows) -> SweepIntegration:
+    def watched(
+        inputs: outcome.Inputs, pipeline: MappingPipeline, rows: Rows, survey: Survey | None
+    ) -> SweepIntegration:
         left.append(len(pipeline.sweeps.integrator.grid))
-        return again(inputs, pipeline, rows)
+        return again(inputs, pipeline, rows, survey)
 
     monkeypatch.setattr(outcome, "integrate_again", watched)
     build_map(BuildRequest([drive.log], tmp_path / "map", poses=GROUND_TRUTH))

@@ -72,3 +72,8 @@ def test_the_adjoint_carries_a_small_motion() -> None:
     T, small = np.array([2.0, -1.0, 0.8]), 1e-6 * np.array([1.0, 2.0, 3.0])
     moved = se2.compose(se2.compose(T, small), se2.inverse(T))
     assert moved == pytest.approx(se2.adjoint(T) @ small, abs=1e-11)
+
+
+def test_deviations_are_those_of_the_covariance() -> None:
+    error = StepError(np.diag([0.03**2, 0.02**2, 0.01**2]), np.array([0.04, 0.0, 0.0]), np.eye(3))
+    assert error.deviations == pytest.approx([0.05, 0.02, 0.01])
