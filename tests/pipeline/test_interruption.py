@@ -4,9 +4,18 @@ from __future__ import annotations
 
 import signal
 import threading
+from collections.abc import Iterator
 
 import pytest
 from lhdmap.pipeline.interruption import Interruption
+
+
+@pytest.fixture(autouse=True)
+def _handled_by_python() -> Iterator[None]:
+    """Ctrl-C as Python has it: a shell leaves it ignored in what it starts in the background."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)
 
 
 def test_the_first_ctrl_c_asks_and_the_second_raises() -> None:

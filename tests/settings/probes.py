@@ -135,12 +135,17 @@ def recording(settings: Settings) -> str:
 
 
 def _drawn(batches: list[Any]) -> list[Any]:
-    """Return the columns of an entity, less those that tell when the file was made."""
-    names = [name for name in batches[0].schema.names if not name.startswith(("rerun.", "log_t", "RecordingInfo"))]
+    """Return the columns of an entity, less those that tell when the file was made; how rows were batched is chance."""
+    names = sorted({name for batch in batches for name in batch.schema.names})
+    names = [name for name in names if not name.startswith(("rerun.", "log_t", "RecordingInfo"))]
     return [
-        [name, *(str(batch.column(name).to_pylist()) for batch in batches if name in batch.schema.names)]
+        [name, *(str(value) for batch in batches if name in batch.schema.names for value in _values(batch, name))]
         for name in names
     ]
+
+
+def _values(batch: Any, name: str) -> list[Any]:
+    return [value for value in batch.column(name).to_pylist() if value is not None]
 
 
 def plan(settings: Settings) -> str:
