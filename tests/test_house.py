@@ -36,6 +36,9 @@ FLOORS = [
     {"scan_matching"},
     {"logs", "proprioception", "odometry", "integration"},
     {"pile", "rockbreaker"},
+    {"topology"},
+    {"movement", "landmarks"},
+    {"exports"},
     {"smoothing", "simulation", "evaluation"},
     {"report"},
     {"config"},
@@ -48,7 +51,7 @@ FLOORS = [
 
 HEAVY = {
     "numpy", "scipy", "numba", "open3d", "rerun", "matplotlib", "pyarrow", "gtsam", "small_gicp", "kiss_icp", "laspy",
-    "rosbags", "mcap", "rich",
+    "rosbags", "mcap", "rich", "cv2", "skimage", "ezdxf",
 }  # fmt: skip
 
 
