@@ -11,10 +11,8 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
 from lhdmap.exports.content import FREE_SPACE, Content, table_in_map
-from lhdmap.exports.outline import floor_of, outlines
+from lhdmap.exports.outline import floor_of, walls
 from lhdmap.topology.geojson import from_geojson
 from lhdmap.topology.model import Point
 
@@ -58,9 +56,9 @@ def _walls(space: Modelspace, content: Content) -> None:
     lines = [one.line_m for one in topology.tunnels] + [one.line_m for one in topology.connections]
     floor = floor_of(lines)
     for sheet in content.sheets:
-        for plan_m in outlines(sheet):
-            line = content.in_frame(np.column_stack([plan_m, floor.heights_m(plan_m, sheet)]))
-            space.add_polyline3d(line[:-1].tolist(), close=True, dxfattribs={"layer": "WALLS"})
+        for line in walls(sheet, floor):
+            ring = content.in_frame(line[:-1]).tolist()
+            space.add_polyline3d(ring, close=True, dxfattribs={"layer": "WALLS"})
 
 
 def _nodes(space: Modelspace, content: Content) -> None:

@@ -130,5 +130,5 @@ def _edges(
 
 def _bends(line: FloatArray) -> FloatArray:
     """Return the line (N, 3) with as few points as keep it within STRAIGHT_M in plan."""
-    kept: FloatArray = line[thinned(line, STRAIGHT_M)]
+    kept: FloatArray = line[thinned(line[:, :2], STRAIGHT_M)]
     return kept

@@ -22,21 +22,21 @@ OCCUPIED_THRESH, FREE_THRESH = 0.65, 0.196
 
 
 def files(content: Content, path: Path) -> list[Path]:
-    """Return the files: a pair, or one a level, from the lowest: NAME_1, NAME_2, … The YAML files come last."""
+    """Return the files: a pair, or one a level, from the lowest: NAME_1, NAME_2, … The YAML files come last.
+
+    Raises:
+        InputError: the map has no free space.
+    """
     sheets = len(content.sheets)
+    if not sheets:
+        raise InputError(f"{content.folder.path}: free_space.npz has no level in it; build the map again")
     stems = [path.stem] if sheets == 1 else [f"{path.stem}_{k}" for k in range(1, sheets + 1)]
     return [path.with_name(stem + suffix) for suffix in (".pgm", path.suffix) for stem in stems]
 
 
 def write(content: Content, path: Path, at: Callable[[Path], Path]) -> dict[str, Any]:
-    """Write the pairs.
-
-    Raises:
-        InputError: the map has no free space.
-    """
+    """Write the pairs; raises InputError as `files`."""
     sheets = sorted(content.sheets, key=lambda sheet: sheet.height_m)
-    if not sheets:
-        raise InputError(f"{content.folder.path}: free_space.npz has no level in it; build the map again")
     names = files(content, path)
     for sheet, pgm, yaml in zip(sheets, names[: len(sheets)], names[len(sheets) :], strict=True):
         _write_pgm(at(pgm), sheet)

@@ -13,6 +13,8 @@ from lhdmap.topology.sheet import FREE, Sheet
 
 SMOOTH_CELLS = 0.75
 """How far the drawn wall may leave the cells' edges. Assumed: takes the stairs out of oblique walls, keeps corners."""
+SMOOTH_HEIGHT_M = 0.1
+"""How far its height may leave the floor's. Assumed: twice what a floor's bumps are."""
 LEAST_CELLS = 4.0
 """Spots of fewer cells are noise and not drawn. Assumed."""
 _LEVEL_M = 2.0  # beyond a sheet's lowest and highest floor, lines are another level's
@@ -36,7 +38,7 @@ class Floor(NamedTuple):
         return heights
 
 
-def floor_of(lines_m: Sequence[FloatArray], step_m: float = 1.0) -> Floor:
+def floor_of(lines_m: Sequence[FloatArray], step_m: float = 0.25) -> Floor:
     """Return the floor along lines (N, 3), with a point each step."""
     parts = [np.zeros((0, 3)), *(_dense(line, step_m) for line in lines_m if len(line))]
     return Floor(np.concatenate(parts))
@@ -54,7 +56,17 @@ def outlines(sheet: Sheet) -> list[FloatArray]:
     for ring in find_contours(free, 0.5):  # type: ignore[no-untyped-call]
         plan = sheet.origin_m + (ring[:, ::-1] - 0.5) * sheet.cell_m
         if abs(_area_m2(plan)) >= LEAST_CELLS * sheet.cell_m**2:
-            found.append(plan[thinned(plan, SMOOTH_CELLS * sheet.cell_m)])
+            found.append(plan)
+    return found
+
+
+def walls(sheet: Sheet, floor: Floor) -> list[FloatArray]:
+    """Return the outlines (N, 3) at the height of the floor beside them, in `map`, with as few points as show both."""
+    smooth_m = SMOOTH_CELLS * sheet.cell_m
+    found = []
+    for plan in outlines(sheet):
+        line = np.column_stack([plan, floor.heights_m(plan, sheet)])
+        found.append(line[thinned(line * (1.0, 1.0, smooth_m / SMOOTH_HEIGHT_M), smooth_m)])
     return found
 
 

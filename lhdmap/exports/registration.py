@@ -157,7 +157,7 @@ def solve(map_m: FloatArray, grid_m: FloatArray, weights: FloatArray) -> Transfo
 
 
 def register(points: Sequence[ControlPoint], tolerance_m: float = TOLERANCE_M) -> Registration:
-    """Return the map's place in the grid and how well the points fit; whether that is good enough, `shortfalls` says.
+    """Return the map's place in the grid and how well the points fit; whether that is good enough, `refuse_misfit` says.
 
     Raises:
         InputError: too few points, on one spot or line, or too near together for a heading.
@@ -166,27 +166,31 @@ def register(points: Sequence[ControlPoint], tolerance_m: float = TOLERANCE_M) -
     map_m, grid_m = np.array([one.map_m for one in points]), np.array([one.grid_m for one in points])
     weights = np.array([one.std_m for one in points]) ** -2.0
     found = solve(map_m, grid_m, weights)
-    residuals = found.points(map_m) - grid_m
     p, q, _, _ = _centred(map_m, grid_m, weights)
-    lever = float(weights @ (p[:, :2] ** 2).sum(axis=1))  # information about the heading (1/rad^2)
-    spread = float(weights @ (p**2).sum(axis=1))
-    excess = math.sqrt(max(float(weights @ (residuals**2).sum(axis=1)) / (3 * len(points) - 4), 1.0))
-    heading_std_deg = math.degrees(excess / math.sqrt(lever))
-    if heading_std_deg > LARGEST_HEADING_STD_DEG:
+    there = found.directions(p)
+    in_plan, in_space = (float(weights @ (p[:, :n] ** 2).sum(axis=1)) for n in (2, 3))  # information about heading and scale
+    if math.degrees(in_plan**-0.5) > LARGEST_HEADING_STD_DEG:
         raise InputError(
-            f"the control points are too near together: they fix the map's heading only to {heading_std_deg:.2f} deg (standard "
-            f"deviation), at most {LARGEST_HEADING_STD_DEG:g} was wanted; take points farther apart"
+            f"the control points are too near together: they fix the map's heading only to {math.degrees(in_plan**-0.5):.2f} deg "
+            f"(standard deviation), at most {LARGEST_HEADING_STD_DEG:g} was wanted; take points farther apart"
         )
+    scale = float(weights @ (there * q).sum(axis=1)) / in_space
     return Registration(
         found,
         tuple(points),
-        residuals,
+        there - q,
         _left_out(map_m, grid_m, weights),
-        float(weights @ (found.directions(p) * q).sum(axis=1)) / spread,
-        excess / math.sqrt(spread),
-        heading_std_deg,
+        scale,
+        _excess(scale * there - q, weights, 5) * in_space**-0.5,
+        math.degrees(_excess(there - q, weights, 4) * in_plan**-0.5),
         tolerance_m,
     )
+
+
+def _excess(residuals: FloatArray, weights: FloatArray, unknowns: int) -> float:
+    """Return by how much residuals (N, 3) are larger than the points' standard deviations say, at least 1."""
+    free = residuals.size - unknowns
+    return math.sqrt(max(float(weights @ (residuals**2).sum(axis=1)) / free, 1.0))
 
 
 def _centred(map_m: FloatArray, grid_m: FloatArray, weights: FloatArray) -> tuple[FloatArray, ...]:

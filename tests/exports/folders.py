@@ -45,7 +45,9 @@ def sloping_ladder() -> TopologicalMap:
     tunnel = ladder().tunnels[0]
     line = tunnel.line_m.copy()
     line[:, 2] = 3.0 * np.sin(np.linspace(0.0, np.pi, len(line)))
-    return replace(ladder(), tunnels=(replace(tunnel, line_m=line), *ladder().tunnels[1:]))
+    first, *others = ladder().connections
+    connections = (replace(first, line_m=line), *others)
+    return replace(ladder(), tunnels=(replace(tunnel, line_m=line), *ladder().tunnels[1:]), connections=connections)
 
 
 def cloud() -> Cloud:
