@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import math
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -42,6 +43,7 @@ def run(arguments: argparse.Namespace, console: Console) -> int:
     """Write the files, print which."""
     from lhdmap.errors import UsageError
     from lhdmap.exports.export import ExportRequest, export
+    from lhdmap.exports.judgement import Misfit
     from lhdmap.exports.registration import TOLERANCE_M
 
     tolerance_m = TOLERANCE_M if arguments.tolerance is None else arguments.tolerance
@@ -58,7 +60,13 @@ def run(arguments: argparse.Namespace, console: Console) -> int:
         arguments.frame,
         arguments.force,
     )
-    values = export(request)
+    try:
+        values = export(request)
+    except Misfit as misfit:
+        member = misfit.registration.to_json()
+        values = {"format": request.format, "files": [], "registration": member}
+        console.result(values, "\n".join([*_points(member), f"not written: {misfit}"]), failure=misfit)
+        return misfit.exit_code
     console.result(values, _text(values))
     return 0
 
@@ -69,13 +77,17 @@ def _text(values: dict[str, Any]) -> str:
     lines.append(f"{'frame':<14} {values['frame']}")
     lines += [f"{name:<14} {count}" for name, count in values["counts"].items()]
     member = values["registration"]
-    if member:
-        lines.append(
-            f"{'registration':<14} turned by {member['rotation_deg']:.4f} deg, RMS {member.get('rms_m', math.nan):.3f} m, "
-            f"leave-one-out at most {member.get('max_leave_one_out_m', math.nan):.3f} m"
-        )
-        lines += [
+    return "\n".join([*lines, *(_points(member) if member else ())])
+
+
+def _points(member: Mapping[str, Any]) -> list[str]:
+    """Return in words how well a registration fits, and each of its points."""
+    rms_m, worst_m = (member.get(key) for key in ("rms_m", "max_leave_one_out_m"))
+    fit = "" if rms_m is None or worst_m is None else f", RMS {rms_m:.3f} m, leave-one-out at most {worst_m:.3f} m"
+    return [
+        f"{'registration':<14} turned by {member['rotation_deg']:.4f} deg to the left{fit}",
+        *(
             f"  {one['name']:<12} residual {one['miss_m']:.3f} m, leave-one-out {one['leave_one_out_m']:.3f} m"
             for one in member.get("control_points", ())
-        ]
-    return "\n".join(lines)
+        ),
+    ]

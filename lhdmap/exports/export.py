@@ -17,7 +17,7 @@ from lhdmap.exports.formats import FORMATS, files_of, writer_of
 from lhdmap.exports.judgement import refuse_misfit, remarks
 from lhdmap.exports.registration import GRID, TOLERANCE_M, Registration, Transform, read_transform, register
 from lhdmap.mapfolder import MapFolder
-from lhdmap.names import beside
+from lhdmap.names import beside, name_of
 from lhdmap.outputs import OutputFiles
 from lhdmap.topology.geojson import from_geojson
 
@@ -41,7 +41,7 @@ def export(request: ExportRequest) -> dict[str, Any]:
     Raises:
         UsageError: the suffix is none of the format's, a file is there already, or the grid is not known.
         InputError: the map lacks what the format needs, or the control points cannot be used.
-        EvaluationShortfall: the control points do not fit within the tolerance.
+        Misfit: the control points do not fit within the tolerance (an EvaluationShortfall).
     """
     path = _target(request)
     folder = MapFolder.open(request.map)
@@ -64,8 +64,7 @@ def _target(request: ExportRequest) -> Path:
     """Return the file to write; its suffix must be one of the format's."""
     form = FORMATS[request.format]
     if request.output is None:
-        stem = beside(request.map, "")
-        return stem.with_name(stem.name.removesuffix("_") + form.ending + form.suffixes[0])
+        return beside(request.map, "").with_name(name_of(request.map) + form.ending + form.suffixes[0])
     if request.output.suffix.lower() not in form.suffixes:
         raise UsageError(
             f"-o {request.output}: {request.format} was asked for; its suffix is {' or '.join(form.suffixes)}"

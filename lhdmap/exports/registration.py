@@ -168,7 +168,9 @@ def register(points: Sequence[ControlPoint], tolerance_m: float = TOLERANCE_M) -
     found = solve(map_m, grid_m, weights)
     p, q, _, _ = _centred(map_m, grid_m, weights)
     there = found.directions(p)
-    in_plan, in_space = (float(weights @ (p[:, :n] ** 2).sum(axis=1)) for n in (2, 3))  # information about heading and scale
+    in_plan, in_space = (
+        float(weights @ (p[:, :n] ** 2).sum(axis=1)) for n in (2, 3)
+    )  # information about heading and scale
     if math.degrees(in_plan**-0.5) > LARGEST_HEADING_STD_DEG:
         raise InputError(
             f"the control points are too near together: they fix the map's heading only to {math.degrees(in_plan**-0.5):.2f} deg "

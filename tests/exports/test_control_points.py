@@ -96,10 +96,10 @@ def test_toml_mistakes(tmp_path: Path, text: str, told: str) -> None:
 
 
 def test_a_missing_file_and_bytes_that_are_no_text(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match="none.csv"):
+    with pytest.raises(InputError, match="none"):
         read_control_points(tmp_path / "none.csv")
     (tmp_path / "b.csv").write_bytes(b"\xff\xfe\x00")
-    with pytest.raises(InputError, match="b.csv"):
+    with pytest.raises(InputError, match=r"b\.csv"):
         read_control_points(tmp_path / "b.csv")
     (tmp_path / "n.csv").write_text("name,E,N,Z\nDP1,1,2,3\n")
     with pytest.raises(InputError, match="no places"):

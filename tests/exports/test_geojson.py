@@ -94,7 +94,9 @@ def test_the_map_s_own_registration_is_used(tmp_path: Path, frame: str) -> None:
     np.testing.assert_allclose(line, sloping_ladder().tunnels[0].line_m, atol=5e-4)
 
 
-@pytest.mark.parametrize(("name", "frame"), [("nav2-route", "map"), ("occupancy", "map"), ("graphml", "mine_grid"), ("laz", "mine_grid")])
+@pytest.mark.parametrize(
+    ("name", "frame"), [("nav2-route", "map"), ("occupancy", "map"), ("graphml", "mine_grid"), ("laz", "mine_grid")]
+)
 def test_formats_for_machines_stay_in_the_map(tmp_path: Path, name: str, frame: str) -> None:
     folder = _registered(tmp_path, frame="map")
     assert export(ExportRequest(folder, name))["frame"] == frame

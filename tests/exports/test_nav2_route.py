@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from dataclasses import replace
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -39,7 +40,9 @@ def loaded(file: Path) -> nx.MultiDiGraph:
         seen.add(number)
         x, y = one["geometry"]["coordinates"][:2]
         assert isinstance(properties["frame"], str)
-        graph.add_node(number, at=np.array([float(x), float(y)]), frame=properties["frame"], **checked(properties["metadata"]))
+        graph.add_node(
+            number, at=np.array([float(x), float(y)]), frame=properties["frame"], **checked(properties["metadata"])
+        )
         assert properties["operations"] == {}
     for one in edges:
         properties = one["properties"]
@@ -50,7 +53,7 @@ def loaded(file: Path) -> nx.MultiDiGraph:
         assert isinstance(properties["cost"], float)
         assert isinstance(properties["overridable"], bool)
         metadata = checked(properties["metadata"])
-        assert FLOATS <= metadata.keys()
+        assert metadata.keys() >= FLOATS
         graph.add_edge(start, end, key=number, cost=properties["cost"], **metadata)
     return graph
 
@@ -78,7 +81,7 @@ def named(graph: nx.MultiDiGraph, name: str) -> int:
 
 def driven_m(graph: nx.MultiDiGraph, start: str, end: str) -> float:
     path = nx.shortest_path(graph, named(graph, start), named(graph, end), weight="abs_time_taken")
-    return float(sum(np.linalg.norm(graph.nodes[a]["at"] - graph.nodes[b]["at"]) for a, b in zip(path, path[1:], strict=False)))
+    return float(sum(np.linalg.norm(graph.nodes[a]["at"] - graph.nodes[b]["at"]) for a, b in pairwise(path)))
 
 
 def test_nav2_loads_it_and_drives_it(exported: Exporter) -> None:

@@ -32,7 +32,9 @@ def well_spread(map_m: FloatArray) -> bool:
 
 
 @given(clouds, st.floats(-np.pi, np.pi), st.tuples(*[st.floats(-1e7, 1e7)] * 3))
-def test_a_rigid_transform_is_found_again(rows: list[tuple[float, ...]], turn_rad: float, shift: tuple[float, ...]) -> None:
+def test_a_rigid_transform_is_found_again(
+    rows: list[tuple[float, ...]], turn_rad: float, shift: tuple[float, ...]
+) -> None:
     map_m = np.array(rows)
     assume(well_spread(map_m))
     c, s = np.cos(turn_rad), np.sin(turn_rad)
@@ -152,7 +154,7 @@ def test_points_that_do_not_fix_a_map_are_refused(map_m: FloatArray, told: str) 
 
 
 def test_a_mark_in_the_roof_above_one_on_the_floor_is_no_trouble() -> None:
-    map_m = np.vstack([SQUARE, SQUARE[:1] + [0.0, 0.0, 4.0]])
+    map_m = np.vstack([SQUARE, SQUARE[:1] + np.array([0.0, 0.0, 4.0])])
     assert register(points(map_m, in_grid(map_m))).rms_m < 1e-6
 
 

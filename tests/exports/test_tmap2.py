@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -44,7 +45,7 @@ def loaded(file: Path) -> dict[str, Any]:
     return table
 
 
-def typed(table: dict[str, Any], wanted: dict[str, type]) -> None:
+def typed(table: dict[str, Any], wanted: Mapping[str, type]) -> None:
     assert wanted.keys() <= table.keys()
     assert all(isinstance(table[key], kind) for key, kind in wanted.items())
 
@@ -52,7 +53,9 @@ def typed(table: dict[str, Any], wanted: dict[str, type]) -> None:
 def test_its_readers_find_all_they_ask_for(exported: Exporter) -> None:
     table = loaded(exported("tmap2", ".tmap2"))
     assert len(table["nodes"]) == 6
-    graph = nx.DiGraph([(entry["node"]["name"], edge["node"]) for entry in table["nodes"] for edge in entry["node"]["edges"]])
+    graph = nx.DiGraph(
+        [(entry["node"]["name"], edge["node"]) for entry in table["nodes"] for edge in entry["node"]["edges"]]
+    )
     assert graph.number_of_edges() == 14
     assert nx.shortest_path(graph, "DP1", "i2.t1") == ["DP1", "i1.t3", "i1.t1", "i2.t1"]
     dp = next(entry["node"] for entry in table["nodes"] if entry["node"]["name"] == "DP1")
