@@ -89,5 +89,6 @@ def _points(member: Mapping[str, Any]) -> list[str]:
         *(
             f"  {one['name']:<12} residual {one['miss_m']:.3f} m, leave-one-out {one['leave_one_out_m']:.3f} m"
             for one in member.get("control_points", ())
+            if {"miss_m", "leave_one_out_m"} <= one.keys()
         ),
     ]

@@ -23,6 +23,7 @@ if TYPE_CHECKING:
 TEXT_M = 0.8
 LAYERS = {"WALLS": 7, "CENTRELINE": 5, "NODES": 3, "ACCESS_POINTS": 1, "WAYPOINTS": 6, "CONTROL_POINTS": 30}
 """Layers and their colours (AutoCAD colour index)."""
+_AHEAD_M = 1.3
 _ARROW_M = ((-1.0, 0.0), (1.0, 0.0), (0.4, 0.35), (1.0, 0.0), (0.4, -0.35))
 
 
@@ -74,23 +75,24 @@ def _nodes(space: Modelspace, content: Content) -> None:
 
 
 def _arrow(space: Modelspace, layer: str, point: Point) -> None:
+    """Draw an arrow and, before its head, the name: that of its twin, which faces the other way, is behind it."""
     x, y, z, yaw = point.pose.tolist()
     space.add_blockref("ARROW", (x, y, z), {"layer": layer, "rotation": math.degrees(yaw) % 360.0})
-    _text(space, layer, getattr(point, "name", point.id), [x, y, z])
+    ahead = [x + _AHEAD_M * math.cos(yaw), y + _AHEAD_M * math.sin(yaw), z]
+    _text(space, layer, getattr(point, "name", point.id), ahead)
 
 
 def _control_points(space: Modelspace, content: Content) -> None:
     """Draw the control points where the grid has them, or in `map` where the map has them."""
-    member = content.registration or {}
     key = "map_m" if content.T_grid_map is None else "grid_m"
-    for point in member.get("control_points", ()):
+    for point in (content.registration or {}).get("control_points", ()):
         space.add_blockref("MARK", point[key], {"layer": "CONTROL_POINTS"})
-        _text(space, "CONTROL_POINTS", point["name"], point[key])
+        _text(space, "CONTROL_POINTS", str(point["name"]), point[key])
 
 
 def _text(space: Modelspace, layer: str, text: str, at: list[float]) -> None:
     x, y, z = at
-    place = (x + 0.5 * TEXT_M, y + 0.5 * TEXT_M, z)
+    place = (x + 0.3 * TEXT_M, y + 0.3 * TEXT_M, z)
     space.add_text(text, height=TEXT_M, dxfattribs={"layer": layer, "insert": place})
 
 

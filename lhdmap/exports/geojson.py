@@ -24,7 +24,9 @@ def write(content: Content, path: Path, at: Callable[[Path], Path]) -> dict[str,
         if feature["geometry"]["type"] == "Polygon":
             height_m = properties["T_map_node"][2]
             feature["geometry"]["coordinates"] = [
-                _ring(one, height_m) for one in feature["geometry"]["coordinates"] if one
+                _ring(one, height_m)
+                for one in feature["geometry"]["coordinates"]
+                if one  # [] where its outline is not known
             ]
         if content.frame == GRID and "heading_deg" in properties:
             properties["azimuth_deg"] = round((90.0 - properties["heading_deg"]) % 360.0, 4)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
@@ -12,6 +13,7 @@ from lhdmap.exports.content import Content
 from lhdmap.exports.places import Place, Way, places_graph
 
 _TYPES = {bool: "boolean", int: "int", float: "double", str: "string"}
+_NOT_XML = re.compile("[\x00-\x08\x0b\x0c\x0e-\x1f\ud800-\udfff\ufffe\uffff]")
 _SCHEMA = "http://graphml.graphdrawing.org/xmlns"
 Rows = list[tuple[dict[str, str], dict[str, Any]]]
 
@@ -85,5 +87,5 @@ def _data(element: ET.Element, values: Mapping[str, Any], keys: Mapping[str, str
     """Write attributes; one that is infinite (a straight line's radius) is left out."""
     for name, value in values.items():
         if not isinstance(value, float) or math.isfinite(value):
-            text = str(value).lower() if isinstance(value, bool) else str(value)
+            text = str(value).lower() if isinstance(value, bool) else _NOT_XML.sub(" ", str(value))
             ET.SubElement(element, "data", {"key": keys[name]}).text = text

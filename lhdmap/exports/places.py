@@ -77,6 +77,15 @@ def places_graph(topology: TopologicalMap, times_s: Mapping[tuple[str, str], flo
     return PlacesGraph(tuple(places), tuple(ways))
 
 
+def unique_names(graph: PlacesGraph) -> list[str]:
+    """Return a name for each place; where two have the same one, its id follows."""
+    names = [place.name for place in graph.places]
+    return [
+        name if names.count(name) == 1 else f"{name}_{place.points[0].id}"
+        for name, place in zip(names, graph.places, strict=True)
+    ]
+
+
 def drivable_ways(graph: PlacesGraph) -> list[Way]:
     """Return the ways that can be driven; of those between the same two places in one node the quickest."""
     best: dict[tuple[frozenset[int], str], Way] = {}

@@ -133,13 +133,13 @@ def read_transform(member: Mapping[str, Any], where: str) -> Transform:
         InputError: it is damaged.
     """
     try:
-        shift = np.array(member["translation_m"], dtype=float)
-        rotation_rad = math.radians(float(member["rotation_deg"]))
+        rotation_rad, shift = math.radians(member["rotation_deg"]), np.array(member["translation_m"], dtype=float)
+        marks = [one[key] for one in member.get("control_points", ()) for key in ("map_m", "grid_m") if one["name"]]
+        numbers = np.array([shift, *marks], dtype=float)
     except (KeyError, TypeError, ValueError) as error:
-        shift, rotation_rad = np.zeros(0), math.nan
-        del error
-    if shift.shape != (3,) or not np.isfinite([*shift, rotation_rad]).all():
-        raise InputError(f"{where}: its registration is damaged (rotation_deg and translation_m were wanted)")
+        raise InputError(f"{where}: its registration is damaged ({type(error).__name__}: {error})") from error
+    if numbers.shape[1:] != (3,) or not np.isfinite([*numbers.ravel(), rotation_rad]).all():
+        raise InputError(f"{where}: its registration is damaged (translations and points of three numbers were wanted)")
     return Transform(rotation_rad, shift)
 
 

@@ -13,7 +13,7 @@ from typing import Any
 
 from lhdmap.errors import InputError
 from lhdmap.exports.content import Content
-from lhdmap.exports.places import Place, Way, drivable_ways, places_graph
+from lhdmap.exports.places import Place, Way, drivable_ways, places_graph, unique_names
 from lhdmap.names import name_of
 
 ACTION, ACTION_TYPE = "NavigateToPose", "geometry_msgs/PoseStamped"
@@ -36,12 +36,12 @@ def write(content: Content, path: Path, at: Callable[[Path], Path]) -> dict[str,
     if not ways:
         raise InputError(f"{content.folder.path}: no connection that can be driven; a map without an edge is of no use")
     name = name_of(content.folder.path)
-    names = [place.name for place in graph.places]
+    names = unique_names(graph)
     edges: list[list[dict[str, Any]]] = [[] for _ in graph.places]
     for way in ways:
         for a, b in ((way.start, way.end), (way.end, way.start)):
             edges[a].append(_edge(names[a], names[b], way, sum(one["node"] == names[b] for one in edges[a])))
-    nodes = [_node(place, edges[k], name, content.frame) for k, place in enumerate(graph.places)]
+    nodes = [_node(place, names[k], edges[k], name, content.frame) for k, place in enumerate(graph.places)]
     table = {
         "meta": {"last_updated": content.folder.info.get("software", "lhdmap")},
         "metric_map": name,
@@ -62,14 +62,14 @@ def write(content: Content, path: Path, at: Callable[[Path], Path]) -> dict[str,
     return {"nodes": len(nodes), "edges": sum(map(len, edges))}
 
 
-def _node(place: Place, edges: list[dict[str, Any]], name: str, frame: str) -> dict[str, Any]:
+def _node(place: Place, called: str, edges: list[dict[str, Any]], name: str, frame: str) -> dict[str, Any]:
     x, y, z, yaw = (float(value) for value in place.points[0].pose)
     corners = [(-ZONE_M, -ZONE_M), (ZONE_M, -ZONE_M), (ZONE_M, ZONE_M), (-ZONE_M, ZONE_M)]
     through = place.kind in ("access_point", "pass")
     return {
-        "meta": {"map": name, "node": place.name, "pointset": name},
+        "meta": {"map": name, "node": called, "pointset": name},
         "node": {
-            "name": place.name,
+            "name": called,
             "parent_frame": frame,
             "localise_by_topic": "",
             "pose": {

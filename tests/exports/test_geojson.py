@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import shutil
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -111,3 +112,11 @@ def test_what_a_later_version_adds_is_kept(tmp_path: Path) -> None:
     export(ExportRequest(folder, "geojson", tmp_path / "out.geojson", control_points(tmp_path / "p.csv")))
     properties = loaded(tmp_path / "out.geojson")["features"][-1]["properties"]
     assert (properties["cost_s"], properties["dust"]) == (77.5, "high")
+
+
+def test_an_intersection_without_an_outline(exported: Exporter) -> None:
+    first, second = ladder().intersections
+    topology = replace(ladder(), intersections=(replace(first, outline_m=np.zeros((0, 2))), second))
+    table = json.loads(exported("geojson", ".geojson", topology, grid=True).read_text(encoding="utf-8"))
+    assert feature(table, "intersection", "I1")["geometry"]["coordinates"] == []
+    assert len(from_geojson(table).intersections[0].outline_m) == 0

@@ -50,3 +50,13 @@ def test_in_the_grid(exported: Exporter) -> None:
     assert graph.graph["frame"] == "mine_grid"
     dp = graph.nodes["w1"]
     np.testing.assert_allclose([dp["x_m"], dp["y_m"], dp["z_m"]], in_grid(np.array([[0.0, -26.0, 0.0]]))[0], atol=5e-4)
+
+
+@pytest.mark.parametrize("name", ['Förderort <1> & "2"', "a\x01b\x1f"])
+def test_any_name_makes_a_file_that_can_be_read(exported: Exporter, name: str) -> None:
+    (waypoint,) = ladder().waypoints
+    graph = nx.read_graphml(
+        exported("graphml", ".graphml", replace(ladder(), waypoints=(replace(waypoint, name=name),)))
+    )
+    printable = "".join(c for c in name if c.isprintable())
+    assert [part for part in graph.nodes["w1"]["name"] if part in printable]

@@ -170,3 +170,10 @@ def test_a_registration_is_read_back() -> None:
 def test_poses_turn_with_the_map() -> None:
     pose = Transform(np.pi / 2, np.array([10.0, 0.0, 1.0])).pose(np.array([1.0, 0.0, 0.0, np.pi]))
     np.testing.assert_allclose(pose, [10.0, 1.0, 1.0, -np.pi / 2], atol=1e-12)
+
+
+def test_control_points_of_a_registration_are_checked() -> None:
+    member = register(points(SQUARE, in_grid(SQUARE))).to_json()
+    member["control_points"][1]["grid_m"] = [1.0, None, 3.0]
+    with pytest.raises(InputError, match="damaged"):
+        read_transform(member, "topology.geojson")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +16,7 @@ from ruamel.yaml import YAML
 
 from tests.exports.conftest import Exporter
 from tests.exports.folders import in_grid
+from tests.topology.maps import ladder, pose
 
 NODE = {
     "name": str, "parent_frame": str, "localise_by_topic": str, "pose": dict, "properties": dict, "verts": list,
@@ -76,3 +78,10 @@ def test_in_the_grid(exported: Exporter) -> None:
 def test_a_map_without_a_way_is_refused(exported: Exporter) -> None:
     with pytest.raises(InputError, match="no connection"):
         exported("tmap2", ".tmap2", TopologicalMap())
+
+
+def test_places_of_one_name_are_told_apart(exported: Exporter) -> None:
+    topology = ladder()
+    twice = replace(topology.waypoints[0], id="w2", pose=pose(0.0, -20.0, -90.0))
+    table = loaded(exported("tmap2", ".tmap2", replace(topology, waypoints=(*topology.waypoints, twice))))
+    assert {"DP1_w1", "DP1_w2"} <= {entry["node"]["name"] for entry in table["nodes"]}
