@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 TEXT_M = 0.8
 LAYERS = {"WALLS": 7, "CENTRELINE": 5, "NODES": 3, "ACCESS_POINTS": 1, "WAYPOINTS": 6, "CONTROL_POINTS": 30}
 """Layers and their colours (AutoCAD colour index)."""
-_AHEAD_M = 1.3
+_AHEAD_M, _GAP_M = 1.2, 0.3
 _ARROW_M = ((-1.0, 0.0), (1.0, 0.0), (0.4, 0.35), (1.0, 0.0), (0.4, -0.35))
 
 
@@ -79,7 +79,7 @@ def _arrow(space: Modelspace, layer: str, point: Point) -> None:
     x, y, z, yaw = point.pose.tolist()
     space.add_blockref("ARROW", (x, y, z), {"layer": layer, "rotation": math.degrees(yaw) % 360.0})
     ahead = [x + _AHEAD_M * math.cos(yaw), y + _AHEAD_M * math.sin(yaw), z]
-    _text(space, layer, getattr(point, "name", point.id), ahead)
+    _text(space, layer, getattr(point, "name", point.id), ahead, to_left=math.cos(yaw) < -0.5)
 
 
 def _control_points(space: Modelspace, content: Content) -> None:
@@ -90,10 +90,14 @@ def _control_points(space: Modelspace, content: Content) -> None:
         _text(space, "CONTROL_POINTS", str(point["name"]), point[key])
 
 
-def _text(space: Modelspace, layer: str, text: str, at: list[float]) -> None:
+def _text(space: Modelspace, layer: str, text: str, at: list[float], *, to_left: bool = False) -> None:
+    """Write a text to the right of a place, or to its left."""
+    from ezdxf.enums import TextEntityAlignment
+
+    side = TextEntityAlignment.MIDDLE_RIGHT if to_left else TextEntityAlignment.MIDDLE_LEFT
     x, y, z = at
-    place = (x + 0.3 * TEXT_M, y + 0.3 * TEXT_M, z)
-    space.add_text(text, height=TEXT_M, dxfattribs={"layer": layer, "insert": place})
+    place = (x - _GAP_M if to_left else x + _GAP_M, y, z)
+    space.add_text(text, height=TEXT_M, dxfattribs={"layer": layer}).set_placement(place, align=side)
 
 
 def _show_all(drawing: Drawing, space: Modelspace) -> None:

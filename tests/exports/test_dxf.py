@@ -29,7 +29,7 @@ def arrow(file: Path, layer: str, name: str) -> tuple[FloatArray, float]:
     space = readfile(file).modelspace()
     text = next(one for one in space.query(f'TEXT[layer=="{layer}"]') if one.dxf.text == name)
     inserts = list(space.query(f'INSERT[layer=="{layer}"]'))
-    near = min(inserts, key=lambda one: (one.dxf.insert - text.dxf.insert).magnitude)
+    near = min(inserts, key=lambda one: (one.dxf.insert - text.dxf.align_point).magnitude)
     return np.array(near.dxf.insert.xyz), float(near.dxf.rotation)
 
 
