@@ -18,6 +18,7 @@ import time
 from pathlib import Path
 
 from tests.cli.logs import write_room_log
+from tests.exports.folders import map_folder
 
 EXIT_DONE, EXIT_INTERRUPTED = 0, 4
 BAD = ("Traceback", "fault in lhdmap", "Error:", "Exception ignored")
@@ -48,6 +49,7 @@ def commands(work: Path) -> dict[str, list[str]]:
         "eval-pile": ["eval", "pile", "--truth", str(work / "t.csv")],
         "view": ["view", str(log), "--web", "--port", "9191"],
         "screenshot": ["view", str(log), "--screenshot", "{out}.png"],
+        "export": ["export", str(map_folder(work / "map")), "--format", "dxf", "-o", "{out}.dxf"],
         "demo": ["demo", "-o", "{out}"],
     }
 
