@@ -85,9 +85,9 @@ def meeting_m(axes: list[Axis], centre_m: FloatArray, radius_m: float) -> FloatA
     b: FloatArray = _PULL * centre_m
     for axis in axes:
         weight = min(axis.fitted_m / _FIT_M, 1.0) ** 3
-        across = weight * np.outer(_normal(axis.along), _normal(axis.along))
-        A += across
-        b += across @ axis.point_m
+        normal = _normal(axis.along)
+        A += weight * np.outer(normal, normal)
+        b += weight * normal * float(normal @ axis.point_m)
     found: FloatArray = np.linalg.solve(A, b)
     return found if float(np.linalg.norm(found - centre_m)) <= _FARTHEST_RADII * radius_m + 0.5 else centre_m
 
