@@ -81,13 +81,10 @@ def meeting_m(axes: list[Axis], centre_m: FloatArray, radius_m: float) -> FloatA
 
     What lies far from there is no meeting: in a room arms have no axes.
     """
-    A: FloatArray = _PULL * np.eye(2)
-    b: FloatArray = _PULL * centre_m
-    for axis in axes:
-        weight = min(axis.fitted_m / _FIT_M, 1.0) ** 3
-        normal = _normal(axis.along)
-        A += weight * np.outer(normal, normal)
-        b += weight * normal * float(normal @ axis.point_m)
+    normals = np.array([_normal(axis.along) for axis in axes])
+    weighted = np.array([min(axis.fitted_m / _FIT_M, 1.0) ** 3 for axis in axes])[:, None] * normals
+    offsets = (normals * np.array([axis.point_m for axis in axes])).sum(axis=1)
+    A, b = _PULL * np.eye(2) + weighted.T @ normals, _PULL * centre_m + weighted.T @ offsets
     found: FloatArray = np.linalg.solve(A, b)
     return found if float(np.linalg.norm(found - centre_m)) <= _FARTHEST_RADII * radius_m + 0.5 else centre_m
 
