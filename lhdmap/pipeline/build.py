@@ -168,6 +168,8 @@ def _write(
     folder.finished(folder.path / "cloud.ply")
     if outcome.pile is not None:
         folder.write_json("pile.json", outcome.pile.to_json())
+    if evidence := outcome.pipeline.smoother.evidence:
+        folder.write_json("closures.json", {"closures": [one.to_json() for one in evidence]})
     if outcome.topology is not None:
         folder.write_json("topology.geojson", to_geojson(outcome.topology.map))
         folder.finished(write_sheets(folder.path / "free_space.npz", outcome.topology.sheets))
