@@ -31,6 +31,7 @@ COMMANDS = {
     "rockbreaker": "plan trajectories of a rockbreaker over its grizzly",
     "simulate": "write a simulated log and its truth",
     "replay": "drive a simulated machine in closed loop: log, journal, verdict, report",
+    "route": "movement sequence between two places of a map, with inversions and its cost",
     "eval": "compare results with ground truth",
     "config": "print the settings with unit and source",
     "completion": "print the tab completion for bash, zsh or fish",
