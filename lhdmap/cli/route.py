@@ -45,8 +45,12 @@ def run(arguments: argparse.Namespace, console: Console) -> int:
     options = RouteOptions(arguments.heading, arguments.goal_heading, tuple(arguments.avoid), arguments.loaded)
     found = route(topology, arguments.start, arguments.goal, options, settings)
     failure = None if found.feasible else EvaluationShortfall(f"no route: {found.reason}")
-    console.result(route_json(found), "\n".join(route_lines(found, topology)), failure=failure)
+    console.result(route_json(found), _text(arguments, found, topology), failure=failure)
     return 0 if failure is None else failure.exit_code
+
+
+def _text(arguments: argparse.Namespace, route: Route, topology: TopologicalMap) -> str:
+    return "\n".join([f"from to      {arguments.start} to {arguments.goal}", *route_lines(route, topology)])
 
 
 def route_lines(route: Route, topology: TopologicalMap) -> Iterator[str]:
@@ -55,7 +59,7 @@ def route_lines(route: Route, topology: TopologicalMap) -> Iterator[str]:
     if not route.feasible:
         yield f"no route     {route.reason}"
         return
-    yield f"route        {route.reason}: {route.distance_m:.1f} m in {route.time_s:.1f} s, {_inversions(route)}"
+    yield f"route        {route.distance_m:.1f} m in {route.time_s:.1f} s, {_inversions(route)}"
     yield f"heading      {route.start_heading} at the start, {route.goal_heading} at the goal"
     if route.other_heading:
         yield f"otherwise    {route.other_heading}"

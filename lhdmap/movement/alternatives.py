@@ -35,7 +35,7 @@ def alternatives_of(
         known = others.get(route.nodes)
         others[route.nodes] = route if known is None or route.time_s < known.time_s else known
     order = sorted(others.values(), key=lambda route: route.time_s)
-    best = replace(order[0], reason=best.reason)
+    best = order[0]
     lost = [_alternative(route, best) for route in order[1 : count + 1]]
     blocked = _if_free(planner, best, begin, end, avoided)
     return replace(best, alternatives=(*([] if blocked is None else [blocked]), *lost))
@@ -53,7 +53,7 @@ def _tried(
         without[way] = np.inf
         other = planner.sequence(begin.standing(), end, without)
         if other is not None:
-            yield planner.told(other, "")
+            yield planner.told(other)
 
 
 def _if_free(planner: RoutePlanner, best: Route, begin: Place, end: Place, avoided: Bools) -> Alternative | None:
@@ -63,7 +63,7 @@ def _if_free(planner: RoutePlanner, best: Route, begin: Place, end: Place, avoid
     found = planner.sequence(begin.standing(), end, None, everywhere=True)
     if found is None:
         return None
-    route = planner.told(found, "")
+    route = planner.told(found)
     blocks = tuple(blocks_on(planner.topology, planner.ways, found, avoided))
     if not blocks or route.time_s > best.time_s - _SHORTER_S:
         return None

@@ -19,6 +19,13 @@ def toll_of(avoided: Bools) -> FloatArray | None:
     return np.where(avoided, np.inf, 0.0) if avoided.any() else None
 
 
+def tolls_of_all(ways: Ways, avoided: Bools) -> FloatArray:
+    """Return the tolls (W,) with which a search over all ways finds what would open one: rather closed ways than infeasible ones."""
+    infeasible = ways.blocked == WHYS.index("infeasible")
+    tolls: FloatArray = np.where(infeasible, 1e9, np.where(avoided | (ways.blocked > 0), 1e6, 0.0))
+    return tolls
+
+
 def blocks_on(topology: TopologicalMap, ways: Ways, sequence: Sequence, avoided: Bools) -> Iterator[Block]:
     """Yield the blocked and avoided ways of a sequence of states, each once, in its order."""
     connections = known_connections(topology)

@@ -12,6 +12,9 @@ from lhdmap.movement.settings import MovementSettings
 from lhdmap.movement.ways import Bools, Ways
 from lhdmap.topology.model import TopologicalMap
 
+_TIE = 1e-6
+"""Of two ways that cost the same, the one with fewer states is taken, and that in forward gear: s for a link, s/s in reverse."""
+
 
 @dataclass(frozen=True, slots=True)
 class Pace:
@@ -62,7 +65,8 @@ def edge_costs(
     stays = from_stop & to_stop
     gathered = np.where(from_stop & ~stays, speed / (2.0 * pace.acceleration_mps2), 0.0)
     lost = np.where(to_stop & ~stays, speed / (2.0 * pace.deceleration_mps2) + pace.inversion_s, 0.0)
-    cost: FloatArray = driving + gathered + lost
+    tie = np.where(ways.within[way], np.where(gear < 0, _TIE * driving, 0.0), _TIE)
+    cost: FloatArray = driving + gathered + lost + tie
     return cost
 
 

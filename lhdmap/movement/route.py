@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from dataclasses import asdict, dataclass, field
 from itertools import groupby
 from typing import Any, Literal
@@ -78,13 +77,10 @@ class Route:
 
     @property
     def nodes(self) -> tuple[str, ...]:
-        """The nodes (ids) in the order in which they are passed."""
-        return tuple(node for node, _ in groupby(step.node for step in self.states))
-
-
-def node_names(nodes: Iterable[str], names: dict[str, str]) -> str:
-    """Return nodes as a person reads them: `T1 > I2 > T3`."""
-    return " > ".join(names.get(node, node) for node in nodes)
+        """The nodes (ids) in the order in which they are passed; one that is touched at its edge alone, for a stop, is none."""
+        visits = [(node, {step.point for step in steps}) for node, steps in groupby(self.states, lambda step: step.node)]
+        inside = [node for k, (node, points) in enumerate(visits) if len(points) > 1 or k in (0, len(visits) - 1)]
+        return tuple(node for node, _ in groupby(inside))
 
 
 def route_json(route: Route) -> dict[str, Any]:

@@ -14,7 +14,7 @@ import numpy as np
 
 from lhdmap.messages import FloatArray
 from lhdmap.movement.alternatives import alternatives_of
-from lhdmap.movement.blocks import blocks_on, toll_of
+from lhdmap.movement.blocks import blocks_on, toll_of, tolls_of_all
 from lhdmap.movement.costs import Pace, pace_of
 from lhdmap.movement.movement_map import MovementMap, movement_map
 from lhdmap.movement.places import Place, avoided_ways, place
@@ -71,7 +71,7 @@ class RoutePlanner:
         found = self.sequence(begin.standing(), end, toll_of(avoided))
         if found is None:
             return self._none(begin, end, avoided)
-        route = self.told(found, f"{start} to {goal}")
+        route = self.told(found)
         if asked.alternatives:
             route = alternatives_of(self, route, found, begin, end, avoided, asked.alternatives)
         return replace(route, other_heading=self._other_heading(begin, end, avoided, route, asked))
@@ -90,12 +90,12 @@ class RoutePlanner:
         edges = (self._map_of_all if everywhere else self.movement).edges
         return Sequence(path.states, edges.way[path.edges]).stopped()
 
-    def told(self, sequence: Sequence, reason: str) -> Route:
+    def told(self, sequence: Sequence) -> Route:
         """Return a sequence as a route."""
         steps = steps_of(self.topology, self.ways, self.pace, sequence)
         return Route(
             True,
-            reason,
+            "",
             steps[-1].at_m,
             steps[-1].at_s,
             sum(step.inversion for step in steps),
@@ -115,8 +115,7 @@ class RoutePlanner:
 
     def _none(self, begin: Place, end: Place, avoided: Bools) -> Route:
         """Return why there is no route: the ways on the easiest path that are blocked, or that nothing leads there."""
-        blocked = (self.ways.blocked > 0) | avoided
-        found = self.sequence(begin.standing(), end, np.where(blocked, _HIGH_TOLL_S, 0.0), everywhere=True)
+        found = self.sequence(begin.standing(), end, tolls_of_all(self.ways, avoided), everywhere=True)
         if found is not None:
             blocks = tuple(blocks_on(self.topology, self.ways, found, avoided))
             return Route(False, f"{begin.name} to {end.name}: {_blocked_text(blocks)}", blocked_by=blocks)
@@ -140,7 +139,7 @@ class RoutePlanner:
         word = "along" if other > 0 else "against"
         if found is None:
             return f"{word}: no route"
-        instead = self.told(found, "")
+        instead = self.told(found)
         return f"{word}: {instead.time_s - route.time_s:+.1f} s, {instead.inversions} inversions"
 
     @cached_property
@@ -158,9 +157,6 @@ class RoutePlanner:
     @cached_property
     def _peak_mps(self) -> FloatArray:
         return self.ways.peak_mps
-
-
-_HIGH_TOLL_S = 1e6  # on a blocked way, when the path with the fewest of them is wanted
 
 
 def route(

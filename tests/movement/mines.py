@@ -1,0 +1,58 @@
+"""Mines as ways: streets with cross drifts, large and random, for the search; and changes to maps made by hand."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from lhdmap.movement.ways import Ways
+from lhdmap.topology.model import KINDS, TopologicalMap
+
+ARMS = 4
+_BACK_BACK, _FRONT_FRONT = KINDS.index("back_back"), KINDS.index("front_front")
+
+
+def streets(rows: int, columns: int, *, crossed: bool = True, seed: int = 0) -> Ways:
+    """Return the paper's benchmark: `rows` streets with `columns` intersections of 4 access points, tunnels between them.
+
+    `crossed`: tunnels from street to street, too (their access points are those of the intersections: links).
+    """
+    rng = np.random.default_rng(seed)
+    base = np.arange(rows * columns).reshape(rows, columns) * ARMS  # east, north, west, south of each
+    first, second = np.triu_indices(ARMS, 1)
+    inner_a = (base.reshape(-1, 1) + first).ravel()
+    inner_b = (base.reshape(-1, 1) + second).ravel()
+    count = rows * (columns - 1)
+    tunnel_a = rows * columns * ARMS + 2 * np.arange(count)
+    links_a = [(base[:, :-1] + 0).ravel(), (base[:, 1:] + 2).ravel()]
+    links_b = [tunnel_a, tunnel_a + 1]
+    if crossed:
+        links_a.append((base[:-1] + 1).ravel())
+        links_b.append((base[1:] + 3).ravel())
+    start = np.concatenate([inner_a, tunnel_a, *links_a])
+    end = np.concatenate([inner_b, tunnel_a + 1, *links_b])
+    within = np.arange(len(start)) < len(inner_a) + count
+    length = np.where(within, rng.uniform(10.0, 60.0, len(start)), 0.0)
+    return _ways(start, end, within, length, rows * columns * ARMS + 2 * count, rng)
+
+
+def _ways(start: Any, end: Any, within: Any, length: Any, points: int, rng: np.random.Generator) -> Ways:
+    limit = np.where(within, rng.uniform(6.0, 24.0, len(start)) / 3.6, np.inf)
+    kind = np.where(within, _BACK_BACK, _FRONT_FRONT)
+    blocked = np.zeros(len(start), np.int8)
+    ints = [one.astype(np.int32) for one in (start, end, kind)]
+    return Ways(*ints, within, length, limit, blocked, np.zeros(points, bool))
+
+
+def blocked(ways: Ways, share: float, seed: int) -> Ways:
+    """Return the ways with a share of those within nodes infeasible."""
+    rng = np.random.default_rng(seed)
+    return replace(ways, blocked=(ways.within & (rng.random(len(ways.start)) < share)).astype(np.int8))
+
+
+def with_connection(topology: TopologicalMap, start: str, end: str, **changes: Any) -> TopologicalMap:
+    """Return a map with one connection changed."""
+    changed = [replace(one, **changes) if (one.start, one.end) == (start, end) else one for one in topology.connections]
+    assert changed != list(topology.connections)
+    return replace(topology, connections=tuple(changed))
