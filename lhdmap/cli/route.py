@@ -24,7 +24,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("map", type=Path, metavar="MAP", help="map folder, or a topology.geojson")
     parser.add_argument("start", metavar="FROM", help="name or id of a waypoint, an access point or a node")
     parser.add_argument("goal", metavar="TO", help="the same; of a node, the nearest of its points")
-    parser.add_argument("--heading", metavar="H", help=f"how the machine stands at FROM: {_HEADING} (default: both tried)")
+    parser.add_argument(
+        "--heading", metavar="H", help=f"how the machine stands at FROM: {_HEADING} (default: both tried)"
+    )
     parser.add_argument("--goal-heading", metavar="H", help=f"how it is to stand at TO: {_HEADING} (default: any)")
     parser.add_argument(
         "--avoid", action="append", default=[], metavar="NAME", help="point, node, or A:B not to pass; repeatable"
@@ -67,7 +69,9 @@ def route_lines(route: Route, topology: TopologicalMap) -> Iterator[str]:
     rows = [("at m", "at s", "point", "node", "state", "gear", ""), *_rows(route.states, names)]
     widths = [max(len(row[k]) for row in rows) for k in range(6)]
     for row in rows:
-        cells = [text.rjust(w) if k < 2 else text.ljust(w) for k, (text, w) in enumerate(zip(row, widths, strict=False))]
+        cells = [
+            text.rjust(w) if k < 2 else text.ljust(w) for k, (text, w) in enumerate(zip(row, widths, strict=False))
+        ]
         yield "  ".join([*cells, row[6]]).rstrip()
     yield ""
     for one in route.alternatives:

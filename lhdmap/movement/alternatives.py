@@ -41,9 +41,7 @@ def alternatives_of(
     return replace(best, alternatives=(*([] if blocked is None else [blocked]), *lost))
 
 
-def _tried(
-    planner: RoutePlanner, found: Sequence, begin: Place, end: Place, avoided: Bools
-) -> Iterator[Route]:
+def _tried(planner: RoutePlanner, found: Sequence, begin: Place, end: Place, avoided: Bools) -> Iterator[Route]:
     links = [int(way) for way in dict.fromkeys(found.ways.tolist()) if way != TURN and not planner.ways.within[way]]
     every = max(1.0, len(links) / _MOST_TRIED)
     toll = np.zeros(len(avoided)) if (given := toll_of(avoided)) is None else given

@@ -81,6 +81,6 @@ def connection_times(topology: TopologicalMap, settings: MovementSettings) -> di
     for one in topology.connections:
         node = topology.points[one.start].node if one.start in topology.points else ""
         limit_kmh = min(one.speed_limit_kmh, limits.get(node, one.speed_limit_kmh))
-        time_s = one.length_m / min(limit_kmh / 3.6, pace.forward_mps)
+        time_s = one.length_m / min(limit_kmh / 3.6, pace.forward_mps) if limit_kmh > 0.0 else np.inf
         times[one.start, one.end] = min(time_s, times.get((one.start, one.end), np.inf))
     return times

@@ -78,7 +78,9 @@ class Route:
     @property
     def nodes(self) -> tuple[str, ...]:
         """The nodes (ids) in the order in which they are passed; one that is touched at its edge alone, for a stop, is none."""
-        visits = [(node, {step.point for step in steps}) for node, steps in groupby(self.states, lambda step: step.node)]
+        visits = [
+            (node, {step.point for step in steps}) for node, steps in groupby(self.states, lambda step: step.node)
+        ]
         inside = [node for k, (node, points) in enumerate(visits) if len(points) > 1 or k in (0, len(visits) - 1)]
         return tuple(node for node, _ in groupby(inside))
 

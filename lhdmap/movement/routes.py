@@ -76,7 +76,9 @@ class RoutePlanner:
             route = alternatives_of(self, route, found, begin, end, avoided, asked.alternatives)
         return replace(route, other_heading=self._other_heading(begin, end, avoided, route, asked))
 
-    def sequence(self, sources: Indices, goal: Place, toll: FloatArray | None, *, everywhere: bool = False) -> Sequence | None:
+    def sequence(
+        self, sources: Indices, goal: Place, toll: FloatArray | None, *, everywhere: bool = False
+    ) -> Sequence | None:
         """Return the cheapest sequence of states from standing at `sources` (S,) to a stop at the goal; None: there is none.
 
         `toll` (W,): what a way costs in addition; `everywhere`: blocked ways may be used.

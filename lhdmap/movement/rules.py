@@ -31,7 +31,10 @@ class State(NamedTuple):
 
 STATES = (State(-1, -1), State(-1, 1), State(1, 1), State(1, -1), State(0, 1), State(0, -1))
 NAMES: tuple[Name, ...] = ("i", "ii", "iii", "iv", "v", "vi")
-_MOTION = {"front": (1, -1), "back": (-1, 1)}  # along the heading, when the machine leaves there, and when it arrives there
+_MOTION = {
+    "front": (1, -1),
+    "back": (-1, 1),
+}  # along the heading, when the machine leaves there, and when it arrives there
 
 
 def reversed_kind(kind: Kind) -> Kind:

@@ -15,7 +15,11 @@ class MovementSettings:
     """Routes over the topological map: what a movement costs in time, and what check-map wants."""
 
     limit_empty_kmh: float = setting(
-        24.0, unit="km/h", source=_PAPER, minimum=0.5, doc="Highest speed with an empty bucket; a tunnel may allow less."
+        24.0,
+        unit="km/h",
+        source=_PAPER,
+        minimum=0.5,
+        doc="Highest speed with an empty bucket; a tunnel may allow less.",
     )
     limit_loaded_kmh: float = setting(
         18.0, unit="km/h", source="assumed, within the paper's 12 to 24 km/h", minimum=0.5, doc="The same loaded."

@@ -54,14 +54,15 @@ class Ways:
 def ways_of(topology: TopologicalMap) -> Ways:
     """Return the ways of a map: its connections in their order, then the links; points in the order of `topology.points`.
 
-    A connection between points that are not there is left out; so is the link of an access point whose twin does not join it.
+    A connection between points that are not there is left out; so is the link of an access point whose twin does not join it. One
+    without a length or a speed is infeasible.
     """
     index = {name: k for k, name in enumerate(topology.points)}
     connections = known_connections(topology)
     links = twin_pairs(topology)
     count = len(links)
     limits = {one.id: one.speed_limit_kmh for one in topology.tunnels}
-    closed = {one.id for one in topology.tunnels if one.closed}
+    closed = {one.id for one in topology.tunnels if one.closed or not one.speed_limit_kmh > 0.0}
     nodes = [topology.points[one.start].node for one in connections]
     return Ways(
         _ints([index[one.start] for one in connections] + [index[a] for a, _ in links]),
@@ -80,7 +81,9 @@ def ways_of(topology: TopologicalMap) -> Ways:
             [_why(one, node in closed) for one, node in zip(connections, nodes, strict=True)] + [0] * count,
             dtype=np.int8,
         ),
-        np.array([isinstance(one, Waypoint) and one.purpose == "turning_bay" for one in topology.points.values()], bool),
+        np.array(
+            [isinstance(one, Waypoint) and one.purpose == "turning_bay" for one in topology.points.values()], bool
+        ),
     )
 
 
@@ -100,12 +103,10 @@ def twin_pairs(topology: TopologicalMap) -> list[tuple[str, str]]:
 
 
 def _why(one: Connection, closed: bool) -> int:
-    if not one.feasible:
+    if not one.feasible or not 0.0 <= one.length_m < np.inf or not one.speed_limit_kmh > 0.0:
         return WHYS.index("infeasible")
     return WHYS.index("closed") if one.closed or closed else 0
 
 
 def _ints(values: list[int]) -> Ints:
     return np.array(values, dtype=np.int32)
-
-

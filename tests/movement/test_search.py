@@ -101,7 +101,9 @@ def test_several_goals_with_costs_of_their_own_and_tolls() -> None:
     toll = np.zeros(len(movement.ways.start))
     toll[used[len(used) // 2]] = np.inf
     other = searcher.path(np.array([4, 5]), goals, extra, toll)
-    assert other is None or (other.cost_s >= path.cost_s and used[len(used) // 2] not in movement.edges.way[other.edges])
+    assert other is None or (
+        other.cost_s >= path.cost_s and used[len(used) // 2] not in movement.edges.way[other.edges]
+    )
     assert searcher.path(np.array([4, 5]), goals, extra).cost_s == path.cost_s  # type: ignore[union-attr]
 
 
