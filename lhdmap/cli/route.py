@@ -44,8 +44,8 @@ def run(arguments: argparse.Namespace, console: Console) -> int:
 
     settings = load_settings(arguments.config, arguments.set).movement
     topology = read_topology(arguments.map)
-    options = RouteOptions(arguments.heading, arguments.goal_heading, tuple(arguments.avoid), arguments.loaded)
-    found = route(topology, arguments.start, arguments.goal, options, settings)
+    options = RouteOptions(arguments.heading, arguments.goal_heading, tuple(arguments.avoid))
+    found = route(topology, arguments.start, arguments.goal, options, settings, loaded=arguments.loaded)
     failure = None if found.feasible else EvaluationShortfall(f"no route: {found.reason}")
     console.result(route_json(found), _text(arguments, found, topology), failure=failure)
     return 0 if failure is None else failure.exit_code
@@ -57,7 +57,7 @@ def _text(arguments: argparse.Namespace, route: Route, topology: TopologicalMap)
 
 def route_lines(route: Route, topology: TopologicalMap) -> Iterator[str]:
     """Yield a route in words: its figures, the table of movements, what lost against it."""
-    names = {one.id: one.name for one in (*topology.waypoints, *topology.tunnels, *topology.intersections)}
+    names = {one.id: one.name for one in topology.waypoints} | {one.id: one.name for one in topology.nodes.values()}
     if not route.feasible:
         yield f"no route     {route.reason}"
         return

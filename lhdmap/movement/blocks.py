@@ -20,7 +20,7 @@ def toll_of(avoided: Bools) -> FloatArray | None:
 
 
 def tolls_of_all(ways: Ways, avoided: Bools) -> FloatArray:
-    """Return the tolls (W,) with which a search over all ways finds what would open one: rather closed ways than infeasible ones."""
+    """Return the tolls (W,) with which a search over all ways finds what would open one: rather closed than infeasible ways."""
     infeasible = ways.blocked == WHYS.index("infeasible")
     tolls: FloatArray = np.where(infeasible, 1e9, np.where(avoided | (ways.blocked > 0), 1e6, 0.0))
     return tolls

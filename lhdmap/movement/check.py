@@ -10,7 +10,13 @@ from lhdmap.machine import Machine
 from lhdmap.mapfolder import MapFolder
 from lhdmap.movement.check_folder import content_findings, folder_findings, machine_of_map
 from lhdmap.movement.check_moves import Reach, inversion_findings, reach_findings
-from lhdmap.movement.check_parts import limit_findings, room_findings, state_findings, twin_findings
+from lhdmap.movement.check_parts import (
+    connection_findings,
+    limit_findings,
+    room_findings,
+    tunnel_findings,
+    twin_findings,
+)
 from lhdmap.movement.findings import Finding, Verdict, verdict_of
 from lhdmap.movement.routes import RoutePlanner
 from lhdmap.movement.settings import MovementSettings
@@ -46,7 +52,8 @@ def topology_findings(
     yield from twin_findings(topology, chosen)
     yield from limit_findings(topology, runs)
     yield from room_findings(topology, chosen, runs)
-    yield from state_findings(topology)
+    yield from tunnel_findings(topology)
+    yield from connection_findings(topology)
     if not topology.points:
         yield Finding("error", "reach", "map", "no access point and no waypoint: there is nowhere to go")
         return

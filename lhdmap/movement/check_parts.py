@@ -90,8 +90,8 @@ def room_findings(topology: TopologicalMap, settings: MovementSettings, machine:
             yield Finding("warning", "narrow", f"{way.start}:{way.end}", text)
 
 
-def state_findings(topology: TopologicalMap) -> Iterator[Finding]:
-    """Yield what is not explored, closed, infeasible in a tunnel, or looks the same over a stretch; damaged connections."""
+def tunnel_findings(topology: TopologicalMap) -> Iterator[Finding]:
+    """Yield tunnels that are not explored, closed, look the same over a stretch, or end nowhere."""
     for one in topology.tunnels:
         if UNEXPLORED in one.ends or not one.driven:
             yield Finding("note", "unexplored", one.name, "an opening that was seen and not driven")
@@ -105,6 +105,10 @@ def state_findings(topology: TopologicalMap) -> Iterator[Finding]:
         for end in one.ends:
             if end not in (DEAD_END, UNEXPLORED) and not isinstance(topology.nodes.get(end), Intersection):
                 yield Finding("error", "ends", one.name, f"ends at '{end}', which is no intersection of the map")
+
+
+def connection_findings(topology: TopologicalMap) -> Iterator[Finding]:
+    """Yield connections that are damaged, closed, or infeasible within a tunnel."""
     for way in topology.connections:
         where = f"{way.start}:{way.end}"
         missing = [end for end in (way.start, way.end) if end not in topology.points]

@@ -52,11 +52,11 @@ def edge_costs(
 ) -> FloatArray:
     """Return what each edge (E,) of the movement map costs, s: its way, gear, and whether it begins and ends standing.
 
-    Length over speed; what is lost against that while the machine gathers speed v, v / 2a, or loses it, v / 2d; and, at each stop on
-    the way, the change of gear (who stops and goes on in the same gear would better not have stopped). A link between twins has
-    no length and no speed of its own: from standing to moving it costs as at the highest speed of the ways around, so that it
-    is no way round those losses. Where a stop follows a stop within a few metres the losses are somewhat too large here;
-    `lhdmap.movement.profile` has the times that are told.
+    Length over speed; what is lost against that while the machine gathers speed v, v / 2a, or loses it, v / 2d; and, at each
+    stop on the way, the change of gear (who stops and goes on in the same gear would better not have stopped). A link between
+    twins has no length and no speed of its own: from standing to moving it costs as at the highest speed of the ways around, so
+    that it is no way round those losses. Where a stop follows a stop within a few metres the losses are somewhat too large
+    here; `lhdmap.movement.profile` has the times that are told.
     """
     peak = ways.peak_mps
     around = np.maximum(peak[ways.start], peak[ways.end])

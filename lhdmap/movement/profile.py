@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from itertools import pairwise
 
 from lhdmap.movement.costs import Pace
 
@@ -13,7 +14,7 @@ def run_times(lengths_m: list[float], speeds_mps: list[float], pace: Pace) -> li
     The speed between two pieces is the highest one that can be gathered from the start, lost before the end, and is allowed on
     both. A piece too short for its highest speed has a peak in the middle (a triangle over time).
     """
-    between = [0.0, *(min(a, b) for a, b in zip(speeds_mps, speeds_mps[1:], strict=False)), 0.0]
+    between = [0.0, *(min(a, b) for a, b in pairwise(speeds_mps)), 0.0]
     for k, length in enumerate(lengths_m):
         between[k + 1] = min(between[k + 1], math.sqrt(between[k] ** 2 + 2.0 * pace.acceleration_mps2 * length))
     for k in range(len(lengths_m) - 1, -1, -1):

@@ -38,7 +38,6 @@ class RouteOptions:
     heading: str | None = None
     goal_heading: str | None = None
     avoid: tuple[str, ...] = ()
-    loaded: bool = False
     alternatives: int = 2
 
 
@@ -167,10 +166,11 @@ def route(
     goal: str,
     options: RouteOptions | None = None,
     settings: MovementSettings | None = None,
+    *,
+    loaded: bool = False,
 ) -> Route:
     """Return the quickest route between two places of a map; see `RoutePlanner.route`, which is for several routes."""
-    asked = options or RouteOptions()
-    return RoutePlanner(topology, settings, loaded=asked.loaded).route(start, goal, asked)
+    return RoutePlanner(topology, settings, loaded=loaded).route(start, goal, options)
 
 
 def _any(one: Place) -> Place:

@@ -77,10 +77,9 @@ class Searcher:
         self._query += 1
         e, fees = self._edges, self._free if toll is None else toll
         table, bounds = _NONE if landmarks is None else (landmarks.table, landmarks.bounds(goals))
-        found: tuple[int, float, int] = search(
-            e.first, e.to, e.cost_s, e.way, fees, sources, goals, goal_costs, table, bounds, self._dist, *self._before,
-            *self._marks, self._goal_cost, *self._heap, self._query,
-        )  # fmt: skip
+        given = (e.first, e.to, e.cost_s, e.way, fees, sources, goals, goal_costs, table, bounds)
+        own = (self._dist, *self._before, *self._marks, self._goal_cost, *self._heap, self._query)
+        found: tuple[int, float, int] = search(*given, *own)
         return found
 
 

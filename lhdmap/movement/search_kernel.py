@@ -59,6 +59,11 @@ def _ahead(table, bounds, state):  # type: ignore[no-untyped-def]
 
 
 @nb.njit(cache=True, nogil=True)
+def _fee(toll, way):  # type: ignore[no-untyped-def]
+    return toll[way] if way >= 0 else 0.0
+
+
+@nb.njit(cache=True, nogil=True)
 def search(  # type: ignore[no-untyped-def]
     first, to, cost, way, toll, sources, goals, goal_costs, table, bounds, dist, state_before, edge_before,
     seen, done, goal_mark, goal_cost, keys, items, query,
@@ -68,17 +73,14 @@ def search(  # type: ignore[no-untyped-def]
     `toll` (W,): what a way costs in addition; inf: not to be used. Without goals all distances are found. Returns state -1 where
     no goal is reached. `dist`, `state_before` and `edge_before` (N,) hold for the states with `seen == query`.
     """
-    for k in range(len(goals)):
-        goal_mark[goals[k]], goal_cost[goals[k]] = query, goal_costs[k]
+    goal_mark[goals], goal_cost[goals] = query, goal_costs
+    dist[sources], seen[sources], state_before[sources], edge_before[sources] = 0.0, query, -1, -1
     guided = bounds.shape[1] > 0
     size = 0
     for source in sources:
-        dist[source], seen[source] = 0.0, query
-        state_before[source], edge_before[source] = -1, -1
         key = _ahead(table, bounds, source) if guided else 0.0
-        if key < np.inf:
-            _push(keys, items, size, key, source)
-            size += 1
+        _push(keys, items, size, key, source)
+        size += key < np.inf
     best, best_state, settled = np.inf, -1, 0
     while size > 0 and keys[0] < best:
         state = items[0]
@@ -95,7 +97,7 @@ def search(  # type: ignore[no-untyped-def]
             after = to[edge]
             if done[after] == query:
                 continue
-            there = here + cost[edge] + (toll[way[edge]] if way[edge] >= 0 else 0.0)
+            there = here + cost[edge] + _fee(toll, way[edge])
             if there < np.inf and (seen[after] != query or there < dist[after]):
                 key = there + (_ahead(table, bounds, after) if guided else 0.0)
                 if key < best:

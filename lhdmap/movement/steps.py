@@ -39,7 +39,7 @@ def steps_of(topology: TopologicalMap, ways: Ways, pace: Pace, sequence: Sequenc
     """Return the steps of a sequence of states that begins and ends standing."""
     gears = _gears(sequence.states)
     stops = [int(state) % STATE_COUNT >= STANDING_ALONG for state in sequence.states]
-    inversion, turn = _stops(sequence, gears, stops)
+    inversion, turn = _stops(sequence, stops)
     spent_s = _spent(ways, pace, sequence, gears, stops)
     at_s = 0.0
     steps, ids = [], list(topology.points)
@@ -57,7 +57,7 @@ def steps_of(topology: TopologicalMap, ways: Ways, pace: Pace, sequence: Sequenc
 
 
 def _gears(states: Indices) -> list[int]:
-    """Return the gear of each piece (n - 1,): that of a moving state at either end; of a stop to a stop, that of the next piece."""
+    """Return the gear of each piece (n - 1,): that of a moving state at either end; from stop to stop, the next piece's."""
     own = [STATES[int(state) % STATE_COUNT].gear for state in states]
     gears = [before or after for before, after in pairwise(own)]
     for order in (range(len(gears) - 2, -1, -1), range(1, len(gears))):
@@ -67,7 +67,7 @@ def _gears(states: Indices) -> list[int]:
     return gears
 
 
-def _stops(sequence: Sequence, gears: list[int], stops: list[bool]) -> tuple[list[bool], list[bool]]:
+def _stops(sequence: Sequence, stops: list[bool]) -> tuple[list[bool], list[bool]]:
     """Return at which states the gear changes, and at which the machine turns round."""
     own = [STATES[int(state) % STATE_COUNT].gear for state in sequence.states]
     inversion, turn = [False] * len(own), [False] * len(own)

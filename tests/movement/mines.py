@@ -41,8 +41,8 @@ def _ways(start: Any, end: Any, within: Any, length: Any, points: int, rng: np.r
     limit = np.where(within, rng.uniform(6.0, 24.0, len(start)) / 3.6, np.inf)
     kind = np.where(within, _BACK_BACK, _FRONT_FRONT)
     blocked = np.zeros(len(start), np.int8)
-    ints = [one.astype(np.int32) for one in (start, end, kind)]
-    return Ways(*ints, within, length, limit, blocked, np.zeros(points, bool))
+    a, b, kinds = (one.astype(np.int32) for one in (start, end, kind))
+    return Ways(a, b, kinds, within, length, limit, blocked, np.zeros(points, bool))
 
 
 def blocked(ways: Ways, share: float, seed: int) -> Ways:
@@ -51,7 +51,7 @@ def blocked(ways: Ways, share: float, seed: int) -> Ways:
     return replace(ways, blocked=(ways.within & (rng.random(len(ways.start)) < share)).astype(np.int8))
 
 
-def with_connection(topology: TopologicalMap, start: str, end: str, **changes: Any) -> TopologicalMap:
+def with_connection(topology: TopologicalMap, start: str, end: str, /, **changes: Any) -> TopologicalMap:
     """Return a map with one connection changed."""
     changed = [replace(one, **changes) if (one.start, one.end) == (start, end) else one for one in topology.connections]
     assert changed != list(topology.connections)

@@ -54,7 +54,7 @@ def test_all_cells_are_those_printed_but_for_the_errata(number: int) -> None:
     differ = {}
     for (origin, column), entry in cells.items():
         kind = next(kind for kind in KINDS if kind == column)
-        derived = {NAMES[k] for k in successors(NAMES.index(origin), kind, within=number == 1)}  # type: ignore[arg-type]
+        derived = {NAMES[k] for k in successors(NAMES.index(origin), kind, within=number == 1)}
         if derived != entry:
             differ[number, origin, column] = derived
     assert differ == {key: cell for key, cell in ERRATA.items() if key[0] == number}
@@ -76,4 +76,4 @@ def test_what_is_driven_one_way_can_be_driven_back(kind: str, within: bool) -> N
     for origin, end in forth:
         (m0, h0), (m1, h1) = STATES[origin], STATES[end]
         if m0 and m1:
-            assert (STATES.index((-m1, h1)), STATES.index((-m0, h0))) in back  # type: ignore[arg-type]
+            assert (STATES.index((-m1, h1)), STATES.index((-m0, h0))) in back
