@@ -77,7 +77,7 @@ def _stops(sequence: Sequence, stops: list[bool]) -> tuple[list[bool], list[bool
         if stops[k] and leaves and came and own[k + 1] != came:
             inversion[k] = True
         points = sequence.states[k : k + 2] // STATE_COUNT
-        turn[k] = stops[k] and len(points) == 2 and points[0] == points[1]
+        turn[k] = stops[k] and len(points) == 2 and bool(points[0] == points[1])
         came = gear or came
     return inversion, turn
 

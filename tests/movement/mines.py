@@ -9,6 +9,8 @@ import numpy as np
 from lhdmap.movement.ways import Ways
 from lhdmap.topology.model import KINDS, TopologicalMap
 
+from tests.topology.maps import ladder, pose
+
 ARMS = 4
 _BACK_BACK, _FRONT_FRONT = KINDS.index("back_back"), KINDS.index("front_front")
 
@@ -56,3 +58,19 @@ def with_connection(topology: TopologicalMap, start: str, end: str, /, **changes
     changed = [replace(one, **changes) if (one.start, one.end) == (start, end) else one for one in topology.connections]
     assert changed != list(topology.connections)
     return replace(topology, connections=tuple(changed))
+
+
+def fast_ladder() -> TopologicalMap:
+    """The ladder with limits of 30 km/h, a turning bay at DP1, 3.2 m of tunnel width, and a pair of twins 0.6 m and 12° apart."""
+    topology = ladder()
+    apart = {"i1.t1": pose(6.0, 0.6, 0.0), "i2.t1": pose(54.0, 0.0, 168.0)}
+    return replace(
+        topology,
+        tunnels=tuple(
+            replace(one, speed_limit_kmh=30.0, half_widths_m=np.full((len(one.line_m), 2), 1.6))
+            for one in topology.tunnels
+        ),
+        access_points=tuple(replace(one, pose=apart.get(one.id, one.pose)) for one in topology.access_points),
+        waypoints=tuple(replace(one, purpose="turning_bay", speed_limit_kmh=30.0) for one in topology.waypoints),
+        connections=tuple(replace(one, speed_limit_kmh=30.0) for one in topology.connections),
+    )
