@@ -17,7 +17,7 @@ from lhdmap.movement.places import place
 from lhdmap.movement.routes import RoutePlanner
 from lhdmap.movement.rules import STANDING_ALONG, STATE_COUNT
 from lhdmap.movement.search import Searcher
-from lhdmap.movement.ways import known_connections
+from lhdmap.movement.ways import arms_of, known_connections
 from lhdmap.topology.model import DEAD_END, AccessPoint, Connection, Intersection, TopologicalMap, Waypoint
 
 Labels = npt.NDArray[np.int32]
@@ -66,10 +66,13 @@ def reach_findings(planner: RoutePlanner, reach: Reach) -> Iterator[Finding]:
     """Yield nodes and waypoints that cannot be reached from the others, or not be left again."""
     topology = planner.topology
     index = {name: k for k, name in enumerate(topology.points)}
+    shut = {one.id for one in topology.tunnels if one.closed}
     for node in topology.nodes.values():
         points = reach.of(node.id)
         if not len(points):
             yield Finding("error", "reach", node.name, "has no access point: nothing leads there")
+        elif node.id in shut:
+            continue
         elif not reach.reached[points].any():
             yield _unreached(planner, reach, node.id, node.name)
         elif not (reach.returns | ~reach.reached)[points].all():
@@ -95,8 +98,9 @@ def inversion_findings(topology: TopologicalMap, reach: Reach, machine: Machine)
     inside: dict[str, list[Connection]] = {}
     for way in known_connections(topology):
         inside.setdefault(topology.points[way.start].node, []).append(way)
+    shut = arms_of(topology, {one.id for one in topology.tunnels if one.closed})
     for node in topology.intersections:
-        yield from _arm_findings(topology, node, reach, inside.get(node.id, []))
+        yield from _arm_findings(topology, node, reach, inside.get(node.id, []), shut)
     length_m = machine.dimensions.length_m
     for tunnel in topology.tunnels:
         if DEAD_END in tunnel.ends and tunnel.length_m < length_m:
@@ -120,13 +124,16 @@ def _heading_findings(topology: TopologicalMap, reach: Reach) -> Iterator[Findin
 
 
 def _arm_findings(
-    topology: TopologicalMap, node: Intersection, reach: Reach, ways: list[Connection]
+    topology: TopologicalMap, node: Intersection, reach: Reach, ways: list[Connection], shut: set[str]
 ) -> Iterator[Finding]:
-    """Yield pairs of arms without a free way from one to the other: by an inversion in a third arm, or not at all."""
+    """Yield pairs of arms without a free way from one to the other: by an inversion in a third arm, or not at all.
+
+    `shut`: arms into closed tunnels, of which nothing is wanted.
+    """
     free = {frozenset((one.start, one.end)) for one in ways if one.feasible and not one.closed}
     why = {frozenset((one.start, one.end)): one.reason or ("closed" if one.closed else "too sharp") for one in ways}
     points = list(topology.points.values())
-    arms = [points[k].id for k in reach.of(node.id) if isinstance(points[k], AccessPoint)]
+    arms = [points[k].id for k in reach.of(node.id) if isinstance(points[k], AccessPoint) and points[k].id not in shut]
     for a, b in combinations(arms, 2):
         pair = frozenset((a, b))
         if pair in free:

@@ -56,7 +56,8 @@ class MovementMap:
 def movement_map(ways: Ways, pace: Pace, *, blocked_too: bool = False) -> MovementMap:
     """Build the movement map; `blocked_too`: as if nothing were infeasible or closed, to find what stands in the way."""
     count = STATE_COUNT * ways.point_count
-    origin, to, way = _edges_by_rule(ways, np.ones(len(ways.start), bool) if blocked_too else ways.blocked == 0)
+    sound = np.isfinite(ways.length_m) & (ways.length_m >= 0.0) & (ways.limit_mps > 0.0)
+    origin, to, way = _edges_by_rule(ways, sound & (blocked_too | (ways.blocked == 0)))
     from_k, to_k = origin % STATE_COUNT, to % STATE_COUNT
     from_stop, to_stop = from_k >= STANDING_ALONG, to_k >= STANDING_ALONG
     gear = np.where(to_stop, GEARS[from_k], GEARS[to_k])

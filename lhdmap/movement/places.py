@@ -11,7 +11,7 @@ import numpy as np
 from lhdmap.errors import UsageError
 from lhdmap.movement.rules import STANDING_AGAINST, STANDING_ALONG, STATE_COUNT, STATES
 from lhdmap.movement.search import Indices
-from lhdmap.movement.ways import Bools, Ways
+from lhdmap.movement.ways import Bools, Ways, arms_of
 from lhdmap.settings import nearest
 from lhdmap.topology.model import AccessPoint, Point, TopologicalMap, Waypoint
 
@@ -83,6 +83,8 @@ def _headings(point: Point, heading: str | None, option: str) -> tuple[int, ...]
 def avoided_ways(topology: TopologicalMap, ways: Ways, names: Iterable[str]) -> Bools:
     """Return which ways (W,) the names take out: those of a point, of a node, or between the two of `A:B`.
 
+    Of a node also those that lead to it within its neighbours: who inverts there would stand in it.
+
     Raises:
         UsageError: a name is unknown, or nothing joins the two.
     """
@@ -93,7 +95,9 @@ def avoided_ways(topology: TopologicalMap, ways: Ways, names: Iterable[str]) -> 
         ends = [np.isin(ends, points) for one in both for points in [_points(topology, index, one)]
                 for ends in (ways.start, ways.end)]  # fmt: skip
         if len(both) == 1:
-            avoided |= ends[0] | ends[1]
+            node = getattr(topology.called(name), "id", name)
+            arms = [index[one] for one in arms_of(topology, {node})]
+            avoided |= ends[0] | ends[1] | np.isin(ways.start, arms) | np.isin(ways.end, arms)
             continue
         joined = (ends[0] & ends[3]) | (ends[1] & ends[2])
         if not joined.any():

@@ -8,13 +8,17 @@ from itertools import pairwise
 from lhdmap.movement.costs import Pace
 
 
-def run_times(lengths_m: list[float], speeds_mps: list[float], pace: Pace) -> list[float]:
+def run_times(
+    lengths_m: list[float], speeds_mps: list[float], pace: Pace, caps_mps: list[float] | None = None
+) -> list[float]:
     """Return the times (s) for the n pieces of a run from a stop to the next, with a highest speed on each piece.
 
     The speed between two pieces is the highest one that can be gathered from the start, lost before the end, and is allowed on
-    both. A piece too short for its highest speed has a peak in the middle (a triangle over time).
+    both, and at the point there (`caps_mps`, n - 1). A piece too short for its highest speed has a peak in the middle (a
+    triangle over time).
     """
-    between = [0.0, *(min(a, b) for a, b in pairwise(speeds_mps)), 0.0]
+    caps = [math.inf] * (len(lengths_m) - 1) if caps_mps is None else caps_mps
+    between = [0.0, *(min(a, b, cap) for (a, b), cap in zip(pairwise(speeds_mps), caps, strict=True)), 0.0]
     for k, length in enumerate(lengths_m):
         between[k + 1] = min(between[k + 1], math.sqrt(between[k] ** 2 + 2.0 * pace.acceleration_mps2 * length))
     for k in range(len(lengths_m) - 1, -1, -1):

@@ -35,7 +35,7 @@ class Searcher:
         self._edges = edges
         self._free = np.zeros(max(way_count, 1))
         self._query = 0
-        self._dist = np.empty(count)
+        self._dist, self._ahead = np.empty(count), np.empty(count)
         self._before = np.empty(count, np.int32), np.empty(count, np.int32)
         self._marks = [np.zeros(count, np.int32) for _ in range(3)]
         self._goal_cost = np.empty(count)
@@ -78,7 +78,7 @@ class Searcher:
         e, fees = self._edges, self._free if toll is None else toll
         table, bounds = _NONE if landmarks is None else (landmarks.table, landmarks.bounds(goals))
         given = (e.first, e.to, e.cost_s, e.way, fees, sources, goals, goal_costs, table, bounds)
-        own = (self._dist, *self._before, *self._marks, self._goal_cost, *self._heap, self._query)
+        own = (self._dist, self._ahead, *self._before, *self._marks, self._goal_cost, *self._heap, self._query)
         found: tuple[int, float, int] = search(*given, *own)
         return found
 

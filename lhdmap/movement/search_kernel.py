@@ -65,7 +65,7 @@ def _fee(toll, way):  # type: ignore[no-untyped-def]
 
 @nb.njit(cache=True, nogil=True)
 def search(  # type: ignore[no-untyped-def]
-    first, to, cost, way, toll, sources, goals, goal_costs, table, bounds, dist, state_before, edge_before,
+    first, to, cost, way, toll, sources, goals, goal_costs, table, bounds, dist, ahead, state_before, edge_before,
     seen, done, goal_mark, goal_cost, keys, items, query,
 ):  # fmt: skip
     """Search from `sources` to the cheapest of `goals`, each with a cost of its own; return it and how many states were settled.
@@ -78,7 +78,8 @@ def search(  # type: ignore[no-untyped-def]
     guided = bounds.shape[1] > 0
     size = 0
     for source in sources:
-        key = _ahead(table, bounds, source) if guided else 0.0
+        ahead[source] = _ahead(table, bounds, source) if guided else 0.0
+        key = ahead[source]
         _push(keys, items, size, key, source)
         size += key < np.inf
     best, best_state, settled = np.inf, -1, 0
@@ -98,10 +99,13 @@ def search(  # type: ignore[no-untyped-def]
             if done[after] == query:
                 continue
             there = here + cost[edge] + _fee(toll, way[edge])
-            if there < np.inf and (seen[after] != query or there < dist[after]):
-                key = there + (_ahead(table, bounds, after) if guided else 0.0)
+            known = seen[after] == query
+            if not known:
+                ahead[after], dist[after], seen[after] = _ahead(table, bounds, after) if guided else 0.0, np.inf, query
+            if there < dist[after]:
+                key = there + ahead[after]
                 if key < best:
-                    dist[after], seen[after] = there, query
+                    dist[after] = there
                     state_before[after], edge_before[after] = state, edge
                     _push(keys, items, size, key, after)
                     size += 1

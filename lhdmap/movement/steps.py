@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
-from itertools import pairwise
+import math
+from dataclasses import dataclass
+from itertools import accumulate, pairwise
 
 import numpy as np
 
@@ -12,10 +13,10 @@ from lhdmap.movement.costs import Pace
 from lhdmap.movement.movement_map import TURN
 from lhdmap.movement.profile import run_times
 from lhdmap.movement.route import Gear, Step
-from lhdmap.movement.rules import NAMES, STANDING_ALONG, STATE_COUNT, STATES, State
+from lhdmap.movement.rules import NAMES, STATE_COUNT, STATES, State
 from lhdmap.movement.search import Indices
 from lhdmap.movement.ways import Ints, Ways
-from lhdmap.topology.model import TopologicalMap
+from lhdmap.topology.model import Point, TopologicalMap, Waypoint
 
 
 @dataclass(frozen=True)
@@ -37,23 +38,27 @@ class Sequence:
 
 def steps_of(topology: TopologicalMap, ways: Ways, pace: Pace, sequence: Sequence) -> tuple[Step, ...]:
     """Return the steps of a sequence of states that begins and ends standing."""
-    gears = _gears(sequence.states)
-    stops = [int(state) % STATE_COUNT >= STANDING_ALONG for state in sequence.states]
+    ids = list(topology.points)
+    points = [topology.points[ids[int(state) // STATE_COUNT]] for state in sequence.states]
+    names = [NAMES[int(state) % STATE_COUNT] for state in sequence.states]
+    gears, stops = _gears(sequence.states), [name in ("v", "vi") for name in names]
     inversion, turn = _stops(sequence, stops)
-    spent_s = _spent(ways, pace, sequence, gears, stops)
-    at_s = 0.0
-    steps, ids = [], list(topology.points)
-    along = np.concatenate([[0.0], np.cumsum(_lengths(ways, sequence.ways))])
-    for k, state in enumerate(map(int, sequence.states)):
-        at_s += spent_s[k - 1] if k else 0.0
-        leaving = gears[k] if k < len(gears) else (gears[-1] if gears else 1)
-        gear: Gear = "reverse" if leaving < 0 else "forward"
-        point = topology.points[ids[state // STATE_COUNT]]
-        name = NAMES[state % STATE_COUNT]
-        steps.append(Step(point.id, name, point.node, gear, stops[k], float(along[k]), at_s))
-        steps[-1] = replace(steps[-1], inversion=inversion[k], turn=turn[k])
-        at_s += pace.inversion_s * inversion[k] + pace.turn_s * turn[k]
-    return tuple(steps)
+    waits = [pace.inversion_s * changes + pace.turn_s * turns for changes, turns in zip(inversion, turn, strict=True)]
+    spent = _spent(ways, pace, sequence, gears, stops, [_cap_mps(point) for point in points])
+    at_s = accumulate((wait + drive for wait, drive in zip(waits, spent, strict=False)), initial=0.0)
+    at_m = accumulate(_lengths(ways, sequence.ways).tolist(), initial=0.0)
+    leaving = [*gears, *(gears[-1:] or [1])]
+    told: list[Gear] = ["reverse" if gear < 0 else "forward" for gear in leaving]
+    columns = (names, points, told, stops, at_m, at_s, inversion, turn)
+    return tuple(
+        Step(point.id, name, point.node, gear, stop, length, time, changes, turns)
+        for name, point, gear, stop, length, time, changes, turns in zip(*columns, strict=True)
+    )
+
+
+def _cap_mps(point: Point) -> float:
+    """Return the highest speed at which a point is passed, m/s."""
+    return point.speed_limit_kmh / 3.6 if isinstance(point, Waypoint) and point.speed_limit_kmh > 0.0 else math.inf
 
 
 def _gears(states: Indices) -> list[int]:
@@ -87,15 +92,17 @@ def _lengths(ways: Ways, way: Ints) -> FloatArray:
     return lengths
 
 
-def _spent(ways: Ways, pace: Pace, sequence: Sequence, gears: list[int], stops: list[bool]) -> list[float]:
-    """Return the time on each piece (n - 1,), run by run between stops."""
-    lengths = _lengths(ways, sequence.ways)
-    limits = np.where(sequence.ways == TURN, np.inf, ways.limit_mps[sequence.ways]) if len(gears) else np.zeros(0)
-    speeds = pace.speed_mps(limits, np.array(gears, dtype=np.int8))
+def _spent(
+    ways: Ways, pace: Pace, sequence: Sequence, gears: list[int], stops: list[bool], caps_mps: list[float]
+) -> list[float]:
+    """Return the time on each piece (n - 1,), run by run between stops; `caps_mps` (n,): how fast each point is passed at most."""
+    lengths = _lengths(ways, sequence.ways).tolist()
+    limits = np.where(sequence.ways == TURN, np.inf, ways.limit_mps[sequence.ways]) if gears else np.zeros(0)
+    speeds = pace.speed_mps(limits, np.array(gears, dtype=np.int8)).tolist()
     spent: list[float] = []
     begin = 0
     for k in range(1, len(stops)):
         if stops[k]:
-            spent += run_times(lengths[begin:k].tolist(), speeds[begin:k].tolist(), pace)
+            spent += run_times(lengths[begin:k], speeds[begin:k], pace, caps_mps[begin + 1 : k])
             begin = k
     return spent

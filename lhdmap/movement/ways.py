@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Set as AbstractSet
 from dataclasses import dataclass
 from typing import Literal
 
@@ -55,7 +56,8 @@ def ways_of(topology: TopologicalMap) -> Ways:
     """Return the ways of a map: its connections in their order, then the links; points in the order of `topology.points`.
 
     A connection between points that are not there is left out; so is the link of an access point whose twin does not join it. One
-    without a length or a speed is infeasible.
+    without a length or a speed is infeasible. A closed tunnel closes the ways to it through its intersections, too: a machine
+    that only inverts there would stand in it with half its length.
     """
     index = {name: k for k, name in enumerate(topology.points)}
     connections = known_connections(topology)
@@ -63,6 +65,7 @@ def ways_of(topology: TopologicalMap) -> Ways:
     count = len(links)
     limits = {one.id: one.speed_limit_kmh for one in topology.tunnels}
     closed = {one.id for one in topology.tunnels if one.closed or not one.speed_limit_kmh > 0.0}
+    shut = arms_of(topology, closed)
     nodes = [topology.points[one.start].node for one in connections]
     return Ways(
         _ints([index[one.start] for one in connections] + [index[a] for a, _ in links]),
@@ -78,7 +81,11 @@ def ways_of(topology: TopologicalMap) -> Ways:
             + [np.inf] * count
         ),
         np.array(
-            [_why(one, node in closed) for one, node in zip(connections, nodes, strict=True)] + [0] * count,
+            [
+                _why(one, node in closed or bool({one.start, one.end} & shut))
+                for one, node in zip(connections, nodes, strict=True)
+            ]
+            + [0] * count,
             dtype=np.int8,
         ),
         np.array(
@@ -90,6 +97,12 @@ def ways_of(topology: TopologicalMap) -> Ways:
 def known_connections(topology: TopologicalMap) -> list[Connection]:
     """Return the connections whose points are both in the map."""
     return [one for one in topology.connections if {one.start, one.end} <= topology.points.keys()]
+
+
+def arms_of(topology: TopologicalMap, nodes: AbstractSet[str]) -> set[str]:
+    """Return the access points (ids) of other nodes that join one of `nodes` (ids)."""
+    points = topology.points
+    return {one.id for one in topology.access_points if one.joins in points and points[one.joins].node in nodes}
 
 
 def twin_pairs(topology: TopologicalMap) -> list[tuple[str, str]]:

@@ -144,6 +144,11 @@ def test_settings_say_what_is_wanted() -> None:
     assert len(list(topology_findings(apart, MovementSettings(twin_deg=2.0)))) == 2
 
 
+def test_a_closed_tunnel_is_no_fault_of_the_map() -> None:
+    found = [(one.severity, one.rule) for one in topology_findings(tunnel("t2", closed=True)(ladder()))]
+    assert found == [("note", "closed"), ("note", "heading")]  # without the ring nothing turns the machine
+
+
 def test_an_empty_map_is_not_ready() -> None:
     assert [one.rule for one in topology_findings(TopologicalMap())] == ["reach"]
 

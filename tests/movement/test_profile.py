@@ -38,6 +38,13 @@ def test_pieces_of_a_run_sum_to_the_whole() -> None:
     assert cut[1] == 0.0
 
 
+def test_a_point_is_passed_at_its_limit() -> None:
+    """As a piece of no length with that limit."""
+    capped = run_times([30.0, 30.0], [4.0, 5.0], PACE, [1.5])
+    assert sum(capped) == pytest.approx(sum(run_times([30.0, 0.0, 30.0], [4.0, 1.5, 5.0], PACE)))
+    assert sum(capped) == pytest.approx(simulated([29.999, 0.004, 29.999], [4.0, 1.5, 5.0]), rel=0.002)
+
+
 def simulated(lengths: list[float], speeds: list[float]) -> float:
     """Return the time of the quickest drive in steps of 2 mm: the highest speed squared at each place, from both sides."""
     step = 0.002

@@ -145,7 +145,7 @@ def test_what_is_avoided_is_told_apart() -> None:
     for name in ("T2", "i1.t2:t2.start", "I1:T2", "t2.start"):
         found = route(ladder(), "DP1", "t2.start", RouteOptions(avoid=(name, "I2")))
         assert not found.feasible
-        assert [one.why for one in found.blocked_by] == ["avoided"]
+        assert {one.why for one in found.blocked_by} == {"avoided"}
     around = route(ladder(), "DP1", "t2.start", RouteOptions(avoid=("i1.t3:i1.t2",)))
     assert around.nodes == ("t3", "i1", "t1", "i2", "t2") or around.inversions == 1
 
@@ -153,10 +153,29 @@ def test_what_is_avoided_is_told_apart() -> None:
 def test_a_closed_tunnel_is_not_driven() -> None:
     topology = ladder()
     shut = replace(topology, tunnels=tuple(replace(one, closed=one.id == "t1") for one in topology.tunnels))
-    found = route(shut, "i1.t1", "i2.t1")
-    assert "t1" not in found.nodes[1:-1]
-    assert found.distance_m > 108.0
-    assert found.alternatives[0].blocked_by[0].why == "closed"
+    found = route(shut, "DP1", "i2.t2")
+    assert found.nodes == ("t3", "i1", "t2", "i2")
+    assert found.distance_m == pytest.approx(20.0 + 12.0 + 108.0)
+    assert {one.why for one in found.alternatives[0].blocked_by} == {"closed"}
+
+
+def test_nobody_inverts_with_half_the_machine_in_a_closed_tunnel() -> None:
+    shut = replace(SHARP, tunnels=tuple(replace(one, closed=one.id == "t3") for one in SHARP.tunnels))
+    options = RouteOptions(heading="along", avoid=("T1:I2",))
+    assert route(SHARP, "t1.start", "t2.start", options).inversions == 1
+    assert not route(shut, "t1.start", "t2.start", options).feasible
+    assert not route(SHARP, "t1.start", "t2.start", replace(options, avoid=("T1:I2", "T3"))).feasible
+
+
+def test_a_waypoint_is_passed_at_its_limit() -> None:
+    topology = two_places(False)
+    slow = replace(topology, waypoints=(topology.waypoints[0], replace(topology.waypoints[1], speed_limit_kmh=3.6)))
+    plain, capped = (route(one, "DP1", "T1", RouteOptions(heading="against")) for one in (topology, slow))
+    speed, s = 12.0 / 3.6, MovementSettings()
+    lost = (speed - 1.0) ** 2 / (2.0 * speed) * (1.0 / s.acceleration_mps2 + 1.0 / s.deceleration_mps2)
+    room = speed**2 / (2.0 * s.acceleration_mps2) + (speed**2 - 1.0) / (2.0 * s.deceleration_mps2)
+    assert room > 10.0  # the full speed is not reached before it
+    assert 0.5 * lost < capped.time_s - plain.time_s < lost
 
 
 def test_alternatives_and_why_they_lost() -> None:
