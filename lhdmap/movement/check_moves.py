@@ -35,7 +35,10 @@ class Reach:
     def __init__(self, planner: RoutePlanner) -> None:
         movement, topology = planner.movement, planner.topology
         edges = movement.edges
-        graph = csr_matrix((np.ones(len(edges.to)), edges.to, edges.first), shape=(movement.state_count,) * 2)
+        graph = csr_matrix(
+            (np.ones(len(edges.to)), edges.to, edges.first), shape=(movement.state_count,) * 2, copy=True
+        )
+        graph.sum_duplicates()  # with parallel edges SciPy's search for strong components does not end
         labels = connected_components(graph, connection="strong")[1].reshape(-1, STATE_COUNT)
         self.labels: Labels = labels[:, STANDING_ALONG:]
         self._points: dict[str, list[int]] = {}

@@ -149,6 +149,14 @@ def test_a_closed_tunnel_is_no_fault_of_the_map() -> None:
     assert found == [("note", "closed"), ("note", "heading")]  # without the ring nothing turns the machine
 
 
+def test_parallel_connections_are_no_fault() -> None:
+    topology = connected("i1.t1", "i1.t3", closed=True)(connected("i1.t2", "i1.t3", closed=True)(ladder()))
+    twice = replace(topology, connections=(*topology.connections, *topology.connections))
+    once = list(topology_findings(topology))
+    assert any(one.rule == "reach" for one in once)
+    assert {(one.rule, one.where) for one in topology_findings(twice)} == {(one.rule, one.where) for one in once}
+
+
 def test_an_empty_map_is_not_ready() -> None:
     assert [one.rule for one in topology_findings(TopologicalMap())] == ["reach"]
 
