@@ -24,6 +24,7 @@ from lhdmap.report.recording import RecordingSettings
 from lhdmap.rockbreaker.settings import RockbreakerSettings
 from lhdmap.settings import load_section, nearest, section_toml
 from lhdmap.smoothing.settings import SmoothingSettings
+from lhdmap.topology.settings import TopologySettings
 
 _HEADER = """\
 # Settings of the lhdmap pipeline: the defaults. Copy this file, change what you need and pass it with --config; keys that
@@ -46,6 +47,7 @@ class Settings:
     slip: SlipSettings = field(default_factory=SlipSettings)
     integration: IntegrationSettings = field(default_factory=IntegrationSettings)
     smoothing: SmoothingSettings = field(default_factory=SmoothingSettings)
+    topology: TopologySettings = field(default_factory=TopologySettings)
     pile: PileSettings = field(default_factory=PileSettings)
     figure9: Figure9Constants = field(default_factory=Figure9Constants)
     figure9_repaired: RepairedConstants = field(default_factory=RepairedConstants)

@@ -86,7 +86,7 @@ _TABLE = (
     Role("tilt_pressure", "/machine/pressure/tilt", PRESSURE, Pressure, words="tilt|bucket"),
     Role("command", "/machine/command", COMMAND, Command, by_type=True),
     Role("mode", "/operation/mode", TEXT, Text),
-    Role("node", "/operation/node", TEXT, Text),
+    Role("node", "/operation/node", TEXT, Text, (BUILD_MAP, GIVEN_POSES)),
     Role("tf_static", "/tf_static", TRANSFORMS, Mount, _ALL),
     Role("wheel_odometry", "/odom", ODOMETRY, WheelPose, _DRIVE, by_type=True, survey="speed"),
     Role("ground_truth", "/ground_truth/odometry", ODOMETRY, GroundTruth),

@@ -19,6 +19,7 @@ from pathlib import Path
 
 from lhdmap.topology.geojson import to_geojson
 from tests.cli.logs import write_room_log
+from tests.exports.folders import map_folder
 from tests.topology.maps import ladder
 
 EXIT_DONE, EXIT_INTERRUPTED = 0, 4
@@ -53,6 +54,7 @@ def commands(work: Path) -> dict[str, list[str]]:
         "screenshot": ["view", str(log), "--screenshot", "{out}.png"],
         "route": ["route", str(work / "t.geojson"), "DP1", "T2"],
         "check-map": ["check-map", str(work / "t.geojson")],
+        "export": ["export", str(map_folder(work / "map")), "--format", "dxf", "-o", "{out}.dxf"],
         "demo": ["demo", "-o", "{out}"],
     }
 

@@ -25,6 +25,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--machine", type=Path, metavar="FILE.toml", help="machine description (dimensions, bodies, mounts)"
     )
     parser.add_argument(
+        "--edits",
+        type=Path,
+        metavar="FILE.toml",
+        help="changes of the topology: names, limits, closures (docs/topology.md)",
+    )
+    parser.add_argument(
         "--one-process",
         action="store_true",
         help="no second process for pile, recording and report: less memory, slower",
@@ -47,6 +53,7 @@ def run(arguments: argparse.Namespace, console: Console) -> int:
         poses=arguments.poses,
         helper=not arguments.one_process,
         force=arguments.force,
+        edits=arguments.edits,
     )
     result = build_map(request)
     for text in result.warnings:

@@ -22,13 +22,16 @@ LARGEST_LIST = 4096
 COUNT = "number of "
 
 
-def write_ply(path: Path, cloud: Cloud) -> None:
-    """Write a binary PLY with what the cloud has of x y z nx ny nz curvature stamp_ns stamp_rest_ns hits."""
+def write_ply(path: Path, cloud: Cloud, *, frame: str = "map") -> None:
+    """Write a binary PLY with what the cloud has of x y z nx ny nz curvature stamp_ns stamp_rest_ns hits; `frame` it is in.
+
+    A cloud with an origin of its own has x y z as double, with that origin added.
+    """
     table = table_of(cloud, PLY_NAMES, [("stamp_ns", "<f8"), ("stamp_rest_ns", "<i4")])
     if cloud.stamps_ns is not None:
         table["stamp_ns"] = cloud.stamps_ns
         table["stamp_rest_ns"] = cloud.stamps_ns - table["stamp_ns"].astype(np.int64)
-    lines = ["ply", "format binary_little_endian 1.0", "comment lhdmap: metres, frame map"]
+    lines = ["ply", "format binary_little_endian 1.0", f"comment lhdmap: metres, frame {frame}"]
     if cloud.stamps_ns is not None:
         lines.append("comment exact time in nanoseconds = int(stamp_ns) + stamp_rest_ns")
     lines.append(f"element vertex {len(cloud)}")

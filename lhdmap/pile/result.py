@@ -111,6 +111,12 @@ class PileReport:
             return _of_a_pile(self.last.estimate)
         return PileEstimate.unknown(self.reason) if self.reason else PileEstimate()
 
+    def middles_m(self) -> list[FloatArray]:
+        """Return the middles (3,) of all piles that were decided on the drive."""
+        estimates = [self.estimate, *(one.last.estimate for one in self.piles)]
+        middles = [one.center_m for one in estimates if one.status not in (None, "none")]
+        return [middle for middle in middles if np.isfinite(middle).all()]
+
     def to_json(self) -> dict[str, Any]:
         """Return the content of `pile.json`: the last estimate, and when and how far away it was decided.
 

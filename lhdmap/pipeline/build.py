@@ -33,6 +33,9 @@ from lhdmap.provenance import file_entry, source_entry
 from lhdmap.report.page import fill_in_cost
 from lhdmap.report.recording import Thinning
 from lhdmap.runfolder import RunInfo
+from lhdmap.topology.edits import load_edits
+from lhdmap.topology.geojson import to_geojson
+from lhdmap.topology.sheet import write_sheets
 from lhdmap.trajectory import Trajectory
 
 _ASKED = "interrupted: what was read so far is being written; Ctrl-C once more ends at once"
@@ -47,6 +50,7 @@ class BuildRequest:
 
     `poses`: given poses for the cloud and the final trajectory (`given.given_rows`); empty: the odometry's.
     `helper`: whether a second process may look for the pile, record and report; what comes out is the same.
+    `edits`: TOML file with a user's changes of the topology.
     `force`: replace a map folder that is there, and try a log that the survey calls unusable. `recorded_as`: names of logs in
     `map.json`, where they are moved later.
     """
@@ -60,12 +64,14 @@ class BuildRequest:
     poses: str = ""
     helper: bool = False
     force: bool = False
+    edits: Path | None = None
     recorded_as: Mapping[Path, Path] = field(default_factory=dict)
 
     @property
     def inputs(self) -> Inputs:
         """What the map is made of."""
-        return Inputs(self.logs, self.settings, self.topics, self.target.name, self.poses, self.force)
+        name = self.target.name
+        return Inputs(self.logs, self.settings, self.topics, name, self.poses, self.force, load_edits(self.edits))
 
 
 @dataclass(frozen=True, slots=True)
@@ -162,6 +168,9 @@ def _write(
     folder.finished(folder.path / "cloud.ply")
     if outcome.pile is not None:
         folder.write_json("pile.json", outcome.pile.to_json())
+    if outcome.topology is not None:
+        folder.write_json("topology.geojson", to_geojson(outcome.topology.map))
+        folder.finished(write_sheets(folder.path / "free_space.npz", outcome.topology.sheets))
     try:
         spent = inspector.ask(Inspection.spent)
     except HelperDied as error:
@@ -215,6 +224,7 @@ def _options(request: BuildRequest) -> dict[str, Any]:
             "poses": request.poses or None,
             "poses_file": None if poses is None else file_entry(poses),
             "topics": dict(request.topics),
+            "edits": None if request.edits is None else file_entry(request.edits),
             "machine": None if request.machine is None else request.machine.name,
         },
     }

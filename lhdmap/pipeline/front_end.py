@@ -83,7 +83,7 @@ class FrontEnd:
 
     def input(self, scan: LaserScan, before_ns: int, time_ns: int, height_m: float) -> ScanInput:
         """Return a scan with all that is known of the machine at `time_ns`, the middle of its sweep."""
-        rear = partial(self._behind, time_ns) if self.has_inclinometer else None
+        rear = partial(self.behind_at, time_ns) if self.has_inclinometer else None
         rise = rise_of(self.mounts.of(scan.frame_id, "front").T_parent_child)
         view = View(height_m, self.boxes, rear, rise, self.has_inclinometer)
         return ScanInput(scan, partial(self.placement, scan, time_ns), self._wheel_step(before_ns, time_ns), view)
@@ -146,7 +146,8 @@ class FrontEnd:
         for message in self._early:
             self.attitude.update(message)
 
-    def _behind(self, time_ns: int) -> RearView | None:
+    def behind_at(self, time_ns: int) -> RearView | None:
+        """Return what the rear scanner saw at `time_ns`, None where it saw nothing or the joint is not known."""
         return self.rear.near(time_ns, *self.attitude_at(time_ns))
 
     def _wheel_step(self, before_ns: int, time_ns: int) -> WheelStep | None:

@@ -18,9 +18,10 @@ import numpy as np
 
 from lhdmap.config import Settings
 from lhdmap.machine import Machine
-from lhdmap.messages import FloatArray, LaserScan, Message, PointCloud, WheelPose
+from lhdmap.messages import FloatArray, LaserScan, Message, PointCloud, Text, WheelPose
 from lhdmap.odometry.cloud_odometry import CloudOdometry, CloudStep
 from lhdmap.odometry.planar import PlanarOdometry
+from lhdmap.odometry.rear_view import behind
 from lhdmap.odometry.start import starting_velocity
 from lhdmap.odometry.steps import OdometryStep
 from lhdmap.pipeline.front_end import FrontEnd
@@ -34,9 +35,11 @@ from lhdmap.pipeline.track import Track
 from lhdmap.proprioception.slip import SkidFactor
 from lhdmap.smoothing.realign import AlignedScan
 from lhdmap.smoothing.smoother import Smoother
+from lhdmap.topology.views import Views
 
 _PATIENCE_SCANS = 3  # after a pause of the whole log, wheels may come within as many scans before they count as silent
 _MOMENT_NS = 5_000_000
+_VIEW_BEAMS = 400
 _PLANAR = [3, 4, 2]  # of a twist (rotation before translation): x, y, heading
 _NOT_KNOWN = np.full(3, math.nan)
 
@@ -70,6 +73,8 @@ class MappingPipeline:
         self.path = FinalPath(self.track)
         self.sweeps = SweepIntegration(settings, machine, self.mounts, on_sweep, worker)
         self.smoother = Smoother(settings.smoothing)
+        self.said: list[tuple[int, str]] = []  # names of nodes, each where the operator begins to say it
+        self.views = Views()  # of the drift, for the free space that the topology is found in
         looked_for = primary == "front" and settings.pile.method != "off"
         self.pile: PileSink | None = (pile or PileWatch(settings)) if looked_for else None
         self.records, self.slip = ScanRecords(), SkidFactor(settings.slip)
@@ -97,6 +102,10 @@ class MappingPipeline:
         if isinstance(message, WheelPose):
             self.front_end.update(role, message._replace(stamp_ns=self._order.of_wheels(message.stamp_ns)))
             self._process_ready()
+            return
+        if isinstance(message, Text):
+            if role == "node" and (not self.said or self.said[-1][1] != message.text):
+                self.said.append((self._order.newest_ns, message.text))  # a text has no stamp of its own
             return
         self.front_end.update(role, message)
 
@@ -171,11 +180,25 @@ class MappingPipeline:
         believed = odometry.wheels.use.used
         self._newest = Newest(step.covariance, step.velocity, odometry.wheels.scale if believed else None)
         self.smoother.keys.update(time_ns, step.T_odom_base, odometry.points, step.error, unseen=step.unseen)
+        self._view(scan, time_ns, step, odometry)
         aligned = AlignedScan(time_ns, step.T_odom_base, odometry.points, odometry.points_behind, weak=step.lost)
         self.path.update(aligned)
         self._record(scan.stamp_ns, time_ns, step)
         self._look_for_pile(scan, time_ns, step)
         self.sweeps.advance(self.path.final, self.wheels)
+
+    def _view(self, scan: LaserScan, time_ns: int, step: OdometryStep, odometry: PlanarOdometry) -> None:
+        """Keep what both scanners saw, where the views want it."""
+        height_m = self.track.height_m
+        if not self._cloud or not self.views.wants(step.T_odom_base, height_m):
+            return
+        front = odometry.points - [0.0, 0.0, height_m]
+        fans = [(self.front_end.placement(scan, time_ns)[:2, 3], front)]
+        rear = self.front_end.behind_at(time_ns)
+        if rear is not None:
+            floor_m = self.settings.odometry.min_height_m
+            fans.append((rear.T_level_sensor[:2, 3], behind(rear, step.velocity, 0.0, floor_m, _VIEW_BEAMS).points))
+        self.views.add(time_ns, fans)
 
     def _begin(self, one: TimedScan) -> PlanarOdometry:
         """Start the odometry with the speed that a dry run over the first scans finds; realign its scans where that helps."""

@@ -29,6 +29,7 @@ from lhdmap.pipeline.refusal import key_scans_remark
 from lhdmap.pipeline.said import said_once
 from lhdmap.pipeline.sweep_times import SweepTimes
 from lhdmap.pipeline.sweeps import SweepIntegration
+from lhdmap.pipeline.topology import counts_of, seen_of
 from lhdmap.pipeline.track import FinalTrack, Rows, resample, trajectory_of
 from lhdmap.proprioception.wheels import WheelOdometry
 from lhdmap.report.bounded import bounded
@@ -36,6 +37,8 @@ from lhdmap.report.data import ReportData, Summary, TopicRow
 from lhdmap.roles import BUILD_MAP, GIVEN_POSES, read_by
 from lhdmap.smoothing.smoother import corrected
 from lhdmap.smoothing.trust import expected_error
+from lhdmap.topology.build import Topology, topology_of
+from lhdmap.topology.edits import NO_EDITS, TopologyEdits
 from lhdmap.trajectory import Trajectory
 
 ROLES_READ = read_by(BUILD_MAP)
@@ -56,6 +59,7 @@ class Inputs(NamedTuple):
     title: str
     poses: str = ""
     force: bool = False
+    edits: TopologyEdits = NO_EDITS
 
 
 class Ways(NamedTuple):
@@ -122,6 +126,7 @@ class Outcome:
             raise InputError(f"{source.paths[0]}: its scans hold no hit; lhdmap doctor tells what is wrong")
         self.pile_reason = self._no_pile()
         self.pile = None if self.pile_reason else self._pile(pipeline.pile)
+        self.topology = self._topology()
         told = [*source.warnings, *source.damage, *_of_the_run(pipeline, inputs), *of_sweeps]
         told += _holes(rows) if inputs.poses else _remarks(pipeline)
         self.warnings = said_once([*told, *_of_the_pile(self.pile)])
@@ -137,6 +142,7 @@ class Outcome:
             "degenerate_share": None if inputs.poses else records.degenerate_share,
             "lost_stretches": 0 if inputs.poses else records.lost_stretches,
             "closures": ways.closures,
+            "topology": None if self.topology is None else counts_of(self.topology),
             "pile": None if self.pile is None else self.pile.estimate.status,
             "pile_reason": self.pile_reason or (None if self.pile is None else self.pile.estimate.reason or None),
         }
@@ -163,6 +169,14 @@ class Outcome:
             with contextlib.suppress(HelperDied):  # looked for anew below, and told of when the report is written
                 return self.pipeline.path.moved(stage.report())
         return identify_along(self.ways.rows, inputs.logs, inputs.settings, self.pipeline.machine, inputs.topics)
+
+    def _topology(self) -> Topology | None:
+        """Return the topological map of the drive, None where it is not wanted or no planar scanner saw the drift."""
+        settings = self._inputs.settings.topology
+        if settings.method == "off" or not len(self.pipeline.views):
+            return None
+        seen = seen_of(self.pipeline, self.ways.rows, [] if self.pile is None else self.pile.middles_m())
+        return topology_of(seen, settings, self._inputs.edits)
 
     def report(self) -> ReportData:
         """Return the data of the HTML page and of the recording."""

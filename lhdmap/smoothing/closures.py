@@ -17,10 +17,10 @@ from lhdmap.messages import FloatArray
 from lhdmap.scan_matching.information import marginal_information
 from lhdmap.scan_matching.key_scan import KeyScan
 from lhdmap.scan_matching.matching import Hits, Match
+from lhdmap.scan_matching.places import Nearby
 from lhdmap.scan_matching.scan_points import flattened
 from lhdmap.scan_matching.search import SearchGrid
 from lhdmap.scan_matching.submap import Submap, unsure
-from lhdmap.smoothing.places import Nearby
 from lhdmap.smoothing.settings import SmoothingSettings
 
 _SUBMAP_KEYS = 5  # keys on either side of the earlier one that make up its surroundings

@@ -9,8 +9,8 @@ import numpy as np
 from lhdmap.geometry import se2
 from lhdmap.messages import FloatArray
 from lhdmap.scan_matching.key_scan import KeyScan
+from lhdmap.scan_matching.places import Places
 from lhdmap.scan_matching.step_error import NO_ERROR, StepError
-from lhdmap.smoothing.places import Places
 from lhdmap.smoothing.settings import SmoothingSettings
 
 

@@ -211,7 +211,8 @@ def _read_tunnel(properties: Mapping[str, Any], line: Any) -> Tunnel:
 
 
 def _read_intersection(properties: Mapping[str, Any], rings: Any) -> Intersection:
-    outline = np.array(rings[0], dtype=float).reshape(-1, 2)[:-1]
+    ring = [point[:2] for point in (rings[0] if rings else ())]  # exports have heights
+    outline = np.array(ring, dtype=float).reshape(-1, 2)[:-1]
     frame = np.array(properties["T_map_node"], dtype=float)
     degree, level = int(properties["degree"]), properties["level"]
     return Intersection(str(properties["id"]), str(properties["name"]), degree, frame, outline, level)

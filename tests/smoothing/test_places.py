@@ -7,8 +7,8 @@ import math
 import numpy as np
 from lhdmap.messages import FloatArray
 from lhdmap.scan_matching.key_scan import KeyScan
+from lhdmap.scan_matching.places import Nearby, Places
 from lhdmap.smoothing.keys import KeyScans
-from lhdmap.smoothing.places import Nearby, Places
 from lhdmap.smoothing.settings import SmoothingSettings
 
 SETTINGS = SmoothingSettings()

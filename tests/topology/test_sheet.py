@@ -4,7 +4,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-
 from lhdmap.errors import InputError
 from lhdmap.topology.sheet import FREE, OCCUPIED, Sheet, read_sheets, write_sheets
 
