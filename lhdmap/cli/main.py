@@ -31,6 +31,8 @@ COMMANDS = {
     "rockbreaker": "plan trajectories of a rockbreaker over its grizzly",
     "simulate": "write a simulated log and its truth",
     "replay": "drive a simulated machine in closed loop: log, journal, verdict, report",
+    "route": "movement sequence between two places of a map, with inversions and its cost",
+    "check-map": "is the map ready to run on, and if not, why",
     "export": "a map in a format that other tools read",
     "eval": "compare results with ground truth",
     "config": "print the settings with unit and source",
