@@ -109,22 +109,17 @@ def _joined(
     surfaces: Mapping[str, NodeSurface],
 ) -> Landmarks:
     clouds = [cloud for _, own, _ in parts for cloud in own]
-    points = [cloud.points_m for cloud in clouds]
-    keys = (
-        Keys(*(np.concatenate([np.zeros(0), *column]) for column in zip(*(keys for _, _, keys in parts), strict=True)))
-        if parts
-        else Keys(*(np.zeros(0),) * 4)
-    )
+    points, keys = [cloud.points_m for cloud in clouds], [one for _, _, one in parts]
     return Landmarks(
         np.concatenate([np.zeros((0, 2)), *points]).astype(np.float32),
         np.concatenate([[0], np.cumsum([len(one) for one in points])]).astype(np.int64),
         np.array([cloud.T_node_base for cloud in clouds]).reshape(-1, 3),
         np.array([node for node, own, _ in parts for _ in own], dtype=np.str_),
         np.array([cloud.at_m for cloud in clouds], dtype=np.float64),
-        keys.threshold,
-        keys.delta,
-        keys.radius.astype(np.int32),
-        keys.key.astype(np.bool_),
+        np.concatenate([np.zeros(0), *(one.threshold for one in keys)]),
+        np.concatenate([np.zeros(0), *(one.delta for one in keys)]),
+        np.concatenate([np.zeros(0, np.int32), *(one.radius for one in keys)]),
+        np.concatenate([np.zeros(0, np.bool_), *(one.key for one in keys)]),
         matrices,
         surfaces,
     )

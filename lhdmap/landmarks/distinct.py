@@ -1,10 +1,10 @@
 """Where a tunnel is not distinctive: a length of its walls is found again, nearly as well, at another place of the same tunnel.
 
-Each window of the profile is laid over all other places, in both directions. A place costs half the sum of squared differences over
-their variance (those of both bins, the wall's slope times a half bin, 5 mm), truncated at 3 sigma, tempered by a third, as neighbouring
-bins are not independent; one is taken off each, which is what the right place costs. The least cost is the gap, in nats. The turn
-of the mid line over 2 m is a third channel. All windows along one lag are one running sum: time grows with the square of the
-tunnel's length (1 km: about a second), memory with its length.
+Each window of the profile is laid over all other places, in both directions. A place costs half the sum of squared differences
+over their variance (those of both bins, the wall's slope times a half bin, 5 mm), truncated at 3 sigma, tempered by a third, as
+neighbouring bins are not independent; one is taken off each, which is what the right place costs. The least cost is the gap, in
+nats. The turn of the mid line over 2 m is a third channel. All windows along one lag are one running sum: time grows with the
+square of the tunnel's length (1 km: about a second), memory with its length.
 """
 
 from __future__ import annotations

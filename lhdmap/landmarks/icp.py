@@ -12,47 +12,17 @@ from typing import NamedTuple
 
 import numba as nb
 import numpy as np
-import numpy.typing as npt
 
 from lhdmap.geometry import se2
+from lhdmap.landmarks.target import REACH_M, IcpModel, Target, bearing, counterpart, distance2, prepare
 from lhdmap.messages import Float32Array, FloatArray
 from lhdmap.scan_matching.matching import solve3
 
-REACH_M = 0.5
-"""Points without another one within this distance have no counterpart."""
-CELL_M = 0.05
-_NEIGHBOURS, _NEIGHBOURHOOD_M = 7, 0.6
-_BEARINGS = 180
-_ROUNDS, _WIDE_ROUNDS, _TRIED = 20, 4, 3
-_NARROWING, _LAST_GATE = 0.7, 4.0 / 3.0  # of the gate: each round, and where it ends, in limits
+_ROUNDS, _POINT_ROUNDS, _WIDE_ROUNDS, _TRIED = 30, 60, 4, 3  # points slide along a wall slowly
+_NARROWING = 0.85  # of the gate, each round
+_LAST_GATE = 0.35  # where it ends, in limits; points are too far apart for a narrow one
 _STEADY = 2e-4  # m, and rad times 5: a step below it ends the rounds
 _NOISE_M = 0.012
-_FLATNESS = 0.25  # of PCA: neighbours that scatter more than this across, as a share of along, have no line
-
-
-class IcpModel(NamedTuple):
-    """How clouds are compared: truncation of distances, range of a landmark and centre of it, least share, lines or points."""
-
-    limit_m: float = 0.15
-    range_m: float = 10.0
-    centre_m: float = 0.0
-    min_share: float = 0.6
-    to_line: bool = True
-
-
-class Target(NamedTuple):
-    """A cloud (N, 2) that others are placed on, with lines: `anchors` (N, 2), `normals` (N, 2), zero where it has none.
-
-    `nearest` (H, W) int16: index of the point nearest to each cell of `CELL_M`, -1 beyond `REACH_M`; its corner is `origin_m`.
-    `seen` (B,): bearings about the centre in which it has a hit.
-    """
-
-    points_m: FloatArray
-    anchors: FloatArray
-    normals: FloatArray
-    nearest: npt.NDArray[np.int32]
-    origin_m: FloatArray
-    seen: npt.NDArray[np.bool_]
 
 
 class Fit(NamedTuple):
@@ -70,100 +40,15 @@ class Fit(NamedTuple):
 
 
 @nb.njit(cache=True, nogil=True)
-def _lines(points, anchors, normals):  # type: ignore[no-untyped-def]
-    """Fill the line at each point: centroid and normal of its nearest neighbours."""
-    n = points.shape[0]
-    nearest2, index = np.empty(_NEIGHBOURS), np.empty(_NEIGHBOURS, np.int64)
-    for i in range(n):
-        count = 0
-        for j in range(n):
-            d2 = (points[j, 0] - points[i, 0]) ** 2 + (points[j, 1] - points[i, 1]) ** 2
-            if d2 > _NEIGHBOURHOOD_M**2 or (count == _NEIGHBOURS and d2 >= nearest2[count - 1]):
-                continue
-            at = min(count, _NEIGHBOURS - 1)
-            while at > 0 and nearest2[at - 1] > d2:
-                nearest2[at], index[at] = nearest2[at - 1], index[at - 1]
-                at -= 1
-            nearest2[at], index[at] = d2, j
-            count = min(count + 1, _NEIGHBOURS)
-        mx = my = 0.0
-        for k in range(count):
-            mx += points[index[k], 0]
-            my += points[index[k], 1]
-        mx, my = mx / count, my / count
-        xx = xy = yy = 0.0
-        for k in range(count):
-            dx, dy = points[index[k], 0] - mx, points[index[k], 1] - my
-            xx, xy, yy = xx + dx * dx, xy + dx * dy, yy + dy * dy
-        half, difference = 0.5 * (xx + yy), 0.5 * (xx - yy)
-        root = math.sqrt(difference * difference + xy * xy)
-        anchors[i, 0], anchors[i, 1] = mx, my
-        normals[i, 0] = normals[i, 1] = 0.0
-        if count >= 3 and root > 1e-9 and half - root < _FLATNESS * (half + root):
-            angle = 0.5 * math.atan2(xy, difference) + 0.5 * math.pi
-            normals[i, 0], normals[i, 1] = math.cos(angle), math.sin(angle)
-
-
-@nb.njit(cache=True, nogil=True)
-def prepare(points_m: FloatArray, model: IcpModel) -> Target:
-    """Return a cloud (N, 2), metres, N > 0, as a target."""
-    n, reach = points_m.shape[0], int(math.ceil(REACH_M / CELL_M))
-    anchors, normals = np.empty((n, 2)), np.empty((n, 2))
-    _lines(points_m, anchors, normals)
-    origin = np.array([points_m[:, 0].min(), points_m[:, 1].min()]) - (reach + 1) * CELL_M
-    width = int((points_m[:, 0].max() - origin[0]) / CELL_M) + reach + 2
-    height = int((points_m[:, 1].max() - origin[1]) / CELL_M) + reach + 2
-    nearest, best = np.full((width, height), -1, np.int32), np.full((width, height), np.float32(REACH_M**2))
-    seen = np.zeros(_BEARINGS, np.bool_)
-    for i in range(n):
-        cx, cy = int((points_m[i, 0] - origin[0]) / CELL_M), int((points_m[i, 1] - origin[1]) / CELL_M)
-        for ix in range(cx - reach, cx + reach + 1):
-            dx = origin[0] + (ix + 0.5) * CELL_M - points_m[i, 0]
-            for iy in range(cy - reach, cy + reach + 1):
-                dy = origin[1] + (iy + 0.5) * CELL_M - points_m[i, 1]
-                d2 = np.float32(dx * dx + dy * dy)
-                if d2 < best[ix, iy]:
-                    best[ix, iy], nearest[ix, iy] = d2, i
-        seen[_bearing(points_m[i, 0] - model.centre_m, points_m[i, 1])] = True
-    return Target(points_m, anchors, normals, nearest, origin, seen)
-
-
-@nb.njit(cache=True, nogil=True, inline="always")
-def _bearing(x: float, y: float) -> int:
-    return int((math.atan2(y, x) + math.pi) * (_BEARINGS / (2.0 * math.pi))) % _BEARINGS
-
-
-@nb.njit(cache=True, nogil=True, inline="always")
-def _counterpart(target, x, y):  # type: ignore[no-untyped-def]
-    """Return the index of the target's point nearest to (x, y), -1 where none is in reach."""
-    ix, iy = int((x - target.origin_m[0]) / CELL_M), int((y - target.origin_m[1]) / CELL_M)
-    if x < target.origin_m[0] or y < target.origin_m[1]:
-        return -1
-    if ix >= target.nearest.shape[0] or iy >= target.nearest.shape[1]:
-        return -1
-    return target.nearest[ix, iy]
-
-
-@nb.njit(cache=True, nogil=True, inline="always")
-def _distance2(target, k, x, y, to_line):  # type: ignore[no-untyped-def]
-    """Return the squared distance (m²) of (x, y) from the line at the target's point `k`, or from it where it has none."""
-    nx, ny = target.normals[k, 0], target.normals[k, 1]
-    if to_line and (nx != 0.0 or ny != 0.0):
-        d = nx * (x - target.anchors[k, 0]) + ny * (y - target.anchors[k, 1])
-        return d * d
-    return (x - target.points_m[k, 0]) ** 2 + (y - target.points_m[k, 1]) ** 2
-
-
-@nb.njit(cache=True, nogil=True)
 def _equations(target, points, step, pose, gate_m, to_line, H, b):  # type: ignore[no-untyped-def]
-    """Fill H (3, 3) and b (3,) of the weighted distances of each `step`-th point at `pose`; axes of the target, about the source."""
+    """Fill H (3, 3) and b (3,) of the weighted distances of each `step`-th point at `pose`, in the target's axes."""
     c, s = math.cos(pose[2]), math.sin(pose[2])
     h00 = h01 = h02 = h11 = h12 = h22 = b0 = b1 = b2 = 0.0
     inverse2 = 1.0 / (gate_m * gate_m)
     for i in range(0, points.shape[0], step):
         rx, ry = c * points[i, 0] - s * points[i, 1], s * points[i, 0] + c * points[i, 1]
         x, y = pose[0] + rx, pose[1] + ry
-        k = _counterpart(target, x, y)
+        k = counterpart(target, x, y)
         if k < 0:
             continue
         if to_line:
@@ -192,6 +77,11 @@ def _equations(target, points, step, pose, gate_m, to_line, H, b):  # type: igno
     b[0], b[1], b[2] = b0, b1, b2
 
 
+@nb.njit(cache=True, nogil=True, inline="always")
+def _last_gate(model):  # type: ignore[no-untyped-def]
+    return _LAST_GATE * model.limit_m if model.to_line else REACH_M
+
+
 @nb.njit(cache=True, nogil=True)
 def _moved(target, points, pose, rounds, step, model, narrowing):  # type: ignore[no-untyped-def]
     """Move `pose` (3,) in place by rounds of Gauss-Newton over each `step`-th point; the gate narrows while they go on."""
@@ -200,13 +90,15 @@ def _moved(target, points, pose, rounds, step, model, narrowing):  # type: ignor
     for k in range(rounds):
         gate = REACH_M
         if narrowing:
-            gate = max(REACH_M * _NARROWING ** (k + 1), _LAST_GATE * model.limit_m)
+            gate = max(REACH_M * _NARROWING**k, _last_gate(model))
         _equations(target, points, step, pose, gate, model.to_line, H, b)
         shift = solve3(H + damping, b)
         pose[0] += shift[0]
         pose[1] += shift[1]
         pose[2] = se2.wrap(pose[2] + shift[2])
-        if abs(shift[0]) + abs(shift[1]) + 5.0 * abs(shift[2]) < _STEADY and (not narrowing or k > 3):
+        if abs(shift[0]) + abs(shift[1]) + 5.0 * abs(shift[2]) < _STEADY and (
+            not narrowing or gate == _last_gate(model)
+        ):
             break
 
 
@@ -226,11 +118,11 @@ def judge(target, points, pose, model):  # type: ignore[no-untyped-def]
         x = pose[0] + c * points[i, 0] - s * points[i, 1]
         y = pose[1] + s * points[i, 0] + c * points[i, 1]
         about = x - model.centre_m
-        if about * about + y * y > model.range_m**2 or not target.seen[_bearing(about, y)]:
+        if about * about + y * y > model.range_m**2 or not target.seen[bearing(about, y)]:
             continue
         common[side] += 1.0
-        k = _counterpart(target, x, y)
-        total += min(_distance2(target, k, x, y, model.to_line), limit2) if k >= 0 else limit2
+        k = counterpart(target, x, y)
+        total += min(distance2(target, k, x, y, model.to_line), limit2) if k >= 0 else limit2
     both = common[0] + common[1]
     share = both / max(points.shape[0], 1)
     valid = both > 0.0 and share >= model.min_share
@@ -246,10 +138,10 @@ def align(target: Target, points_m: FloatArray, start: FloatArray, model: IcpMod
     It finds what is up to a metre and some degrees away in rough walls.
     """
     pose = start.copy()
-    _moved(target, points_m, pose, _ROUNDS, 1, model, True)
+    _moved(target, points_m, pose, _ROUNDS if model.to_line else _POINT_ROUNDS, 1, model, True)
     fitness, share, valid = judge(target, points_m, pose, model)
     H, b = np.zeros((3, 3)), np.zeros(3)
-    _equations(target, points_m, 1, pose, _LAST_GATE * model.limit_m, model.to_line, H, b)
+    _equations(target, points_m, 1, pose, _last_gate(model), model.to_line, H, b)
     return Fit(pose, fitness, share, valid, H / max(fitness, _NOISE_M**2))
 
 
@@ -281,9 +173,9 @@ def _roughly(target, points, pose, model):  # type: ignore[no-untyped-def]
     for i in range(0, points.shape[0], 2):
         x = pose[0] + c * points[i, 0] - s * points[i, 1]
         y = pose[1] + s * points[i, 0] + c * points[i, 1]
-        k = _counterpart(target, x, y)
+        k = counterpart(target, x, y)
         n += 1
-        total += min(_distance2(target, k, x, y, model.to_line), limit2) if k >= 0 else limit2
+        total += min(distance2(target, k, x, y, model.to_line), limit2) if k >= 0 else limit2
     return total / max(n, 1)
 
 

@@ -2,13 +2,14 @@
 
 For each landmark j, the values of column j of the similarity matrix (each other landmark on j) in rising order:
 
-* threshold: the value of the last landmark before the first that is no local neighbour. The paper calls it a minimum; a low fitness
-  is a good one, so it is the largest that a match may have. Landmark j itself, with fitness 0, is left out of the order.
+* threshold: the value of the last landmark before the first that is no local neighbour. The paper calls it a minimum; a low
+  fitness is a good one, so it is the largest that a match may have. Landmark j itself, with fitness 0, is left out of the order.
 * local neighbours are a fixed window, `neighbours` to each side: the radius that the paper would define them by is the result.
 * delta: the next value less the threshold, never negative (the paper has it the other way round).
 * where the first in the order is already no neighbour, nothing is selected: threshold, delta and radius are 0, it is no key.
-* radius: the largest r for which all landmarks within r have a value up to the threshold. The paper's "distance to the selected one"
-  is that of the last accepted; those skipped in between would go unnoticed. A pair that does not match at all counts for nobody.
+* radius: the largest r for which all landmarks within r have a value up to the threshold. The paper's "distance to the selected
+  one" is that of the last accepted; those skipped in between would go unnoticed. A pair that does not match at all counts for
+  nobody. So a radius is 1 or 2, and larger only where the two scanners' clouds overlap further (docs/landmarks.md).
 * the best of the first and of the last ten are keys, if they have a radius; in a short tunnel the second only where it is apart
   from the first, as all others.
 * "radius greater than" and "farther than" are strict, as the paper has them.
@@ -44,10 +45,9 @@ def choose_keys(F: npt.NDArray[np.floating], settings: LandmarkSettings) -> Keys
     radius = np.array([one[2] for one in judged], dtype=np.int32)
     key = np.zeros(n, dtype=np.bool_)
     for first, last in ((0, settings.ends), (n - settings.ends, n)):
-        rows = np.arange(max(first, 0), min(last, n))
-        best = min(rows, key=lambda j: (-radius[j], -delta[j], j), default=None)
-        if best is not None and radius[best] > 0 and _apart(best, key, F, threshold, settings):
-            key[best] = True
+        rows = range(max(first, 0), min(last, n))
+        for j in sorted(rows, key=lambda j: (-radius[j], -delta[j], j))[:1]:
+            key[j] = radius[j] > 0 and _apart(j, key, F, threshold, settings)
     for j in sorted(range(n), key=lambda j: (-radius[j], -delta[j], j)):
         if radius[j] > settings.min_radius and _apart(j, key, F, threshold, settings):
             key[j] = True

@@ -32,10 +32,10 @@ class Landmarks:
     """K landmarks, those of a node together and in order along it, and the walls of each node.
 
     `points_m` (N, 2) float32, of landmark k the rows `offsets[k]` to `offsets[k + 1]`, in the machine's frame at
-    `poses_node[k]` (K, 3: x, y, yaw in the node's frame); that of an intersection is in the node's frame, its pose zero. `node` (K,):
-    ids; `at_m` (K,). `threshold`, `delta` (K,): fitness (m²) that a match may have, and how much more the next one has that is no
-    neighbour; NaN in intersections. `radius` (K,): landmarks to each side that match. `key` (K,): an intersection's one is.
-    `similarity`: by tunnel, (n, n) float32, source i on target j. `surfaces`: by node.
+    `poses_node[k]` (K, 3: x, y, yaw in the node's frame); that of an intersection is in the node's frame, its pose zero. `node`
+    (K,): ids; `at_m` (K,). `threshold`, `delta` (K,): fitness (m²) that a match may have, and how much more the next one has
+    that is no neighbour; NaN in intersections. `radius` (K,): landmarks to each side that match. `key` (K,): the one of an
+    intersection is. `similarity`: by tunnel, (n, n) float32, source i on target j. `surfaces`: by node.
     """
 
     points_m: Float32Array

@@ -27,8 +27,8 @@ class Profile(NamedTuple):
     """Walls along a tunnel, P bins: float32 (P,) but for `line_m`, (P, 2).
 
     `at_m`: place along the node's line; `line_m`: the mid line in the node's frame; `heading_rad`: its heading there. `left_m`,
-    `right_m`: distance of the walls from it, NaN where none is seen; `left_var`, `right_var`: their variances (m²). `gap`: how much
-    less likely the most similar other place of the tunnel is, in nats (inf where there is no other).
+    `right_m`: distance of the walls from it, NaN where none is seen; `left_var`, `right_var`: their variances (m²). `gap`: how
+    much less likely the most similar other place of the tunnel is, in nats (inf where there is no other).
     """
 
     at_m: Float32Array
@@ -73,8 +73,19 @@ def profile_of(
         line = np.column_stack([_smoothed(column, settings) for column in line.T])
         line, at = _resampled(line, at, settings.profile_m)
     walls = _walls_along(line, cells_m, counts, settings)
-    single = [array.astype(np.float32) for array in (at, line, _heading(line), *walls.T)]
-    return Profile(*single, np.full(len(at), np.inf, dtype=np.float32))
+    left, right, left_var, right_var = (np.asarray(column, dtype=np.float32) for column in walls.T)
+    heading = np.asarray(_heading(line), dtype=np.float32)
+    gap = np.full(len(at), np.inf, dtype=np.float32)
+    return Profile(
+        np.asarray(at, dtype=np.float32),
+        np.asarray(line, dtype=np.float32),
+        heading,
+        left,
+        right,
+        left_var,
+        right_var,
+        gap,
+    )
 
 
 def _empty() -> Profile:

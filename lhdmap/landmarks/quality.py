@@ -1,9 +1,9 @@
 """How well a node's own scans fit its fused walls: what localization compares a live scan with.
 
 * support: share of hits that agree, of the node's scans matched at their own poses; mean, and the least (5th percentile).
-* kappa: what the information of a match is to be divided by, as neighbouring hits share the map's errors. Measured on scans that
-  had no part in the walls they are matched with: mean squared deviation from their poses over its stated variance; never under
-  `LEAST_KAPPA`.
+* kappa: what the information of a match is to be divided by, as neighbouring hits share the map's errors. The larger of two: what
+  the scale of the map asks for (measured with a second drive: 3 at 0.1 %, 10 at 0.5 %), and the mean squared deviation of scans
+  from their poses over its stated variance, matched with walls that they had no part in.
 * scale: by how much poses near each other are stretched against the scans. Matched with what lies ahead of it alone, a scan of a
   stretched map moves ahead, with what lies behind it alone, back: half the difference over the mean distance of these hits.
 """
@@ -25,8 +25,7 @@ from lhdmap.scan_matching.information import body_information, marginal_informat
 from lhdmap.scan_matching.matching import Hits, Match, Prior, match
 from lhdmap.scan_matching.submap import OTHER_VISIT
 
-LEAST_KAPPA, MOST_KAPPA = 3.0, 100.0
-"""Bounds: 3 is what maps from scan odometry need in rough walls; 100 is what the smoothest walls with 0.5 % of scale need."""
+KAPPA_SCALES, KAPPAS = (0.001, 0.005, 0.05), (3.0, 10.0, 100.0)
 _SCANS, _HITS = 60, 400
 _PRIOR = np.diag([1.0 / 0.3**2, 1.0 / 0.3**2, 1.0 / math.radians(2.0) ** 2])
 _WINDOW_M = 40.0
@@ -62,10 +61,15 @@ def quality_of(cells: Cells, scans: Sequence[NodeScan], T_map_node: FloatArray, 
         float(support.mean()),
         float(np.percentile(support, 5.0)),
         float(np.mean([one.residual_sigmas for one in whole])),
-        float(np.clip(np.nanmean(apart), LEAST_KAPPA, MOST_KAPPA)),
+        max(float(np.nanmean(apart)), _kappa_of(scale)),
         scale,
         scale_std,
     )
+
+
+def _kappa_of(scale: float) -> float:
+    """Return what the scale of a map asks for; where it is not known, what one of half a per cent does."""
+    return float(np.interp(0.005 if math.isnan(scale) else abs(scale), KAPPA_SCALES, KAPPAS))
 
 
 def _matched(cells: Cells, scan: NodeScan, T_map_node: FloatArray, settings: LandmarkSettings, side: int = 0) -> Match:

@@ -76,7 +76,12 @@ class LandmarkSettings:
         10, unit="landmarks", doc="The best of so many at each end of a tunnel is a key.", minimum=1, source=_PAPER
     )
     min_radius: int = setting(
-        2, unit="landmarks", doc="Other keys have a larger radius than this.", minimum=0, source=_PAPER
+        0,
+        unit="landmarks",
+        doc="Other keys have a larger radius than this. The paper has 2: clouds 6 m apart must match, which those of scanners 7 m "
+        "apart, cut at 10 m, cannot.",
+        minimum=0,
+        source="measured (docs/landmarks.md)",
     )
     key_spacing: int = setting(
         5, unit="landmarks", doc="... and are farther than this from each other.", minimum=0, source=_PAPER

@@ -19,9 +19,10 @@ import numba as nb
 import numpy as np
 
 from lhdmap.geometry import se2
-from lhdmap.landmarks.icp import IcpModel, align, best_of, prepare
+from lhdmap.landmarks.icp import align, best_of
 from lhdmap.landmarks.scans import Cloud
 from lhdmap.landmarks.settings import LandmarkSettings
+from lhdmap.landmarks.target import IcpModel, prepare
 from lhdmap.messages import Float32Array, FloatArray
 
 STRAY_M, STRAY_RAD = 0.5, 0.1

@@ -84,11 +84,11 @@ def read_landmarks(path: Path) -> Landmarks:
         raise InputError(f"{path}: no landmarks.npz of lhdmap: {', '.join(missing[:3])} missing; build the map again")
     _check(path, arrays)
     return Landmarks(
-        arrays["points"],
-        arrays["offsets"],
-        *(arrays[name] for name in _OF_LANDMARKS),
-        {name.removeprefix(_MATRIX): matrix for name, matrix in arrays.items() if name.startswith(_MATRIX)},
-        _surfaces(arrays),
+        points_m=arrays["points"],
+        offsets=arrays["offsets"],
+        **{name: arrays[name] for name in _OF_LANDMARKS},
+        similarity={name.removeprefix(_MATRIX): matrix for name, matrix in arrays.items() if name.startswith(_MATRIX)},
+        surfaces=_surfaces(arrays),
     )
 
 
