@@ -11,6 +11,7 @@ from typing import NamedTuple
 
 import numba as nb
 import numpy as np
+from scipy.ndimage import median_filter
 from scipy.spatial import cKDTree
 
 from lhdmap.landmarks.settings import LandmarkSettings
@@ -20,6 +21,7 @@ WALL_MOST_M = 6.0
 """What is farther to the side is no wall of the tunnel."""
 _WALL_LEAST_M, _WALL_DEPTH_M = 0.3, 0.25
 _FLOOR_M = 0.003  # deviation of a bin that no averaging goes below
+_STEP_M = 0.3
 _PASSES = 3
 
 
@@ -67,25 +69,17 @@ def profile_of(
         return _empty()
     for _ in range(_PASSES):
         walls = _walls_along(line, cells_m, counts, settings)
-        middle = _smoothed(_filled(0.5 * (walls[:, 0] - walls[:, 1])), settings)
-        heading = _heading(line)
-        line = line + middle[:, None] * np.column_stack([-np.sin(heading), np.cos(heading)])
+        left, right = (_without_niches(wall, settings) for wall in walls.T[:2])
+        middle = _smoothed(0.5 * (left - right), settings)
+        turned = _heading(line)
+        line = line + middle[:, None] * np.column_stack([-np.sin(turned), np.cos(turned)])
         line = np.column_stack([_smoothed(column, settings) for column in line.T])
         line, at = _resampled(line, at, settings.profile_m)
     walls = _walls_along(line, cells_m, counts, settings)
-    left, right, left_var, right_var = (np.asarray(column, dtype=np.float32) for column in walls.T)
-    heading = np.asarray(_heading(line), dtype=np.float32)
+    single_left, single_right, left_var, right_var = (np.asarray(column, dtype=np.float32) for column in walls.T)
     gap = np.full(len(at), np.inf, dtype=np.float32)
-    return Profile(
-        np.asarray(at, dtype=np.float32),
-        np.asarray(line, dtype=np.float32),
-        heading,
-        left,
-        right,
-        left_var,
-        right_var,
-        gap,
-    )
+    single_at, single_line, heading = (np.asarray(column, dtype=np.float32) for column in (at, line, _heading(line)))
+    return Profile(single_at, single_line, heading, single_left, single_right, left_var, right_var, gap)
 
 
 def _empty() -> Profile:
@@ -119,6 +113,14 @@ def _smoothed(values: FloatArray, settings: LandmarkSettings) -> FloatArray:
     padded = np.pad(values, half, mode="reflect", reflect_type="odd")
     smooth: FloatArray = np.convolve(padded, kernel / kernel.sum(), "valid")
     return smooth
+
+
+def _without_niches(distances_m: FloatArray, settings: LandmarkSettings) -> FloatArray:
+    """Return a wall's distances (P,) without gaps, and without what is a step deeper than the wall around: niches, openings."""
+    wall = _filled(distances_m)
+    around = median_filter(wall, size=max(round(2.0 * settings.smooth_m / settings.profile_m), 1), mode="nearest")
+    known: FloatArray = np.minimum(wall, around + _STEP_M)
+    return known
 
 
 def _filled(values: FloatArray) -> FloatArray:

@@ -56,7 +56,7 @@ def quality_of(cells: Cells, scans: Sequence[NodeScan], T_map_node: FloatArray, 
     halves = [fused([placed(scan, T_map_node, settings) for scan in scans[k::2]], settings.cell_m) for k in (0, 1)]
     apart = [_deviation(halves[1 - k % 2], scans[k], T_map_node, settings) for k in chosen]
     support = np.array([one.support for one in whole])
-    scale, scale_std = _scale(cells, [scans[k] for k in chosen], T_map_node, settings)
+    scale, scale_std = _scale(cells, _inner([scans[k] for k in chosen], settings), T_map_node, settings)
     return Quality(
         float(support.mean()),
         float(np.percentile(support, 5.0)),
@@ -89,6 +89,13 @@ def _deviation(cells: Cells, scan: NodeScan, T_map_node: FloatArray, settings: L
     off = se2.between(pose, found.pose)
     information = marginal_information(body_information(found.information, pose[2]) + _PRIOR)
     return float(np.mean(off[:2] ** 2 * information[:2]))
+
+
+def _inner(scans: Sequence[NodeScan], settings: LandmarkSettings) -> Sequence[NodeScan]:
+    """Return the scans whose walls were seen from both sides; all of them where the node is too short."""
+    first, last = scans[0].at_m + settings.surface_range_m, scans[-1].at_m - settings.surface_range_m
+    inner = [scan for scan in scans if first <= scan.at_m <= last]
+    return inner if len(inner) >= _LEAST_SCANS else scans
 
 
 def _scale(

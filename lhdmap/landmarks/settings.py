@@ -103,7 +103,7 @@ class LandmarkSettings:
         6.0, unit="m", doc="Length over which the mid line of the profile is smoothed.", minimum=0.5
     )
     distinct_m: float = setting(
-        10.0, unit="m", doc="Length of wall that must be found in no other place of its tunnel.", minimum=2.0
+        15.0, unit="m", doc="Length of wall that must be found in no other place of its tunnel.", minimum=2.0
     )
     distinct_gap: float = setting(
         30.0,

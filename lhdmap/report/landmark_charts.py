@@ -20,7 +20,7 @@ _SHOWN_GAP = 4.0  # times the least gap: where the scale ends
 
 
 def similarity_chart(landmarks: Landmarks, tunnel: str) -> Figure:
-    """Draw the similarity matrix of a tunnel as root mean square distances, with the keys, and each landmark's threshold beside it."""
+    """Draw the similarity matrix of a tunnel as root mean square distances, with its keys; beside it each landmark's threshold."""
     figure = charts.new_figure(_HEIGHT_IN, right_in=0.3)
     matrix, margins = figure.subplots(1, 2, width_ratios=(1.25, 1.0))
     figure.subplots_adjust(wspace=0.32)
