@@ -24,11 +24,12 @@ from lhdmap.messages import FloatArray
 from lhdmap.scan_matching.information import body_information, marginal_information
 from lhdmap.scan_matching.matching import Hits, Match, Prior, match
 from lhdmap.scan_matching.submap import OTHER_VISIT
+from lhdmap.scan_matching.surface_map import SurfaceMap, empty_map
 
 KAPPA_SCALES, KAPPAS = (0.001, 0.005, 0.05), (3.0, 10.0, 100.0)
 _SCANS, _HITS = 60, 400
 _PRIOR = np.diag([1.0 / 0.3**2, 1.0 / 0.3**2, 1.0 / math.radians(2.0) ** 2])
-_WINDOW_M = 40.0
+_PART_M = 40.0
 _LEAST_SCANS = 4
 
 
@@ -52,11 +53,15 @@ def quality_of(cells: Cells, scans: Sequence[NodeScan], T_map_node: FloatArray, 
     if len(scans) < _LEAST_SCANS:
         return UNMEASURED
     chosen = sorted({int(k) for k in np.linspace(0, len(scans) - 1, _SCANS)})
-    whole = [_matched(cells, scans[k], T_map_node, settings) for k in chosen]
-    halves = [fused([placed(scan, T_map_node, settings) for scan in scans[k::2]], settings.cell_m) for k in (0, 1)]
+    walls = _Walls(cells, settings)
+    whole = [_matched(walls, scans[k], T_map_node, settings) for k in chosen]
+    halves = [
+        _Walls(fused([placed(scan, T_map_node, settings) for scan in scans[k::2]], settings.cell_m), settings)
+        for k in (0, 1)
+    ]
     apart = [_deviation(halves[1 - k % 2], scans[k], T_map_node, settings) for k in chosen]
     support = np.array([one.support for one in whole])
-    scale, scale_std = _scale(cells, _inner([scans[k] for k in chosen], settings), T_map_node, settings)
+    scale, scale_std = _scale(walls, _inner([scans[k] for k in chosen], settings), T_map_node, settings)
     return Quality(
         float(support.mean()),
         float(np.percentile(support, 5.0)),
@@ -67,25 +72,41 @@ def quality_of(cells: Cells, scans: Sequence[NodeScan], T_map_node: FloatArray, 
     )
 
 
+class _Walls:
+    """The walls of a node, as maps of its parts: one at a time, as scans in order ask for them."""
+
+    def __init__(self, cells: Cells, settings: LandmarkSettings) -> None:
+        self._cells, self._reach_m = cells, 0.5 * _PART_M + settings.surface_range_m + 2.0
+        self._part: tuple[int, int] | None = None
+        self._map = empty_map(cells.cell_m, 8)
+
+    def about(self, pose: FloatArray) -> SurfaceMap:
+        """Return a map of all that is in reach of a pose (3,)."""
+        part = (round(pose[0] / _PART_M), round(pose[1] / _PART_M))
+        if part != self._part:
+            self._part = part
+            self._map = surface_map(self._cells, _PART_M * np.array(part), self._reach_m)
+        return self._map
+
+
 def _kappa_of(scale: float) -> float:
     """Return what the scale of a map asks for; where it is not known, what one of half a per cent does."""
     return float(np.interp(0.005 if math.isnan(scale) else abs(scale), KAPPA_SCALES, KAPPAS))
 
 
-def _matched(cells: Cells, scan: NodeScan, T_map_node: FloatArray, settings: LandmarkSettings, side: int = 0) -> Match:
+def _matched(walls: _Walls, scan: NodeScan, T_map_node: FloatArray, settings: LandmarkSettings, side: int = 0) -> Match:
     """Return the match of a scan with the walls from its own pose; `side`: 1 its hits ahead alone, -1 those behind."""
     pose, points = in_node(scan, T_map_node), near(scan.points_m, settings.surface_range_m, settings.centre_m)
     if side:
         points = points[side * (points[:, 0] - settings.centre_m) > 0.0]
     points = points[:: max(len(points) // _HITS, 1)]
-    walls = surface_map(cells, pose[:2], _WINDOW_M)
     hits = Hits(np.column_stack([points, np.zeros(len(points))]), len(points), layered=False)
-    return match(walls, hits, Prior(pose, _PRIOR), pose, OTHER_VISIT)
+    return match(walls.about(pose), hits, Prior(pose, _PRIOR), pose, OTHER_VISIT)
 
 
-def _deviation(cells: Cells, scan: NodeScan, T_map_node: FloatArray, settings: LandmarkSettings) -> float:
+def _deviation(walls: _Walls, scan: NodeScan, T_map_node: FloatArray, settings: LandmarkSettings) -> float:
     """Return the squared deviation of a match along and across from the scan's pose, over its stated variance; mean of both."""
-    found, pose = _matched(cells, scan, T_map_node, settings), in_node(scan, T_map_node)
+    found, pose = _matched(walls, scan, T_map_node, settings), in_node(scan, T_map_node)
     off = se2.between(pose, found.pose)
     information = marginal_information(body_information(found.information, pose[2]) + _PRIOR)
     return float(np.mean(off[:2] ** 2 * information[:2]))
@@ -99,13 +120,13 @@ def _inner(scans: Sequence[NodeScan], settings: LandmarkSettings) -> Sequence[No
 
 
 def _scale(
-    cells: Cells, scans: Sequence[NodeScan], T_map_node: FloatArray, settings: LandmarkSettings
+    walls: _Walls, scans: Sequence[NodeScan], T_map_node: FloatArray, settings: LandmarkSettings
 ) -> tuple[float, float]:
     """Return by how much the map is stretched near each scan (0: not), and the deviation of that."""
     values, weights = [], []
     for scan in scans:
         pose = in_node(scan, T_map_node)
-        found = [_matched(cells, scan, T_map_node, settings, side) for side in (1, -1)]
+        found = [_matched(walls, scan, T_map_node, settings, side) for side in (1, -1)]
         distances = [_reach(one, pose) for one in found]
         shifts = [se2.between(pose, one.pose)[0] for one in found]
         information = [body_information(one.information, pose[2])[0, 0] for one in found]

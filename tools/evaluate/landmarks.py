@@ -1,0 +1,188 @@
+"""Landmarks of simulated tunnels, and a second drive that looks for them: `evaluation/landmarks.md`.
+
+python -m tools.evaluate.landmarks [--quick]
+"""
+
+from __future__ import annotations
+
+import argparse
+import math
+import os
+import sys
+import tempfile
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import NamedTuple
+
+os.environ.setdefault("OMP_NUM_THREADS", "1")
+
+import numpy as np
+import numpy.typing as npt
+from lhdmap.geometry import se2
+from lhdmap.landmarks.build import landmarks_of
+from lhdmap.landmarks.icp import align, best_of
+from lhdmap.landmarks.model import Landmarks
+from lhdmap.landmarks.scans import Cloud, along_tunnel
+from lhdmap.landmarks.settings import LandmarkSettings
+from lhdmap.landmarks.similarity import icp_model
+from lhdmap.landmarks.store import write_landmarks
+from lhdmap.landmarks.target import prepare
+from lhdmap.messages import FloatArray
+from tests.landmarks.worlds import MODERATE, ROUGH, SMOOTH, drive, tunnel
+
+RESULT = Path(__file__).resolve().parents[2] / "evaluation" / "landmarks.md"
+CLASSES = {"rough, 12 cm": ROUGH, "moderate, 3 cm": MODERATE, "smooth, 5 mm": SMOOTH}
+_OFF = np.array([0.3, 0.1, 0.01])
+_WRONG_M, _NEAR_M, _NEAR_DEG = 1.0, 0.10, 1.0
+_SHIFTS = np.column_stack([np.arange(-8.0, 9.0), np.zeros(17), np.zeros(17)])
+HEADING = """\
+# Landmarks
+
+Written by `python -m tools.evaluate.landmarks`; not edited by hand. {count} tunnels of {length_m:.0f} m of each class, straight and
+plain or with bends (15–25 m of radius) and niches (1.5–3 m deep), taught by one drive with a scan each metre at true poses; two
+scanners 7.2 m apart, 190°, 0.5°, 12 mm. A second drive, 0.3 m beside the first, looks for each landmark that has a radius: what is
+within it from 0.3 m, 0.1 m and 0.6° away, what is elsewhere from 17 shifts along the axis. *Near*: within 0.10 m and 1°. *Fits*:
+fitness up to the threshold. *Wrong*: over 1 m away, and fits. *Gap*: over 15 m of wall.
+
+"""
+_COLUMNS = (
+    *(
+        "walls",
+        "have a radius",
+        "keys each 100 m",
+        "within a radius: near",
+        "worst, m and °",
+        "of these fit",
+        "fits: near",
+    ),
+    *("wrong of all that fit", "keys mistaken", "not distinctive", "least gap, nats", "kB/m"),
+)
+
+
+class Found(NamedTuple):
+    """Of one tunnel: counts as in the table; `errors` (N, 2): m and degrees of what is within a radius, `fits` (N,): of these."""
+
+    landmarks: Landmarks
+    errors: FloatArray
+    fits: npt.NDArray[np.bool_]
+    accepted: int
+    wrong: int
+    kilobytes: float
+
+
+def found_in(seed: int, rms_m: float, length_m: float, settings: LandmarkSettings, *, bent: bool) -> Found:
+    """Teach a tunnel, drive it again, look for each landmark that has a radius."""
+    world = tunnel(seed, rms_m, length_m, bends=bent, niches=bent)
+    made = landmarks_of(drive(world, seed=1), {"t": world.frame()}, {"t"}, settings)
+    other = along_tunnel(drive(world, seed=77, offset_m=0.3), world.frame(), settings)
+    errors, own, accepted, wrong = [], [], 0, 0
+    for j in np.flatnonzero(made.radius > 0).tolist():
+        for error, near, fits in _looked_for(made, other, j, settings):
+            accepted, wrong = accepted + fits, wrong + (fits and error[0] > _WRONG_M)
+            if near:
+                errors.append(error)
+                own.append(fits)
+    return Found(made, np.array(errors).reshape(-1, 2), np.array(own, dtype=np.bool_), accepted, wrong, _size_kb(made))
+
+
+def _looked_for(
+    made: Landmarks, other: list[Cloud], j: int, settings: LandmarkSettings
+) -> Iterator[tuple[tuple[float, float], bool, bool]]:
+    """Yield for each cloud of the other drive: its error (m, degrees) on landmark `j`, whether it is near it, whether it fits."""
+    model = icp_model(settings)
+    target = prepare(made.cloud(j).astype(np.float64), model)
+    for i, cloud in enumerate(other):
+        true = se2.between(made.poses_node[j], cloud.T_node_base)
+        near = abs(i - j) <= made.radius[j]
+        fit = (
+            align(target, cloud.points_m, true + _OFF, model)
+            if near
+            else best_of(target, cloud.points_m, _SHIFTS, model)
+        )
+        off = se2.between(true, fit.pose)
+        error = (math.hypot(off[0], off[1]), abs(math.degrees(off[2])))
+        yield error, bool(near), bool(fit.valid and fit.fitness <= made.threshold[j])
+
+
+def _size_kb(made: Landmarks) -> float:
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "landmarks.npz"
+        write_landmarks(path, made)
+        return path.stat().st_size / 1024.0
+
+
+def row(name: str, tunnels: list[Found], length_m: float, settings: LandmarkSettings) -> str:
+    """Return the line of one class."""
+    errors = np.concatenate([one.errors for one in tunnels])
+    fits = np.concatenate([one.fits for one in tunnels])
+    near = (errors[:, 0] <= _NEAR_M) & (errors[:, 1] <= _NEAR_DEG)
+    metres = length_m * len(tunnels)
+    radius = np.concatenate([one.landmarks.radius for one in tunnels])
+    keys = sum(int(one.landmarks.key.sum()) for one in tunnels)
+    accepted = sum(one.accepted for one in tunnels)
+    stretches = [s for one in tunnels for s in one.landmarks.not_distinctive_m("t", settings)]
+    profiles = [surface.profile for one in tunnels for surface in one.landmarks.surfaces.values()]
+    least = min(float(profile.gap.min()) for profile in profiles if profile is not None)
+    cells = (
+        name,
+        f"{100 * np.mean(radius > 0):.0f} %",
+        f"{100 * keys / metres:.1f}",
+        f"{_share(near)} of {len(near)}",
+        f"{errors[:, 0].max(initial=0.0):.3f}, {errors[:, 1].max(initial=0.0):.2f}",
+        _share(fits),
+        _share(near[fits]),
+        f"{sum(one.wrong for one in tunnels)} of {accepted}",
+        f"{sum(mistaken(one.landmarks) for one in tunnels)}",
+        f"{100 * sum(b - a for a, b in stretches) / metres:.0f} %",
+        f"{least:.0f}",
+        f"{sum(one.kilobytes for one in tunnels) / metres:.1f}",
+    )
+    return f"| {' | '.join(cells)} |"
+
+
+def _share(flags: npt.NDArray[np.bool_]) -> str:
+    return f"{100 * flags.mean():.1f} %" if len(flags) else "none"
+
+
+def mistaken(made: Landmarks) -> int:
+    """Return how many pairs of keys fit each other under a threshold."""
+    keys = np.flatnonzero(made.key)
+    between = made.threshold[keys] >= made.similarity["t"][np.ix_(keys, keys)]
+    return int(between.sum() - np.diag(between).sum())
+
+
+def table(settings: LandmarkSettings, seeds: range, length_m: float) -> Iterator[str]:
+    """Yield the lines of one table."""
+    yield f"| {' | '.join(_COLUMNS)} |"
+    yield "|" + " --- |" * len(_COLUMNS)
+    for name, rms_m in CLASSES.items():
+        for bent in (False, True):
+            tunnels = [found_in(seed, rms_m, length_m, settings, bent=bent) for seed in seeds]
+            yield row(f"{name}, {'bends and niches' if bent else 'plain'}", tunnels, length_m, settings)
+
+
+def main(words: list[str] | None = None) -> int:
+    """Measure and write the tables."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--quick", action="store_true", help="one tunnel of 80 m a class; nothing is written")
+    quick = parser.parse_args(words).quick
+    seeds, length_m, settings = (range(1), 80.0, LandmarkSettings()) if quick else (range(3), 200.0, LandmarkSettings())
+    parts = [HEADING.format(count=len(seeds), length_m=length_m)]
+    for title, chosen in (
+        ("Defaults: point to line, at least 60 % in common", settings),
+        ("At least 35 % in common", replace(settings, min_share=0.35)),
+        ('Point to point, as in the paper (`landmarks.fitness = "point"`)', replace(settings, fitness="point")),
+    ):
+        lines = []
+        for text in table(chosen, seeds, length_m):
+            print(text, flush=True)
+            lines.append(text)
+        parts += [f"## {title}\n", *lines, ""]
+    if not quick:
+        RESULT.write_text("\n".join(parts), encoding="utf-8")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
