@@ -34,17 +34,22 @@ _LEAST_SCANS = 4
 
 
 class Quality(NamedTuple):
-    """Of a node: `support`, `support_least` (shares), `residual_sigmas`, `kappa`, `scale` and its deviation; NaN: not measured."""
+    """Of a node, NaN where not measured.
+
+    `support`, `support_least`: shares; `along_m`: standard deviation along the machine that a match states, median; `scale`: 0 is
+    right, with its standard deviation.
+    """
 
     support: float
     support_least: float
     residual_sigmas: float
+    along_m: float
     kappa: float
     scale: float
     scale_std: float
 
 
-UNMEASURED = Quality(math.nan, math.nan, math.nan, 10.0, math.nan, math.nan)
+UNMEASURED = Quality(math.nan, math.nan, math.nan, math.nan, 10.0, math.nan, math.nan)
 """Of a node with too few scans; kappa is that of a map whose local scale is off by half a per cent."""
 
 
@@ -66,6 +71,7 @@ def quality_of(cells: Cells, scans: Sequence[NodeScan], T_map_node: FloatArray, 
         float(support.mean()),
         float(np.percentile(support, 5.0)),
         float(np.mean([one.residual_sigmas for one in whole])),
+        float(np.median([_along_m(one) for one in whole])),
         max(float(np.nanmean(apart)), _kappa_of(scale)),
         scale,
         scale_std,
@@ -117,6 +123,11 @@ def _inner(scans: Sequence[NodeScan], settings: LandmarkSettings) -> Sequence[No
     first, last = scans[0].at_m + settings.surface_range_m, scans[-1].at_m - settings.surface_range_m
     inner = [scan for scan in scans if first <= scan.at_m <= last]
     return inner if len(inner) >= _LEAST_SCANS else scans
+
+
+def _along_m(found: Match) -> float:
+    """Return the standard deviation along the machine that a match states, m."""
+    return float(marginal_information(body_information(found.information, found.pose[2]))[0] + 1e-9) ** -0.5
 
 
 def _scale(

@@ -23,7 +23,7 @@ def test_the_matrix_and_its_keys_are_drawn(rough: Taught) -> None:
     expected = 1e3 * np.sqrt(rough.landmarks.similarity["t"])
     assert np.asarray(image.get_array()) == pytest.approx(expected)
     keys = rough.landmarks.at_m[rough.landmarks.key]
-    drawn = sorted({float(line.get_xdata()[0]) for line in figure.axes[0].lines})
+    drawn = sorted({float(np.asarray(line.get_xdata())[0]) for line in figure.axes[0].lines})
     assert drawn == pytest.approx(sorted(keys))
     assert charts.svg_uri(figure).startswith("data:image/svg+xml")
 

@@ -39,11 +39,11 @@ _SHIFTS = np.column_stack([np.arange(-8.0, 9.0), np.zeros(17), np.zeros(17)])
 HEADING = """\
 # Landmarks
 
-Written by `python -m tools.evaluate.landmarks`; not edited by hand. {count} tunnels of {length_m:.0f} m of each class, straight and
-plain or with bends (15–25 m of radius) and niches (1.5–3 m deep), taught by one drive with a scan each metre at true poses; two
-scanners 7.2 m apart, 190°, 0.5°, 12 mm. A second drive, 0.3 m beside the first, looks for each landmark that has a radius: what is
-within it from 0.3 m, 0.1 m and 0.6° away, what is elsewhere from 17 shifts along the axis. *Near*: within 0.10 m and 1°. *Fits*:
-fitness up to the threshold. *Wrong*: over 1 m away, and fits. *Gap*: over 15 m of wall.
+Written by `python -m tools.evaluate.landmarks`; not edited by hand. {count} tunnels of {length_m:.0f} m of each class, straight
+and plain or with bends (15–25 m of radius) and niches (1.5–3 m deep), taught by one drive with a scan each metre at true poses.
+Two scanners 7.2 m apart, 190°, 0.5°, 12 mm. A second drive, 0.3 m beside the first, looks for each landmark that has a radius:
+what is within it from 0.3 m, 0.1 m and 0.6° away, what is elsewhere from 17 shifts along the axis. *Near*: within 0.10 m and 1°.
+*Fits*: fitness up to the threshold. *Wrong*: over 1 m away, and fits. *Gap*: over 15 m of wall.
 
 """
 _COLUMNS = (
