@@ -8,15 +8,15 @@ from collections.abc import Set as AbstractSet
 import numpy as np
 
 from lhdmap.errors import InputError
-from lhdmap.landmarks.distinct import gaps
+from lhdmap.landmarks.distinct import gaps, reduced_chi2
 from lhdmap.landmarks.keys import Keys, choose_keys
 from lhdmap.landmarks.model import Landmarks, NodeSurface
-from lhdmap.landmarks.profile import profile_of
+from lhdmap.landmarks.profile import Profile, profile_of
 from lhdmap.landmarks.quality import quality_of
 from lhdmap.landmarks.scans import Cloud, NodeScan, along_tunnel, checked, in_node, of_intersection, ordered
 from lhdmap.landmarks.settings import LandmarkSettings
 from lhdmap.landmarks.similarity import similarity
-from lhdmap.landmarks.surface import fused, placed
+from lhdmap.landmarks.surface import Cells, fused, placed
 from lhdmap.messages import Float32Array, FloatArray
 
 Progress = Callable[[str, float], None]
@@ -47,18 +47,28 @@ def landmarks_of(
     matrices: dict[str, Float32Array] = {}
     surfaces: dict[str, NodeSurface] = {}
     for number, (node, own) in enumerate(by_node.items()):
-        if progress is not None:
-            progress(node, number / len(by_node))
+        told = _share(progress, node, number, len(by_node))
+        told(0.0)
         T_map_node = np.asarray(frames[node], dtype=np.float64)
         surfaces[node] = node_surface(own, T_map_node, settings, tunnel=node in tunnels)
         if node in tunnels:
             clouds = along_tunnel(own, T_map_node, settings)
-            matrices[node] = similarity(clouds, settings)
+            matrices[node] = similarity(clouds, settings, done=told)
             parts.append((node, clouds, choose_keys(matrices[node], settings)))
         else:
             clouds = [cloud for cloud in (of_intersection(own, T_map_node, settings),) if len(cloud.points_m)]
             parts.append((node, clouds, _whole(len(clouds))))
     return _joined(parts, matrices, surfaces)
+
+
+def _share(progress: Progress | None, node: str, number: int, count: int) -> Callable[[float], None]:
+    """Return what takes the share of one node that is done, and tells the share of all."""
+
+    def told(share: float) -> None:
+        if progress is not None:
+            progress(node, (number + share) / count)
+
+    return told
 
 
 def node_surface(
@@ -69,10 +79,18 @@ def node_surface(
     quality = quality_of(cells, scans, T_map_node, settings)
     if not tunnel:
         return NodeSurface(cells, quality, None)
+    profile = _profile(cells, scans, T_map_node, settings)
+    parts = [scans[k::2] for k in (0, 1)]
+    halves = [fused([placed(scan, T_map_node, settings) for scan in part], settings.cell_m) for part in parts]
+    one, other = (_profile(half, part, T_map_node, settings) for half, part in zip(halves, parts, strict=True))
+    quality = quality._replace(chi2=reduced_chi2(one, other, settings))
+    return NodeSurface(cells, quality, profile._replace(gap=gaps(profile, settings)))
+
+
+def _profile(cells: Cells, scans: Sequence[NodeScan], T_map_node: FloatArray, settings: LandmarkSettings) -> Profile:
     at_m, way = _way(scans, T_map_node)
     points, counts = cells.points_m.astype(np.float64), cells.counts.astype(np.float64)
-    profile = profile_of(points, counts, way, at_m, settings)
-    return NodeSurface(cells, quality, profile._replace(gap=gaps(profile, settings)))
+    return profile_of(points, counts, way, at_m, settings)
 
 
 def _by_node(scans: Sequence[NodeScan], frames: Mapping[str, FloatArray]) -> dict[str, list[NodeScan]]:
@@ -83,6 +101,8 @@ def _by_node(scans: Sequence[NodeScan], frames: Mapping[str, FloatArray]) -> dic
             raise InputError(
                 f"landmarks: a scan is in '{scan.node}', which has no frame: {', '.join(frames) or 'none'}"
             )
+        if np.shape(frames[scan.node]) != (4,) or not np.isfinite(frames[scan.node]).all():
+            raise InputError(f"landmarks: the frame of '{scan.node}' is {frames[scan.node]}; x, y, z, yaw were wanted")
         found.setdefault(scan.node, []).append(checked(scan))
     return {node: ordered(found[node]) for node in frames if node in found}
 

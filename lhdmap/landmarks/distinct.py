@@ -45,6 +45,19 @@ def gaps(profile: Profile, settings: LandmarkSettings) -> Float32Array:
     return best.astype(np.float32)
 
 
+def reduced_chi2(one: Profile, other: Profile, settings: LandmarkSettings) -> float:
+    """Return the mean of the truncated squared differences of two profiles of one tunnel over their variance; NaN without any."""
+    if min(len(one.at_m), len(other.at_m)) < 2:
+        return float("nan")
+    (a, a_var), (b, b_var) = (_channels(profile, settings.profile_m) for profile in (one, other))
+    inside = (one.at_m >= other.at_m.min()) & (one.at_m <= other.at_m.max())
+    b, b_var = (
+        np.column_stack([np.interp(one.at_m, other.at_m, column) for column in columns.T[:2]]) for columns in (b, b_var)
+    )
+    x = np.minimum((a[:, :2] - b) ** 2 / (a_var[:, :2] + b_var), _TRUNCATED)[inside]
+    return float(x[np.isfinite(x)].mean()) if np.isfinite(x).any() else float("nan")
+
+
 def not_distinctive(at_m: Float32Array, gap: Float32Array, least: float) -> Stretches:
     """Return the stretches [from, to] (m) whose gap (P,) is under `least`; what is shorter than half a metre is left out."""
     low = gap < least

@@ -37,7 +37,7 @@ class Quality(NamedTuple):
     """Of a node, NaN where not measured.
 
     `support`, `support_least`: shares; `along_m`: standard deviation along the machine that a match states, median; `scale`: 0 is
-    right, with its standard deviation.
+    right, with its standard deviation. `chi2`: reduced, of the profile of one half of a tunnel's scans against that of the other.
     """
 
     support: float
@@ -47,6 +47,7 @@ class Quality(NamedTuple):
     kappa: float
     scale: float
     scale_std: float
+    chi2: float = math.nan
 
 
 UNMEASURED = Quality(math.nan, math.nan, math.nan, math.nan, 10.0, math.nan, math.nan)

@@ -41,7 +41,7 @@ def similarity(
     settings: LandmarkSettings,
     *,
     threads: int | None = None,
-    done: Callable[[int], None] | None = None,
+    done: Callable[[float], None] | None = None,
 ) -> Float32Array:
     """Return F (n, n) of a tunnel's landmarks in their order: source i on target j, m².
 
@@ -51,7 +51,7 @@ def similarity(
         clouds: of one tunnel, each with points.
         settings: `LandmarkSettings`.
         threads: how many columns at a time; None: one a core.
-        done: is told how many columns are done.
+        done: is told the share (0 to 1) that is done.
     """
     n = len(clouds)
     F = np.full((n, n), np.nan, dtype=np.float32)
@@ -71,7 +71,7 @@ def similarity(
     with ThreadPoolExecutor(threads or os.cpu_count() or 1) as pool:
         for count, _ in enumerate(pool.map(column, range(n)), start=1):
             if done is not None:
-                done(count)
+                done(count / n)
     return F
 
 

@@ -5,7 +5,7 @@
 | `points`, `offsets`, `poses_node`, `node`, `at_m`, `threshold`, `delta`, `radius`, `key` | as in `Landmarks` |
 | `similarity_<node>` | of each tunnel |
 | `surface_node` (n,), `surface_offsets` (n + 1,), `surface_points`, `surface_counts`, `surface_cell_m` | fused walls by node |
-| `surface_quality` (n, 7) | `Quality`, in the order of its fields |
+| `surface_quality` (n, 8) | `Quality`, in the order of its fields |
 | `profile_node` (t,), `profile_offsets` (t + 1,), `profile_<field>` | `Profile` of each tunnel, one after the other |
 """
 

@@ -94,6 +94,22 @@ def test_what_is_unusable_is_told(wrong: NodeScan, told: str) -> None:
         landmarks_of([wrong], {"t": FRAME}, {"t"}, SETTINGS)
 
 
+@pytest.mark.parametrize("frame", [np.zeros(3), np.array([0.0, 0.0, 0.0, np.nan])])
+def test_a_frame_that_is_none_is_told(frame: FloatArray) -> None:
+    with pytest.raises(InputError, match="frame of 't'"):
+        landmarks_of([scan(0.0)], {"t": frame}, {"t"}, SETTINGS)
+
+
+def test_progress_rises_to_the_end() -> None:
+    told: list[tuple[str, float]] = []
+    scans = [scan(float(k), node=node) for node in ("t", "u") for k in range(5)]
+    landmarks_of(scans, {"t": FRAME, "u": FRAME}, {"t", "u"}, SETTINGS, lambda node, share: told.append((node, share)))
+    shares = [share for _, share in told]
+    assert shares == sorted(shares)
+    assert shares[-1] == pytest.approx(1.0)
+    assert {node for node, _ in told} == {"t", "u"}
+
+
 def test_nothing_in_gives_nothing_out() -> None:
     empty = landmarks_of([], {"t": FRAME}, {"t"}, SETTINGS)
     assert len(empty) == 0

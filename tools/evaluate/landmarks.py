@@ -167,7 +167,7 @@ def main(words: list[str] | None = None) -> int:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--quick", action="store_true", help="one tunnel of 80 m a class; nothing is written")
     quick = parser.parse_args(words).quick
-    seeds, length_m, settings = (range(1), 80.0, LandmarkSettings()) if quick else (range(3), 200.0, LandmarkSettings())
+    seeds, length_m, settings = (range(1), 80.0, LandmarkSettings()) if quick else (range(2), 120.0, LandmarkSettings())
     parts = [HEADING.format(count=len(seeds), length_m=length_m)]
     for title, chosen in (
         ("Defaults: point to line, at least 60 % in common", settings),
