@@ -64,6 +64,8 @@ def profile_of(
         at_m: (K,) place of these along the node's line, rising.
         settings: step of the profile, length over which its mid line is smoothed.
     """
+    if len(way_m) < 2:
+        return _empty()
     line, at = _resampled(way_m, at_m, settings.profile_m)
     if len(line) < 3:
         return _empty()
