@@ -19,7 +19,7 @@ import numpy as np
 from lhdmap.geometry import se2
 from lhdmap.landmarks.scans import NodeScan, in_node, near
 from lhdmap.landmarks.settings import LandmarkSettings
-from lhdmap.landmarks.surface import Cells, fused, placed, surface_map
+from lhdmap.landmarks.surface import Cells, fused, most_reach_m, placed, surface_map
 from lhdmap.messages import FloatArray
 from lhdmap.scan_matching.information import body_information, marginal_information
 from lhdmap.scan_matching.matching import Hits, Match, Prior, match
@@ -83,7 +83,8 @@ class _Walls:
     """The walls of a node, as maps of its parts: one at a time, as scans in order ask for them."""
 
     def __init__(self, cells: Cells, settings: LandmarkSettings) -> None:
-        self._cells, self._reach_m = cells, 0.5 * _PART_M + settings.surface_range_m + 2.0
+        self._cells = cells
+        self._reach_m = min(0.5 * _PART_M + settings.surface_range_m + 2.0, most_reach_m(cells.cell_m))
         self._part: tuple[int, int] | None = None
         self._map = empty_map(cells.cell_m, 8)
 

@@ -87,7 +87,7 @@ class LandmarkSettings:
         5, unit="landmarks", doc="... and are farther than this from each other.", minimum=0, source=_PAPER
     )
     cell_m: float = setting(
-        0.05, unit="m", doc="Cells of the fused walls, in which hits are averaged.", minimum=0.01, maximum=0.5
+        0.05, unit="m", doc="Cells of the fused walls, in which hits are averaged.", minimum=0.02, maximum=0.5
     )
     surface_range_m: float = setting(
         15.0,

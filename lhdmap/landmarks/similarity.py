@@ -5,7 +5,7 @@ so what landmark j can be mistaken for stands in column j. Neighbours start at t
 a match elsewhere is none. All others start from shifts along the axis, and the best counts. Nothing is pruned: the most similar
 landmark that is no neighbour is an extreme among equals, which no cheaper measure finds.
 
-Each column needs one prepared target, so memory beside the matrix is one grid (about 1 MB) a thread; the time grows with the
+Each column needs one prepared target, so memory beside the matrix is one grid (about 1.5 MB) a thread; the time grows with the
 number of landmarks times those within `window_m`.
 """
 

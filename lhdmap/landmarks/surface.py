@@ -18,7 +18,7 @@ from lhdmap.landmarks.settings import LandmarkSettings
 from lhdmap.messages import Float32Array, FloatArray
 from lhdmap.scan_matching.surface_map import SurfaceMap, empty_map, insert_all
 
-_LEAST_CELLS, _MOST_CELLS = 256, 4096
+_LEAST_CELLS, _MOST_CELLS, _MARGIN_CELLS = 256, 4096, 32
 _WEIGHED_HITS = 16  # more hits than this make a cell no surer
 _MOST_COUNT = np.iinfo(np.uint16).max
 
@@ -54,6 +54,11 @@ def placed(scan: NodeScan, T_map_node: FloatArray, settings: LandmarkSettings) -
     return points
 
 
+def most_reach_m(cell_m: float) -> float:
+    """Return how far to each side a map with such cells can reach at most, m."""
+    return 0.5 * (_MOST_CELLS - _MARGIN_CELLS) * cell_m
+
+
 def surface_map(cells: Cells, about_m: FloatArray | None = None, reach_m: float = 60.0) -> SurfaceMap:
     """Return the walls as a `SurfaceMap` in the node's frame, all at height 0: match with `Hits(…, layered=False)`.
 
@@ -69,11 +74,11 @@ def surface_map(cells: Cells, about_m: FloatArray | None = None, reach_m: float 
     if about_m is not None:
         inside = (np.abs(points - about_m) <= reach_m).all(axis=1)
         points, counts = points[inside], counts[inside]
-    wide = float(np.ptp(points, axis=0).max()) / cells.cell_m + 32 if len(points) else 0.0
+    wide = float(np.ptp(points, axis=0).max()) / cells.cell_m + _MARGIN_CELLS - 1 if len(points) else 0.0
     if wide > _MOST_CELLS:
         raise InputError(
             f"the walls of the node are {wide * cells.cell_m:.0f} m wide, a map holds {_MOST_CELLS * cells.cell_m:.0f} m: "
-            "say about_m, around which they are wanted"
+            "say about_m, around which they are wanted, and how far (reach_m)"
         )
     size = max(_LEAST_CELLS, 1 << int(np.ceil(np.log2(max(wide, 1.0)))))
     walls = empty_map(cells.cell_m, size)

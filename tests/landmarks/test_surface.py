@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 
 import numpy as np
@@ -96,6 +97,13 @@ def test_a_long_node_is_had_in_parts() -> None:
 def test_the_walls_of_a_node_that_is_not_there_are_told(rough: Taught) -> None:
     with pytest.raises(InputError, match="no walls of 'u'"):
         rough.landmarks.surface_map("u")
+
+
+def test_fine_cells_and_far_hits_are_possible(rough: Taught) -> None:
+    extreme = dataclasses.replace(SETTINGS, cell_m=0.02, surface_range_m=40.0)
+    scans = [scan._replace(points_m=np.vstack([scan.points_m, [[39.0, 30.0]]])) for scan in rough.scans[::4]]
+    surface = node_surface(scans, rough.world.frame(), extreme, tunnel=True)
+    assert surface.quality.support > 0.5
 
 
 @pytest.mark.parametrize("scale", [0.995, 1.0, 1.005])
