@@ -58,7 +58,7 @@ def _margins(axes: Axes, landmarks: Landmarks, tunnel: str) -> None:
     at_m, threshold = landmarks.at_m[judged], landmarks.threshold[judged]
     keys = landmarks.key[judged]
     other = 1e3 * np.sqrt(threshold + landmarks.delta[judged])
-    axes.plot(at_m, other, ".", color=charts.ODOMETRY, label="most similar other")
+    axes.plot(at_m, other, ".", color=charts.ODOMETRY, label="next other")
     axes.plot(at_m, 1e3 * np.sqrt(threshold), ".", color=charts.FINAL, label="threshold")
     axes.plot(at_m[keys], 1e3 * np.sqrt(threshold[keys]), "^", color=charts.WHEELS, label="of a key")
     axes.set(xlabel="along the tunnel, m", ylabel="rms, mm", ylim=(0.0, None))
@@ -82,8 +82,12 @@ def distinctness_chart(landmarks: Landmarks, tunnel: str, settings: LandmarkSett
     lower.plot(at, np.clip(gap, -0.5 * settings.distinct_gap, top), color=charts.FINAL, label="gap, nats")
     lower.axhline(settings.distinct_gap, color=charts.ODOMETRY, linewidth=1.0, linestyle="--", label="least gap")
     _stretches(upper, lower, landmarks.not_distinctive_m(tunnel, settings))
+    lower.set(
+        xlabel="along the tunnel, m",
+        ylabel=f"gap over {settings.distinct_m:g} m, nats",
+        ylim=(-0.55 * settings.distinct_gap, 1.02 * top),
+    )
     _keys(lower, landmarks, tunnel)
-    lower.set(xlabel="along the tunnel, m", ylabel=f"gap over {settings.distinct_m:g} m, nats", ylim=(None, 1.02 * top))
     charts.legend_above(upper)
     charts.legend_above(lower)
     figure.subplots_adjust(hspace=0.32)
