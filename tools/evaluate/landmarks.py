@@ -10,7 +10,7 @@ import math
 import os
 import sys
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
@@ -20,7 +20,7 @@ os.environ.setdefault("OMP_NUM_THREADS", "1")
 import numpy as np
 import numpy.typing as npt
 from lhdmap.geometry import se2
-from lhdmap.landmarks.build import landmarks_of
+from lhdmap.landmarks.build import landmarks_of, node_surface
 from lhdmap.landmarks.icp import align, best_of
 from lhdmap.landmarks.model import Landmarks
 from lhdmap.landmarks.scans import Cloud, along_tunnel
@@ -29,12 +29,13 @@ from lhdmap.landmarks.similarity import icp_model
 from lhdmap.landmarks.store import write_landmarks
 from lhdmap.landmarks.target import prepare
 from lhdmap.messages import FloatArray
-from tests.landmarks.worlds import MODERATE, ROUGH, SMOOTH, drive, tunnel
+from tests.landmarks.worlds import MODERATE, ROUGH, SMOOTH, TunnelWorld, drive, tunnel
 
 RESULT = Path(__file__).resolve().parents[2] / "evaluation" / "landmarks.md"
 CLASSES = {"rough, 12 cm": ROUGH, "moderate, 3 cm": MODERATE, "smooth, 5 mm": SMOOTH}
 _OFF = np.array([0.3, 0.1, 0.01])
 _WRONG_M, _NEAR_M, _NEAR_DEG = 1.0, 0.10, 1.0
+_STARTS_M, _SCALES = (0.0, 0.3, 0.5, 1.0, 2.0), (0.0, 0.001, 0.005, 0.01, -0.005)
 _SHIFTS = np.column_stack([np.arange(-8.0, 9.0), np.zeros(17), np.zeros(17)])
 HEADING = """\
 # Landmarks
@@ -162,6 +163,61 @@ def table(settings: LandmarkSettings, seeds: range, length_m: float) -> Iterator
             yield row(f"{name}, {'bends and niches' if bent else 'plain'}", tunnels, length_m, settings)
 
 
+def capture(seeds: range, length_m: float) -> Iterator[str]:
+    """Yield the lines of how far off ICP may start: clouds of the second drive on the same and the next landmark."""
+    yield f"| walls | distance | {' | '.join(f'{off:g} m' for off in _STARTS_M)} |"
+    yield "|" + " --- |" * (2 + len(_STARTS_M))
+    for name, rms_m in CLASSES.items():
+        for bent in (False, True):
+            worlds = [tunnel(seed, rms_m, length_m, bends=bent, niches=bent) for seed in seeds]
+            for fitness in ("line", "point"):
+                settings = LandmarkSettings(fitness=fitness)
+                errors = np.concatenate([_captured(world, settings) for world in worlds])
+                shares = [
+                    " / ".join(f"{np.mean(errors[errors[:, 0] == away, 1 + k] <= _NEAR_M):.2f}" for away in (0, 1))
+                    for k in range(len(_STARTS_M))
+                ]
+                yield f"| {name}, {'bends and niches' if bent else 'plain'} | {fitness} | {' | '.join(shares)} |"
+
+
+def _captured(world: TunnelWorld, settings: LandmarkSettings) -> FloatArray:
+    """Return for each pair how many landmarks it is apart, and its errors along the axis by start, m."""
+    model = icp_model(settings)
+    own, other = (
+        along_tunnel(drive(world, seed=seed, offset_m=offset_m), world.frame(), settings)
+        for seed, offset_m in ((1, 0.0), (77, 0.3))
+    )
+    found = []
+    for j, cloud in enumerate(own):
+        target = prepare(cloud.points_m, model)
+        for i in range(max(j - 1, 0), min(j + 2, len(other))):
+            true = se2.between(cloud.T_node_base, other[i].T_node_base)
+            poses = [
+                align(target, other[i].points_m, true + np.array([off, 0.1, 0.01]), model).pose for off in _STARTS_M
+            ]
+            found.append([abs(i - j), *(abs(pose[0] - true[0]) for pose in poses)])
+    return np.array(found)
+
+
+def scales(length_m: float) -> Iterator[str]:
+    """Yield the lines of what `Quality` says of maps that are stretched."""
+    yield f"| walls | {' | '.join(f'{100 * scale:g} %' for scale in _SCALES)} |"
+    yield "|" + " --- |" * (1 + len(_SCALES))
+    for name, rms_m in CLASSES.items():
+        world, cells = tunnel(3, rms_m, length_m), []
+        for scale in _SCALES:
+            scans = drive(world, seed=1, scale=1.0 + scale)
+            quality = node_surface(scans, world.frame(), LandmarkSettings(), tunnel=True).quality
+            cells.append(f"{100 * quality.scale:.2f} ± {100 * quality.scale_std:.2f} %, {quality.kappa:.1f}")
+        yield f"| {name} | {' | '.join(cells)} |"
+
+
+def _printed(lines: Iterable[str]) -> Iterator[str]:
+    for line in lines:
+        print(line, flush=True)
+        yield line
+
+
 def main(words: list[str] | None = None) -> int:
     """Measure and write the tables."""
     parser = argparse.ArgumentParser(description=__doc__)
@@ -174,11 +230,15 @@ def main(words: list[str] | None = None) -> int:
         ("At least 35 % in common", replace(settings, min_share=0.35)),
         ('Point to point, as in the paper (`landmarks.fitness = "point"`)', replace(settings, fitness="point")),
     ):
-        lines = []
-        for text in table(chosen, seeds, length_m):
-            print(text, flush=True)
-            lines.append(text)
-        parts += [f"## {title}\n", *lines, ""]
+        parts += [f"## {title}\n", *_printed(table(chosen, seeds, length_m)), ""]
+    for title, lines in (
+        (
+            "How far off ICP may start along the axis: share within 0.10 m along it, same / next landmark",
+            capture(seeds, length_m),
+        ),
+        ("Scale of maps that are stretched (columns), and kappa", scales(80.0)),
+    ):
+        parts += [f"## {title}\n", *_printed(lines), ""]
     if not quick:
         RESULT.write_text("\n".join(parts), encoding="utf-8")
     return 0
