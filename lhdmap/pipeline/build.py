@@ -15,6 +15,7 @@ from typing import Any, Literal, TypeVar
 from lhdmap.config import Settings, settings_table
 from lhdmap.errors import InputError, LhdmapWarning
 from lhdmap.integration.cloud_io import write_cloud
+from lhdmap.landmarks.store import write_landmarks
 from lhdmap.logs.source import LogSource
 from lhdmap.machine import Machine
 from lhdmap.mapfolder import Diagnostics, MapFolderWriter
@@ -176,6 +177,9 @@ def _write(
         times_s = connection_times(outcome.topology.map, request.settings.movement)
         folder.write_json("topology.geojson", to_geojson(outcome.topology.map, times_s))
         folder.finished(write_sheets(folder.path / "free_space.npz", outcome.topology.sheets))
+        if outcome.landmarks is not None:
+            write_landmarks(folder.path / "landmarks.npz", outcome.landmarks)
+            folder.finished(folder.path / "landmarks.npz")
         folder.finished(write_views(folder.path / "views.npz", list(outcome.pipeline.views)))
     try:
         spent = inspector.ask(Inspection.spent)

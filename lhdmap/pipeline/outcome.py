@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 from collections.abc import Mapping, Sequence
+from concurrent.futures import Executor, Future, ThreadPoolExecutor
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -14,6 +15,7 @@ import numpy.typing as npt
 from lhdmap.config import Settings, settings_toml
 from lhdmap.errors import InputError
 from lhdmap.integration.cloud import Cloud
+from lhdmap.landmarks.model import Landmarks
 from lhdmap.logs.source import LogSource
 from lhdmap.logs.survey import Survey
 from lhdmap.machine import Machine
@@ -23,6 +25,7 @@ from lhdmap.pile.result import PileReport
 from lhdmap.pipeline.beside import HelperDied
 from lhdmap.pipeline.given import GROUND_TRUTH
 from lhdmap.pipeline.identify import identify_along
+from lhdmap.pipeline.landmarks import landmarks_for, with_stretches
 from lhdmap.pipeline.mapping import MappingPipeline
 from lhdmap.pipeline.pile import NO_FRONT, NO_INCLINOMETER, OFF, PileSink
 from lhdmap.pipeline.refusal import key_scans_remark
@@ -39,6 +42,7 @@ from lhdmap.smoothing.smoother import Correction, corrected
 from lhdmap.smoothing.trust import expected_error
 from lhdmap.topology.build import Topology, topology_of
 from lhdmap.topology.edits import NO_EDITS, TopologyEdits
+from lhdmap.topology.points import with_piles
 from lhdmap.trajectory import Trajectory
 
 ROLES_READ = read_by(BUILD_MAP)
@@ -126,8 +130,10 @@ class Outcome:
         rows = ways.rows
         if ways.moved:
             pipeline.sweeps.forget()  # two clouds at a time would take twice the memory
-        sweeps = integrate_again(inputs, pipeline, rows, source.survey) if ways.moved else pipeline.sweeps
-        self.cloud: Cloud = sweeps.cloud()
+        with ThreadPoolExecutor(1, "landmarks") as beside:  # they are compared while the scans are read once more
+            found = self._topology(beside)
+            sweeps = integrate_again(inputs, pipeline, rows, source.survey) if ways.moved else pipeline.sweeps
+            self.cloud: Cloud = sweeps.cloud()
         of_sweeps = sweeps.warnings
         sweeps.forget()
         distance_m = float(np.linalg.norm(np.diff(rows.poses[:, :3], axis=0), axis=1).sum())
@@ -135,7 +141,7 @@ class Outcome:
             raise InputError(f"{source.paths[0]}: its scans hold no hit; lhdmap doctor tells what is wrong")
         self.pile_reason = self._no_pile()
         self.pile = None if self.pile_reason else self._pile(pipeline.pile)
-        self.topology = self._topology()
+        self.topology, self.landmarks = self._with_landmarks(*found)
         told = [*source.warnings, *source.damage, *_of_the_run(pipeline, inputs), *of_sweeps]
         told += _holes(rows) if inputs.poses else _remarks(pipeline)
         self.warnings = said_once([*told, *_of_the_pile(self.pile)])
@@ -179,13 +185,25 @@ class Outcome:
                 return self.pipeline.path.moved(stage.report())
         return identify_along(self.ways.rows, inputs.logs, inputs.settings, self.pipeline.machine, inputs.topics)
 
-    def _topology(self) -> Topology | None:
-        """Return the topological map of the drive, None where it is not wanted or no planar scanner saw the drift."""
-        settings = self._inputs.settings.topology
-        if settings.method == "off" or not len(self.pipeline.views):
-            return None
-        seen = seen_of(self.pipeline, self.ways.rows, [] if self.pile is None else self.pile.middles_m())
-        return topology_of(seen, settings, self._inputs.edits)
+    def _topology(self, beside: Executor) -> tuple[Topology | None, Future[Landmarks] | None]:
+        """Return the topological map, None where it is not wanted or no planar scanner saw the drift, and landmarks to come."""
+        settings = self._inputs.settings
+        if settings.topology.method == "off" or not len(self.pipeline.views):
+            return None, None
+        seen = seen_of(self.pipeline, self.ways.rows)
+        topology = topology_of(seen, settings.topology, self._inputs.edits)
+        return topology, beside.submit(landmarks_for, topology.map, seen, settings.landmarks)
+
+    def _with_landmarks(
+        self, topology: Topology | None, coming: Future[Landmarks] | None
+    ) -> tuple[Topology | None, Landmarks | None]:
+        """Return the map with what landmarks and piles tell of it, and the landmarks."""
+        if topology is None or coming is None:
+            return None, None
+        landmarks = coming.result()
+        whole = with_stretches(topology.map, landmarks, self._inputs.settings.landmarks)
+        piles = [] if self.pile is None else self.pile.middles_m()
+        return topology._replace(map=with_piles(whole, piles)), landmarks
 
     def report(self) -> ReportData:
         """Return the data of the HTML page and of the recording."""

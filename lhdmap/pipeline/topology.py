@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from lhdmap.messages import FloatArray
 from lhdmap.pipeline.mapping import MappingPipeline
 from lhdmap.pipeline.track import Rows, resample
 from lhdmap.topology.build import Seen, Topology
@@ -17,7 +16,7 @@ _STEP_M = 0.25
 _PLANAR_AND_HEIGHT = [0, 1, 2, 5]  # of a pose: x, y, z, heading
 
 
-def seen_of(pipeline: MappingPipeline, rows: Rows, piles_m: Sequence[FloatArray]) -> Seen:
+def seen_of(pipeline: MappingPipeline, rows: Rows) -> Seen:
     """Return what a run saw along its final path `rows`; views beyond its ends are left out (given poses may be fewer)."""
     views = [view for view in pipeline.views if rows.times_ns[0] <= view.time_ns <= rows.times_ns[-1]]
     times = np.array([view.time_ns for view in views], dtype=np.int64)
@@ -30,7 +29,6 @@ def seen_of(pipeline: MappingPipeline, rows: Rows, piles_m: Sequence[FloatArray]
         path_ns,
         _said_at(pipeline.said, path_ns),
         pipeline.machine,
-        piles_m,
     )
 
 

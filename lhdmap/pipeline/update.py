@@ -20,11 +20,13 @@ from lhdmap.config import Settings, settings_table
 from lhdmap.errors import InputError, LhdmapWarning, UsageError
 from lhdmap.integration.cloud import Cloud
 from lhdmap.integration.cloud_io import read_cloud, write_cloud
+from lhdmap.landmarks.store import write_landmarks
 from lhdmap.machine import Machine
 from lhdmap.mapfolder import Diagnostics, MapFolder, MapFolderWriter
 from lhdmap.messages import FloatArray
 from lhdmap.outputs import free_folder
 from lhdmap.pipeline.build import BuildRequest, Progress, build_map
+from lhdmap.pipeline.landmarks import landmarks_for, with_stretches
 from lhdmap.pipeline.topology import each_step
 from lhdmap.pipeline.track import Rows
 from lhdmap.provenance import file_entry
@@ -152,11 +154,8 @@ def _in_the_map(known: _Map, drive: _Map, request: UpdateRequest) -> Correction:
     if found is None:
         raise InputError(f"{log}: its scans do not fit the walls of {request.map}; build it apart")
     if found.tied < 0.2 * found.keys:
-        warnings.warn(
-            f"{log}: only {found.tied} of {found.keys} places of the drive are held by the map's walls",
-            LhdmapWarning,
-            stacklevel=2,
-        )
+        text = f"{log}: only {found.tied} of {found.keys} places of the drive are held by the map's walls"
+        warnings.warn(text, LhdmapWarning, stacklevel=2)
     return found.correction
 
 
@@ -173,14 +172,21 @@ def _written(
     final = _both(known.trajectory, moved)
     views, seen = _seen(known, drive, moved, request)
     topology = topology_of(seen, request.settings.topology, load_edits(request.edits))
+    landmarks = landmarks_for(topology.map, seen, request.settings.landmarks)
     version = known.topology.version + 1
-    newer = replace(topology.map, version=version, registration=known.topology.registration)
+    newer = with_stretches(topology.map, landmarks, request.settings.landmarks)
+    newer = replace(newer, version=version, registration=known.topology.registration)
     table, walls = difference(known.topology, newer, (known.sheets, topology.sheets))
     went = np.concatenate([np.zeros((0, 2)), *(one.went_m for one in walls)])
     cloud = merge.joined_clouds(known.cloud, merge.moved_cloud(drive.cloud, correction), went, seen.path)
     _write_files(folder, known, drive, final, views, (newer, topology), cloud, table)
+    write_landmarks(folder.path / "landmarks.npz", landmarks)
+    folder.finished(folder.path / "landmarks.npz")
     distance_m = float(np.linalg.norm(np.diff(final.positions_m, axis=0), axis=1).sum())
+    earlier, added = known.folder.info.get("counts", {}), drive.folder.info.get("counts", {})
     counts = {
+        **earlier,
+        **{key: earlier.get(key, 0) + added.get(key, 0) for key in ("scans_processed", "duration_s", "lost_stretches")},
         "map_version": version,
         "scans": len(final.stamps_ns),
         "distance_m": distance_m,
@@ -210,7 +216,7 @@ def _seen(known: _Map, drive: _Map, moved: Trajectory, request: UpdateRequest) -
     weights = np.concatenate([np.ones(len(known.views)), np.full(len(drive.views), _NEWER_WEIGHT)]).astype(np.int64)
     path = np.vstack([paths[0][0], paths[1][0]])
     times = np.concatenate([paths[0][1], paths[1][1]])
-    return views, Seen(views, poses, path, times, said, request.machine, [], weights)
+    return views, Seen(views, poses, path, times, said, request.machine, weights)
 
 
 def _path(trajectory: Trajectory) -> tuple[FloatArray, npt.NDArray[np.int64]]:
@@ -262,7 +268,7 @@ def _write_pictures(
     path = folder.path / "difference.svg"
     path.write_text(difference_svg(newer, topology.sheets, walls), encoding="utf-8")
     folder.finished(path)
-    summary = Summary(counts["scans"], counts["scans"], 0.0, counts["distance_m"])
+    summary = Summary(counts["scans"], counts["scans_processed"], counts["duration_s"], counts["distance_m"])
     report = ReportData(
         request.target.name, summary, [], final, cloud=cloud, pile_reason="see pile.json", warnings=remarks
     )

@@ -38,8 +38,7 @@ _NARROW_M = 3.2  # tunnels of robots: finer cells
 class Seen(NamedTuple):
     """What a drive saw: views with their poses (N, 4: x, y, z, heading), its path (M, 4) each quarter metre with times (M,).
 
-    `said` (M): what the operator called each pose of the path, empty where nothing; `piles_m`: middles (3,) of piles found;
-    `weights` (N): how often each view counts.
+    `said` (M): what the operator called each pose of the path, empty where nothing; `weights` (N): how often each view counts.
     """
 
     views: Sequence[View]
@@ -48,7 +47,6 @@ class Seen(NamedTuple):
     path_ns: npt.NDArray[np.int64]
     said: Sequence[str]
     machine: Machine | None = None
-    piles_m: Sequence[FloatArray] = ()
     weights: npt.NDArray[np.int64] | None = None
 
 
@@ -142,7 +140,7 @@ def _assembled(
         for number, (node, name) in enumerate(zip(raw.nodes, names.nodes, strict=True), 1)
     ]
     topology = TopologicalMap(tuple(tunnels), tuple(intersections), tuple(_access_points(raw, of_junction)))
-    waypoints = waypoints_of(topology, names, where, seen.path, seen.path_ns, seen.piles_m, settings)
+    waypoints = waypoints_of(topology, names, where, seen.path, seen.path_ns, settings)
     topology = replace(topology, waypoints=(*waypoints, *waypoints_added(topology, edits)))
     walls: list[Walls | None] = [Walls(graph) for graph in graphs]
     of_node = {

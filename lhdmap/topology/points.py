@@ -41,7 +41,6 @@ def waypoints_of(
     where: npt.NDArray[np.int64],
     path: FloatArray,
     path_ns: npt.NDArray[np.int64],
-    piles_m: Sequence[FloatArray],
     settings: TopologySettings,
 ) -> list[Waypoint]:
     """Return a waypoint for each driven dead end, where the machine came farthest, and for each place that was named."""
@@ -52,11 +51,11 @@ def waypoints_of(
         ended = _dead_end(tunnel, places, path, rows)
         if ended is not None:
             at_m, name = ended
-            found.append(_waypoint(len(found) + 1, name, tunnel, at_m, piles_m, settings))
+            found.append(_waypoint(len(found) + 1, name, tunnel, at_m, settings))
             places = [place for place in places if place.name != name]
         for place in places:
             at_m = _stood_at(tunnel, place, path, path_ns)
-            found.append(_waypoint(len(found) + 1, place.name, tunnel, at_m, piles_m, settings))
+            found.append(_waypoint(len(found) + 1, place.name, tunnel, at_m, settings))
     return found
 
 
@@ -101,12 +100,19 @@ def pose_at(tunnel: Tunnel, at_m: float) -> FloatArray:
     return np.array([*place, math.atan2(ahead[1][1] - ahead[1][0], ahead[0][1] - ahead[0][0])])
 
 
-def _waypoint(
-    number: int, name: str, tunnel: Tunnel, at_m: float, piles_m: Sequence[FloatArray], settings: TopologySettings
-) -> Waypoint:
+def with_piles(topology: TopologicalMap, piles_m: Sequence[FloatArray]) -> TopologicalMap:
+    """Return the map with the waypoints before piles (middles, (3,)) as draw points, where no name says what they are."""
+
+    def judged(one: Waypoint) -> Waypoint:
+        before = one.purpose == "stop" and any(math.dist(pile[:2], one.pose[:2]) < _PILE_M for pile in piles_m)
+        return replace(one, purpose="draw_point") if before else one
+
+    return replace(topology, waypoints=tuple(map(judged, topology.waypoints)))
+
+
+def _waypoint(number: int, name: str, tunnel: Tunnel, at_m: float, settings: TopologySettings) -> Waypoint:
     pose = pose_at(tunnel, at_m)
-    piled = any(math.dist(pile[:2], pose[:2]) < _PILE_M for pile in piles_m)
-    purpose: Purpose = purpose_of(name) or ("draw_point" if piled else "stop")
+    purpose: Purpose = purpose_of(name) or "stop"
     return Waypoint(f"w{number}", name or f"W{number}", tunnel.id, pose, purpose, settings.speed_limit_kmh)
 
 

@@ -33,6 +33,7 @@ FILES = {
     "topology.geojson",
     "free_space.npz",
     "views.npz",
+    "landmarks.npz",
     "recording.rrd",
     "report.html",
 }
