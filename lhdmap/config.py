@@ -11,6 +11,7 @@ from typing import Any
 
 from lhdmap.errors import ConfigError
 from lhdmap.integration.integrator import IntegrationSettings
+from lhdmap.movement.settings import MovementSettings
 from lhdmap.odometry.cloud_settings import CloudOdometrySettings
 from lhdmap.odometry.settings import AnchorSettings, OdometrySettings, RangeFlowSettings, SearchSettings
 from lhdmap.odometry.trust_settings import TrustSettings
@@ -50,6 +51,7 @@ class Settings:
     pile: PileSettings = field(default_factory=PileSettings)
     figure9: Figure9Constants = field(default_factory=Figure9Constants)
     figure9_repaired: RepairedConstants = field(default_factory=RepairedConstants)
+    movement: MovementSettings = field(default_factory=MovementSettings)
     recording: RecordingSettings = field(default_factory=RecordingSettings)
     rockbreaker: RockbreakerSettings = field(default_factory=RockbreakerSettings)
 

@@ -17,8 +17,10 @@ import tempfile
 import time
 from pathlib import Path
 
+from lhdmap.topology.geojson import to_geojson
 from tests.cli.logs import write_room_log
 from tests.exports.folders import map_folder
+from tests.topology.maps import ladder
 
 EXIT_DONE, EXIT_INTERRUPTED = 0, 4
 BAD = ("Traceback", "fault in lhdmap", "Error:", "Exception ignored")
@@ -33,6 +35,7 @@ def commands(work: Path) -> dict[str, list[str]]:
     (work / "t.tum").write_text("".join(f"{i}.0 {i}.0 0 0 0 0 0 1\n" for i in range(90)), encoding="utf-8")
     (work / "t.csv").write_text("attempt,log,gt_width_m,gt_inclination_deg\nA,room.mcap,3,-30\nB,room.mcap,3,-30\n")
     (work / "s.toml").write_text('[[scenes]]\nvariant = "wall"\ncount = 2\n', encoding="utf-8")
+    (work / "t.geojson").write_text(json.dumps(to_geojson(ladder())), encoding="utf-8")
     return {
         "help": ["--help"],
         "config": ["config", "pile"],
@@ -50,6 +53,8 @@ def commands(work: Path) -> dict[str, list[str]]:
         "view": ["view", str(log), "--web", "--port", "9191"],
         "screenshot": ["view", str(log), "--screenshot", "{out}.png"],
         "export": ["export", str(map_folder(work / "map")), "--format", "dxf", "-o", "{out}.dxf"],
+        "route": ["route", str(work / "t.geojson"), "DP1", "T2"],
+        "check-map": ["check-map", str(work / "t.geojson")],
         "demo": ["demo", "-o", "{out}"],
     }
 

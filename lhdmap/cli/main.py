@@ -32,6 +32,8 @@ COMMANDS = {
     "simulate": "write a simulated log and its truth",
     "replay": "drive a simulated machine in closed loop: log, journal, verdict, report",
     "export": "a map in a format that other tools read",
+    "route": "movement sequence between two places of a map, with inversions and its cost",
+    "check-map": "is the map ready to run on, and if not, why",
     "eval": "compare results with ground truth",
     "config": "print the settings with unit and source",
     "completion": "print the tab completion for bash, zsh or fish",

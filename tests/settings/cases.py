@@ -45,6 +45,7 @@ _SECTIONS = {
     "pile": Case("pile"),
     "figure9": Case("pile", base=_FOUND),
     "figure9_repaired": Case("pile", base={"pile.method": "figure9_repaired"}),
+    "movement": Case("route"),
     "recording": Case("recording"),
     "rockbreaker": Case("plan"),
 }
@@ -144,6 +145,7 @@ _SETTINGS = {
     "pile.deadline_m": Case("pile", 20.0),
     "pile.sure": Case("pile", 0.9),
     "pile.likely": Case("pile", 0.99),
+    "movement.turn_s": Case("route", 5.0),
     "rockbreaker.clearance_m": Case("rock"),
     **_figure9("figure9", _FOUND),
     **_figure9("figure9_repaired", {"pile.method": "figure9_repaired"}),

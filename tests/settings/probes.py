@@ -21,6 +21,9 @@ from lhdmap.integration.cloud import Cloud
 from lhdmap.integration.cloud_io import write_cloud
 from lhdmap.machine import Machine
 from lhdmap.messages import FloatArray
+from lhdmap.movement.check import topology_findings
+from lhdmap.movement.route import route_json
+from lhdmap.movement.routes import RouteOptions, route
 from lhdmap.odometry.cloud_odometry import CloudStep
 from lhdmap.odometry.steps import OdometryStep
 from lhdmap.pile.stage import ScanHits
@@ -31,6 +34,7 @@ from lhdmap.rockbreaker.machine import Rockbreaker
 from lhdmap.simulation.grizzly import simulate_grizzly
 from lhdmap.smoothing.trust import expected_error
 
+from tests.movement.mines import fast_ladder
 from tests.report.synthetic import START_NS, report_data
 from tests.report.test_recording import read
 from tests.settings import streams
@@ -162,6 +166,20 @@ def rock(settings: Settings) -> str:
         return _planned(settings, ["--cloud", str(cloud)])
 
 
+def routes(settings: Settings) -> str:
+    """Return the digest of routes on a map with fast tunnels and a turning bay, and of its check: twins that are a little off."""
+    topology = fast_ladder()
+    ways = [(loaded, RouteOptions(*headings)) for loaded in (False, True) for headings in _HEADINGS]
+    found = [
+        route_json(route(topology, "t1.start", "DP1", asked, settings.movement, loaded=loaded))
+        for loaded, asked in ways
+    ]
+    return digest(found, list(topology_findings(topology, settings.movement)))
+
+
+_HEADINGS = (("along", "along"), ("along", "against"), ("against", "along"), ("against", "against"))
+
+
 def _planned(settings: Settings, words: list[str]) -> str:
     with tempfile.TemporaryDirectory() as folder:
         file, target = Path(folder) / "settings.toml", Path(folder) / "plan"
@@ -201,4 +219,5 @@ PROBES: dict[str, Probe] = {
     "recording": recording,
     "plan": plan,
     "rock": rock,
+    "route": routes,
 }
