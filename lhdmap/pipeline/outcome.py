@@ -191,6 +191,8 @@ class Outcome:
             has_inclinometer=self.pipeline.has_inclinometer,
             pile=self.pile,
             pile_reason=self.pile_reason,
+            topology=None if self.topology is None else self.topology.map,
+            sheets=() if self.topology is None else self.topology.sheets,
             warnings=self.warnings,
             settings_text=settings_toml(inputs.settings),
             provenance={"log": ", ".join(name_of(path) for path in inputs.logs)} | _given(inputs),
