@@ -12,7 +12,7 @@ from lhdmap.report import charts
 from lhdmap.report import topology_drawing as drawing
 from lhdmap.report.data import ClosureRow
 from lhdmap.report.route_legs import legs_of
-from lhdmap.report.topology_levels import Levels
+from lhdmap.report.topology_levels import Levels, extent_m, middle
 from lhdmap.topology.model import UNEXPLORED, TopologicalMap, Tunnel
 
 if TYPE_CHECKING:
@@ -36,10 +36,9 @@ def level_figure(
     part = part_of(topology, levels, number)
     lines = {kind: levels.on(number, [one.line_m for one in part.tunnels if drawing.kind_of(one) == kind])
              for kind in drawing.KINDS}  # fmt: skip
-    figure, axes = _plan(
-        [*(line for own in lines.values() for line in own), *(one.outline_m for one in part.intersections)]
-    )
     sheet = levels.all[number].sheet
+    shapes = [*(line for own in lines.values() for line in own), *(one.outline_m for one in part.intersections)]
+    figure, axes = _plan([*shapes, *([] if sheet is None else [extent_m(sheet)])])
     if sheet is not None:
         drawing.draw_free_space(axes, sheet)
     drawing.draw_intersections(axes, part.intersections)
@@ -59,7 +58,7 @@ def level_figure(
 def _drawn(part: TopologicalMap, lines: Iterable[Sequence[FloatArray]]) -> list[FloatArray]:
     """Return what names are to keep off: centre lines (N, 3), and where points and crossed-out connections are."""
     marks = [*(one.pose for one in part.waypoints), *(one.pose for one in part.access_points)]
-    marks += [_middle(one.line_m) for one in part.connections if one.closed or not one.feasible]
+    marks += [middle(one.line_m) for one in part.connections if one.closed or not one.feasible]
     return [*(line for own in lines for line in own), *(mark[None, :2] for mark in marks)]
 
 
@@ -91,7 +90,7 @@ def names_of(part: TopologicalMap, levels: Levels, number: int) -> Names:
     for tunnel in part.tunnels:
         own = max(levels.on(number, [tunnel.line_m]), key=len, default=tunnel.line_m)
         if (tunnel.id, tunnel.name) not in said and len(own):
-            names.append((tunnel.name, _middle(own), 1.5))
+            names.append((tunnel.name, middle(own), 1.5))
     return names
 
 
@@ -133,7 +132,7 @@ def _names_on(topology: TopologicalMap, steps: Sequence[Step]) -> Names:
     return [
         *((one.name, one.pose, 6.0) for one in waypoints),
         *(
-            (one.name, _middle(one.line_m) if isinstance(one, Tunnel) else one.T_map_node, 2.0)
+            (one.name, middle(one.line_m) if isinstance(one, Tunnel) else one.T_map_node, 2.0)
             for one in nodes
             if (one.id, one.name) not in said
         ),
@@ -192,7 +191,7 @@ def _draw_connections(axes: Axes, part: TopologicalMap, levels: Levels, number: 
         own = [one for one in part.connections if (one.closed if closed else not one.feasible and not one.closed)]
         lines = levels.on(number, [one.line_m for one in own])
         drawing.draw_lines(axes, lines, colour, ":", "_connections", linewidth=1.3, zorder=2.4)
-        drawing.draw_marks(axes, [_middle(one.line_m) for one in own], mark, colour, words, markersize=6)
+        drawing.draw_marks(axes, [middle(one.line_m) for one in own], mark, colour, words, markersize=6)
 
 
 def _draw_ends(axes: Axes, topology: TopologicalMap, levels: Levels, number: int) -> None:
@@ -208,9 +207,3 @@ def _draw_ends(axes: Axes, topology: TopologicalMap, levels: Levels, number: int
         flags = levels.of(tunnel.line_m) == number
         across += [tunnel.line_m[k] for k in np.flatnonzero(flags[1:] != flags[:-1]) + 1]
     drawing.draw_marks(axes, across, "s", charts.FINAL, "to another level", markerfacecolor="none", markersize=8)
-
-
-def _middle(line_m: FloatArray) -> FloatArray:
-    """Return the point (3,) half way along a line (N, 3)."""
-    at = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(line_m, axis=0), axis=1))])
-    return np.array([np.interp(0.5 * at[-1], at, line_m[:, k]) for k in range(line_m.shape[1])])

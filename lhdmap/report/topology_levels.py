@@ -10,8 +10,9 @@ import numpy.typing as npt
 
 from lhdmap.messages import FloatArray
 from lhdmap.topology.model import UNEXPLORED, TopologicalMap
-from lhdmap.topology.sheet import Sheet
+from lhdmap.topology.sheet import UNKNOWN, Sheet
 
+_STRAY_PCT = 0.3
 Indices = npt.NDArray[np.int64]
 
 
@@ -68,6 +69,20 @@ def coarser(sheet: Sheet, longest: int) -> Sheet:
     padded[: sheet.cells.shape[0], : sheet.cells.shape[1]] = sheet.cells
     cells: npt.NDArray[np.uint8] = padded.reshape(rows, step, columns, step).max(axis=(1, 3))
     return sheet._replace(cells=cells, cell_m=step * sheet.cell_m)
+
+
+def middle(line_m: FloatArray) -> FloatArray:
+    """Return the point half way along a line (N, D)."""
+    at = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(line_m, axis=0), axis=1))])
+    return np.array([np.interp(0.5 * at[-1], at, column) for column in line_m.T])
+
+
+def extent_m(sheet: Sheet) -> FloatArray:
+    """Return lower and upper corner (2, 2) of what is known of a sheet, without the last few cells at its edges: stray beams."""
+    rows_columns = np.argwhere(sheet.cells != UNKNOWN)
+    if not len(rows_columns):
+        return np.empty((0, 2))
+    return sheet.middles_m(np.percentile(rows_columns, [_STRAY_PCT, 100.0 - _STRAY_PCT], axis=0))
 
 
 def summary(topology: TopologicalMap, sheets: Sequence[Sheet] = ()) -> str:

@@ -35,19 +35,18 @@ def _topology(data: ReportData) -> str:
     words = markup.paragraph(summary(topology, data.sheets)) + markup.listed(topology.remarks, "missing")
     if not topology.tunnels:
         return words
-    return words + _pictures(data, levels) + _tables(topology)
+    return words + _pictures(topology, levels, data.closures) + _tables(topology)
 
 
-def _pictures(data: ReportData, levels: Levels) -> str:
-    assert data.topology is not None
+def _pictures(topology: TopologicalMap, levels: Levels, found: Sequence[ClosureRow]) -> str:
     pictures = []
     for number, level in enumerate(levels.all[:MOST_LEVELS]):
-        figure, left_out = level_figure(data.topology, levels, number, data.closures)
+        figure, left_out = level_figure(topology, levels, number, found)
         caption = "From above. Arrows leave their node."
         if level.sheet is not None:
-            low, high = level.sheet.heights_m
+            low, high = (round(height, 1) + 0.0 for height in level.sheet.heights_m)  # no -0.0
             name = f"Level {level.name}, floor" if len(levels.all) > 1 else "Floor"
-            caption = f"{name} from {low:.1f} to {high:.1f} m, from above; grey is free space. Arrows leave their node."
+            caption = f"{name} from {low} to {high} m, from above; grey is free space. Arrows leave their node."
         if left_out:
             caption += f" {counted(left_out, 'name')} had no room here; the tables hold them."
         pictures.append(markup.picture(charts.svg_uri(figure), caption))

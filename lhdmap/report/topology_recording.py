@@ -13,6 +13,7 @@ from lhdmap.report.data import ClosureRow
 from lhdmap.report.recording import RecordingWriter
 from lhdmap.report.route_legs import legs_of
 from lhdmap.report.topology_drawing import kind_of
+from lhdmap.report.topology_levels import middle
 from lhdmap.topology.model import PURPOSES, Point, TopologicalMap
 
 if TYPE_CHECKING:
@@ -23,7 +24,7 @@ _ARROW_M, _POINT_ARROW_M = 3.0, 4.0
 _BLUE, _ORANGE, _GREEN, _RED, _PINK, _YELLOW = 0x2F86C9FF, 0xE69F00FF, 0x009E73FF, 0xD55E00FF, 0xCC79A7FF, 0xF0C419FF
 _WHITE, _DIM = 0xF2F2F2FF, 0x8A949EFF
 _TUNNELS = {
-    "driven": (_BLUE, "blue line", "tunnel, driven"),
+    "driven": (_BLUE, "blue line in the topology", "tunnel, driven"),
     "seen": (_ORANGE, "orange line", "tunnel, only seen"),
     "closed": (_RED, "red line", "tunnel, closed"),
 }
@@ -86,26 +87,29 @@ def raised(points_m: FloatArray, by_m: float = _ABOVE_M) -> FloatArray:
 
 
 def _add_tunnels(writer: RecordingWriter, topology: TopologicalMap) -> None:
-    """Record centre lines; the name of a tunnel that a waypoint in it has, too, stands there alone."""
-    said = {(one.node, one.name) for one in topology.waypoints}
+    """Record centre lines; the name that a waypoint in a tunnel has, too, stands there alone."""
+    import rerun as rr
+
     for kind, (rgba, drawn, meaning) in _TUNNELS.items():
         own = [one for one in topology.tunnels if kind_of(one) == kind]
-        if not own:
-            continue
-        writer.explain(drawn, meaning)
-        for one in own:
-            writer.widen(one.line_m)
-        for named in (True, False):
-            chosen = [one for one in own if ((one.id, one.name) not in said) == named]
-            lines = [raised(one.line_m) for one in chosen]
-            entity = f"map/topology/tunnels/{kind}{'' if named else '/of_waypoints'}"
-            _add_lines(writer, entity, lines, rgba, 2.0, [one.name for one in chosen], shown=named)
+        names = [one.name for one in own]
+        _add_lines(writer, f"map/topology/tunnels/{kind}", [raised(one.line_m) for one in own], rgba, 2.0, names)
+        if own:
+            writer.explain(drawn, meaning)
+            writer.widen(np.vstack([one.line_m for one in own]))
+    said = {(one.node, one.name) for one in topology.waypoints}
+    named = [one for one in topology.tunnels if (one.id, one.name) not in said]
+    if named:
+        at, size = raised(np.array([middle(one.line_m) for one in named])), rr.Radius.ui_points(0.5)
+        labels = [one.name for one in named]
+        names_shape = rr.Points3D(at, colors=_BLUE, radii=size, labels=labels, show_labels=True)
+        writer.add_shape("map/topology/tunnels/names", names_shape)
 
 
 def _add_intersections(writer: RecordingWriter, topology: TopologicalMap) -> None:
     own = [one for one in topology.intersections if len(one.outline_m)]
     rings = [_at_height(np.vstack([one.outline_m, one.outline_m[:1]]), one.T_map_node[2]) for one in own]
-    _add_lines(writer, "map/topology/intersections", rings, _YELLOW, 1.8, [one.name for one in own])
+    _add_lines(writer, "map/topology/intersections", rings, _YELLOW, 1.8, [one.name for one in own], shown=True)
     if own:
         writer.explain("yellow outline", "intersection")
 
@@ -157,7 +161,7 @@ def _add_lines(
     size: float,
     labels: Sequence[str] | None = None,
     *,
-    shown: bool = True,
+    shown: bool = False,
 ) -> None:
     """Record lines (N, 3) of a size in points on screen; nothing where there is none."""
     import rerun as rr
