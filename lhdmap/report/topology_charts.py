@@ -106,7 +106,7 @@ def route_figure(topology: TopologicalMap, route_states: Sequence[Step], sheets:
         own = [leg.line_m for leg in legs if leg.gear == gear]
         drawing.draw_lines(axes, own, colour, "-", gear, linewidth=2.6, zorder=2.6)
         heads = [pose for line in own for pose in _heads(line)]
-        drawing.draw_arrows(axes, heads, colour, f"way it goes in {gear}", length_pt=11.0)
+        drawing.draw_arrows(axes, heads, colour, "_heads", length=11.0, shaft=2.6)
     stops = [(one, topology.points[one.point]) for one in route_states]
     ring = {"markerfacecolor": "none", "markeredgewidth": 2.0, "markersize": 9}
     drawing.draw_marks(

@@ -37,7 +37,7 @@ SYMBOLS = {
 }
 MOST_VERTICES, MOST_OUTLINE, MOST_MARKS, MOST_LABELS = 20_000, 40, 4000, 300
 _LONGEST_IMAGE = 900  # cells
-_ARROW_PT, _SHAFT = 9.0, 1.1
+_ARROW_PT, _SHAFT_PT = 9.0, 1.1
 _STEP_PT = 2.0
 _MARK = np.stack(np.meshgrid(*[np.arange(-4.0, 4.5)] * 2), axis=-1).reshape(-1, 2)  # as wide as a mark is
 
@@ -86,19 +86,16 @@ def draw_intersections(axes: Axes, nodes: Sequence[Intersection]) -> None:
         axes.add_collection(shapes, autolim=False)
 
 
-def draw_arrows(
-    axes: Axes, poses: Sequence[FloatArray], colour: str, label: str, *, length_pt: float = _ARROW_PT
-) -> None:
-    """Draw poses (4,) as arrows of one length on the page, from the place in the direction."""
+def draw_arrows(axes: Axes, poses: Sequence[FloatArray], colour: str, label: str, **size_pt: float) -> None:
+    """Draw poses (4,) as arrows of one length on the page, from the place in the direction; `length`, `shaft` in points."""
     if not len(poses):
         return
     x, y, _, yaw = np.array(poses[:MOST_MARKS]).T
-    drawn = axes.quiver(
-        x, y, np.cos(yaw), np.sin(yaw),
-        angles="xy", scale_units="inches", scale=72.0 / length_pt, units="inches", width=_SHAFT / 72.0,
-        headwidth=3.6, headlength=3.6, headaxislength=3.2, color=colour, zorder=3.0,
+    length, shaft = size_pt.get("length", _ARROW_PT), size_pt.get("shaft", _SHAFT_PT)
+    axes.quiver(
+        x, y, np.cos(yaw), np.sin(yaw), angles="xy", scale_units="inches", scale=72.0 / length, units="inches",
+        width=shaft / 72.0, headwidth=3.6, headlength=3.6, headaxislength=3.2, color=colour, zorder=3.0,
     )  # fmt: skip
-    drawn.set_label("_arrows")
     axes.plot([], [], linestyle="none", marker=r"$\rightarrow$", color=colour, markersize=8, label=label)
 
 

@@ -66,7 +66,10 @@ def record_route(writer: RecordingWriter, topology: TopologicalMap, route_states
         _add_marks(writer, "map/route/inversions", [at for at, _ in marks], _PINK, [name for _, name in marks])
         writer.explain("pink ball", "inversion: the route changes gear, or turns round")
     if stops:
-        _add_marks(writer, "map/route/ends", [stops[0][1], stops[-1][1]], _YELLOW, ["start", "goal"])
+        ends = [getattr(topology.points[route_states[k].point], "name", route_states[k].point) for k in (0, -1)]
+        _add_marks(
+            writer, "map/route/ends", [stops[0][1], stops[-1][1]], _YELLOW, [f"start {ends[0]}", f"goal {ends[1]}"]
+        )
 
 
 def write_topology_recording(
