@@ -161,7 +161,7 @@ def draw_labels(axes: Axes, labels: Sequence[tuple[str, FloatArray, float]], dra
         line = {"arrowstyle": "-", "color": charts.INK, "linewidth": 0.5, "alpha": 0.55, "shrinkA": 0, "shrinkB": 1}
         axes.annotate(
             label.text, (at_x, at_y), (x, y), textcoords="offset points", ha="center", va="center", fontsize=label.size,
-            arrowprops=line if one.apart else None, zorder=5.0, annotation_clip=True,
+            arrowprops=line if one.apart else None, zorder=5.0, annotation_clip=True, parse_math=False,
         )  # fmt: skip
     return len(labels) - len(found)
 

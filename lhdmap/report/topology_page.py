@@ -42,11 +42,11 @@ def _pictures(topology: TopologicalMap, levels: Levels, found: Sequence[ClosureR
     pictures = []
     for number, level in enumerate(levels.all[:MOST_LEVELS]):
         figure, left_out = level_figure(topology, levels, number, found)
-        caption = "From above. Arrows leave their node."
+        caption = "From above. Arrows at access points lead out of their node."
         if level.sheet is not None:
             low, high = (round(height, 1) + 0.0 for height in level.sheet.heights_m)  # no -0.0
             name = f"Level {level.name}, floor" if len(levels.all) > 1 else "Floor"
-            caption = f"{name} from {low} to {high} m, from above; grey is free space. Arrows leave their node."
+            caption = f"{name} from {low} to {high} m, from above; grey is free space. Arrows at access points lead out of their node."
         if left_out:
             caption += f" {counted(left_out, 'name')} had no room here; the tables hold them."
         pictures.append(markup.picture(charts.svg_uri(figure), caption))
@@ -108,16 +108,16 @@ def closures(rows: Sequence[ClosureRow]) -> str:
         (
             _place(row.from_m),
             _place(row.to_m),
-            "accepted" if row.accepted else "refused",
             f"{100.0 * row.residual_m:.1f}",
             f"{row.information:.2g}",
+            "yes" if row.accepted else "no",
             row.reason,
         )
         for row in rows[:MOST_ROWS]
     ]
-    head = ("first, x y z in m", "later, x y z in m", "", "residual, cm", "information, 1/m²", "reason")
+    head = ("first: x y z, m", "later: x y z, m", "residual, cm", "information, 1/m²", "accepted", "reason")
     words = f"{accepted} of {counted(len(rows), 'candidate')} accepted; those refused have not moved the map."
-    table = markup.table(head, told, numbers_from=3, numbers_to=5)
+    table = markup.table(head, told, numbers_from=0, numbers_to=5)
     more = markup.paragraph(f"{len(rows) - len(told)} more are not shown.") if len(rows) > len(told) else ""
     return markup.paragraph(words) + table + more
 
