@@ -73,7 +73,8 @@ def draw_intersections(axes: Axes, nodes: Sequence[Intersection]) -> None:
     """Draw the free space of intersections."""
     from matplotlib.collections import PolyCollection
 
-    outlines = [one.outline_m[charts.thinned(len(one.outline_m), MOST_OUTLINE)] for one in nodes[:MOST_MARKS]]
+    most = max(MOST_OUTLINE, MOST_VERTICES // max(len(nodes), 1))
+    outlines = [one.outline_m[charts.thinned(len(one.outline_m), most)] for one in nodes[:MOST_MARKS]]
     if outlines:
         shapes = PolyCollection(
             [outline for outline in outlines if len(outline)],

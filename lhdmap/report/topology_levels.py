@@ -10,9 +10,9 @@ import numpy.typing as npt
 
 from lhdmap.messages import FloatArray
 from lhdmap.topology.model import UNEXPLORED, TopologicalMap
-from lhdmap.topology.sheet import UNKNOWN, Sheet
+from lhdmap.topology.sheet import OCCUPIED, Sheet
 
-_STRAY_PCT = 0.3
+_STRAY_PCT = 0.5
 Indices = npt.NDArray[np.int64]
 
 
@@ -78,8 +78,8 @@ def middle(line_m: FloatArray) -> FloatArray:
 
 
 def extent_m(sheet: Sheet) -> FloatArray:
-    """Return lower and upper corner (2, 2) of what is known of a sheet, without the last few cells at its edges: stray beams."""
-    rows_columns = np.argwhere(sheet.cells != UNKNOWN)
+    """Return lower and upper corner (2, 2) of the walls of a sheet, without the last few: what stray beams have hit."""
+    rows_columns = np.argwhere(sheet.cells == OCCUPIED)
     if not len(rows_columns):
         return np.empty((0, 2))
     return sheet.middles_m(np.percentile(rows_columns, [_STRAY_PCT, 100.0 - _STRAY_PCT], axis=0))

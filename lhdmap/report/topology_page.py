@@ -10,7 +10,7 @@ from lhdmap.report import charts, markup
 from lhdmap.report.data import ClosureRow, ReportData
 from lhdmap.report.topology_charts import level_figure
 from lhdmap.report.topology_drawing import kind_of
-from lhdmap.report.topology_levels import Levels, counted, summary
+from lhdmap.report.topology_levels import Level, Levels, counted, summary
 from lhdmap.topology.model import DEAD_END, TopologicalMap, Tunnel
 
 MOST_LEVELS, MOST_ROWS = 12, 400
@@ -42,17 +42,22 @@ def _pictures(topology: TopologicalMap, levels: Levels, found: Sequence[ClosureR
     pictures = []
     for number, level in enumerate(levels.all[:MOST_LEVELS]):
         figure, left_out = level_figure(topology, levels, number, found)
-        caption = "From above. Arrows at access points lead out of their node."
-        if level.sheet is not None:
-            low, high = (round(height, 1) + 0.0 for height in level.sheet.heights_m)  # no -0.0
-            name = f"Level {level.name}, floor" if len(levels.all) > 1 else "Floor"
-            caption = f"{name} from {low} to {high} m, from above; grey is free space. Arrows at access points lead out of their node."
+        caption = f"{_named(level, several=len(levels.all) > 1)} Arrows at access points lead out of their node."
         if left_out:
             caption += f" {counted(left_out, 'name')} had no room here; the tables hold them."
         pictures.append(markup.picture(charts.svg_uri(figure), caption))
     if len(levels.all) > MOST_LEVELS:
         pictures.append(markup.paragraph(f"{len(levels.all) - MOST_LEVELS} more levels are not drawn."))
     return "".join(pictures)
+
+
+def _named(level: Level, *, several: bool) -> str:
+    """Return what a picture of a level shows."""
+    name = f"Level {level.name}, from above" if several else "From above"
+    if level.sheet is None:
+        return f"{name}."
+    low, high = (round(height, 1) + 0.0 for height in level.sheet.heights_m)  # no -0.0
+    return f"{name}; grey is free space{f', its floor at {low} to {high} m' if low < high else ''}."
 
 
 def _tables(topology: TopologicalMap) -> str:

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from lhdmap.movement.route import Step
 
 _ABOVE_M = 0.3  # over the floor, so that points of the cloud do not hide it
-_ARROW_M, _POINT_ARROW_M = 3.0, 4.0
+_ARROW, _MOST_ARROW_M = 0.65, 4.0  # of a tunnel's width
 _BLUE, _ORANGE, _GREEN, _RED, _PINK, _YELLOW = 0x2F86C9FF, 0xE69F00FF, 0x009E73FF, 0xD55E00FF, 0xCC79A7FF, 0xF0C419FF
 _WHITE, _DIM = 0xF2F2F2FF, 0x8A949EFF
 _TUNNELS = {
@@ -35,10 +35,12 @@ def add_topology(writer: RecordingWriter, topology: TopologicalMap, closures: Se
     """Record tunnels, intersections, access points, waypoints, connections and loop closures; nothing of what there is none."""
     _add_tunnels(writer, topology)
     _add_intersections(writer, topology)
-    _add_points(writer, "access_points", topology.access_points, _WHITE, [one.id for one in topology.access_points])
+    long_m = _arrow_m(topology)
+    ids = [one.id for one in topology.access_points]
+    _add_arrows(writer, "access_points", topology.access_points, long_m, _WHITE, ids)
     for purpose in PURPOSES:
         own = [one for one in topology.waypoints if one.purpose == purpose]
-        _add_points(writer, f"waypoints/{purpose}", own, _GREEN, [one.name for one in own])
+        _add_arrows(writer, f"waypoints/{purpose}", own, 1.4 * long_m, _GREEN, [one.name for one in own], shown=True)
     if topology.access_points:
         writer.explain("white arrow", "access point, out of its node")
     if topology.waypoints:
@@ -121,19 +123,31 @@ def _at_height(outline_m: FloatArray, height_m: float) -> FloatArray:
     return np.column_stack([outline_m, np.full(len(outline_m), height_m + _ABOVE_M)])
 
 
-def _add_points(writer: RecordingWriter, name: str, points: Sequence[Point], rgba: int, labels: Sequence[str]) -> None:
-    """Record poses as arrows; the names of access points, which are many, are seen only on selection."""
+def _arrow_m(topology: TopologicalMap) -> float:
+    """Return how long an arrow is: less than a tunnel is wide."""
+    widths = [float(one.widths_m.mean()) for one in topology.tunnels if len(one.half_widths_m)]
+    return min(_ARROW * float(np.median(widths)), _MOST_ARROW_M) if widths else _MOST_ARROW_M
+
+
+def _add_arrows(
+    writer: RecordingWriter,
+    name: str,
+    points: Sequence[Point],
+    long_m: float,
+    rgba: int,
+    labels: Sequence[str],
+    *,
+    shown: bool = False,
+) -> None:
+    """Record poses as arrows; names that are not shown, there are many of access points, are seen on selection."""
     import rerun as rr
 
-    if not points:
-        return
-    waypoints = name.startswith("waypoints")
-    poses = np.array([one.pose for one in points])
-    ahead = np.column_stack([np.cos(poses[:, 3]), np.sin(poses[:, 3]), np.zeros(len(poses))])
-    ahead *= _POINT_ARROW_M if waypoints else _ARROW_M
-    size, origins = rr.Radius.ui_points(1.6), raised(poses[:, :3])
-    arrows = rr.Arrows3D(origins=origins, vectors=ahead, colors=rgba, radii=size, labels=labels, show_labels=waypoints)
-    writer.add_shape(f"map/topology/{name}", arrows)
+    if points:
+        poses = np.array([one.pose for one in points])
+        ahead = long_m * np.column_stack([np.cos(poses[:, 3]), np.sin(poses[:, 3]), np.zeros(len(poses))])
+        size, origins = rr.Radius.ui_points(1.6), raised(poses[:, :3])
+        arrows = rr.Arrows3D(origins=origins, vectors=ahead, colors=rgba, radii=size, labels=labels, show_labels=shown)
+        writer.add_shape(f"map/topology/{name}", arrows)
 
 
 def _add_connections(writer: RecordingWriter, topology: TopologicalMap) -> None:

@@ -94,8 +94,8 @@ def test_each_level_has_a_picture_of_what_is_on_it() -> None:
     assert {"I1", "I2", "T1", "T2", "DP1", "D", "to another level"} <= upper
     assert not {"I1", "T1", "DP1"} & lower
     assert not {"I3", "Z"} & upper
-    assert "Level deep, floor from -20.0 to -10.0 m" in page
-    assert "Level 0, floor from -9.9 to 0.5 m" in page
+    assert "Level deep, from above; grey is free space, its floor at -20.0 to -10.0 m." in page
+    assert "Level 0, from above; grey is free space, its floor at -9.9 to 0.5 m." in page
 
 
 def test_no_part_of_a_tunnel_is_lost_between_levels() -> None:
