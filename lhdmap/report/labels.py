@@ -11,6 +11,7 @@ import numpy.typing as npt
 
 from lhdmap.messages import FloatArray
 
+Flags = npt.NDArray[np.bool_]
 _PER_LETTER, _HIGH = 0.62, 1.25  # of the size of the letters: width of one, height of a line (DejaVu Sans)
 _DIRECTIONS = 16
 _RINGS = (0.0, 4.0, 9.0, 15.0, 22.0, 31.0, 42.0, 56.0, 72.0)  # from the place's own mark outwards, in points
@@ -75,17 +76,17 @@ def _boxes(middles: FloatArray, label: Label) -> FloatArray:
     return np.hstack([middles - half, middles + half])
 
 
-def _inside(boxes: FloatArray, size: tuple[float, float]) -> npt.NDArray[np.bool_]:
-    within: npt.NDArray[np.bool_] = (boxes[:, :2] >= 0.0).all(axis=1) & (boxes[:, 2:] <= size).all(axis=1)
+def _inside(boxes: FloatArray, size: tuple[float, float]) -> Flags:
+    x0, y0, x1, y1 = boxes.T
+    within: Flags = (x0 >= 0.0) & (y0 >= 0.0) & (x1 <= size[0]) & (y1 <= size[1])
     return within
 
 
-def _overlaps(boxes: FloatArray, others: FloatArray) -> npt.NDArray[np.bool_]:
+def _overlaps(boxes: FloatArray, others: FloatArray) -> Flags:
     """Return which of boxes (K, 4: x0, y0, x1, y1) lie over any of others (M, 4)."""
-    a, b = boxes[:, None], others[None]
-    over = (a[..., :2] < b[..., 2:]).all(axis=-1) & (a[..., 2:] > b[..., :2]).all(axis=-1)
-    found: npt.NDArray[np.bool_] = over.any(axis=1)
-    return found
+    a, b = boxes.T[:, :, None], others.T[:, None]
+    over: Flags = (a[0] < b[2]) & (a[2] > b[0]) & (a[1] < b[3]) & (a[3] > b[1])
+    return np.asarray(over.any(axis=1))
 
 
 def _summed(drawn: FloatArray, size: tuple[float, float]) -> FloatArray:

@@ -146,7 +146,7 @@ def draw_labels(axes: Axes, labels: Sequence[tuple[str, FloatArray, float]], dra
 
     `drawn_m`: lines (N, 2 or more) that the names are to keep off.
     """
-    scale = 72.0 / axes.figure.dpi  # type: ignore[union-attr]
+    scale = 72.0 / axes.figure.dpi
     corner = np.array(axes.bbox.min)
 
     def to_points(points_m: FloatArray) -> FloatArray:

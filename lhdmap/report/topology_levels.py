@@ -82,7 +82,7 @@ def extent_m(sheet: Sheet) -> FloatArray:
     rows_columns = np.argwhere(sheet.cells == OCCUPIED)
     if not len(rows_columns):
         return np.empty((0, 2))
-    return sheet.middles_m(np.percentile(rows_columns, [_STRAY_PCT, 100.0 - _STRAY_PCT], axis=0))
+    return sheet.middles_m(np.percentile(rows_columns, [_STRAY_PCT, 100.0 - _STRAY_PCT], axis=0).astype(np.int64))
 
 
 def summary(topology: TopologicalMap, sheets: Sequence[Sheet] = ()) -> str:

@@ -42,7 +42,7 @@ def texts(page: str) -> set[str]:
 
 
 def all_names(topology: TopologicalMap) -> set[str]:
-    return {one.name for one in (*topology.tunnels, *topology.intersections, *topology.waypoints)}
+    return set(topology.names()) - set(topology.points) - set(topology.nodes)
 
 
 @pytest.mark.parametrize("topology", [ladder(), told(), board(3, 7)], ids=["ladder", "told", "board"])
