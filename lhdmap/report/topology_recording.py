@@ -117,6 +117,7 @@ def _add_intersections(writer: RecordingWriter, topology: TopologicalMap) -> Non
     _add_lines(writer, "map/topology/intersections", rings, _YELLOW, 1.8, [one.name for one in own], shown=True)
     if own:
         writer.explain("yellow outline", "intersection")
+        writer.widen(np.vstack(rings))
 
 
 def _at_height(outline_m: FloatArray, height_m: float) -> FloatArray:
