@@ -52,9 +52,9 @@ def commands(work: Path) -> dict[str, list[str]]:
         "eval-pile": ["eval", "pile", "--truth", str(work / "t.csv")],
         "view": ["view", str(log), "--web", "--port", "9191"],
         "screenshot": ["view", str(log), "--screenshot", "{out}.png"],
-        "export": ["export", str(map_folder(work / "map")), "--format", "dxf", "-o", "{out}.dxf"],
         "route": ["route", str(work / "t.geojson"), "DP1", "T2"],
         "check-map": ["check-map", str(work / "t.geojson")],
+        "export": ["export", str(map_folder(work / "map")), "--format", "dxf", "-o", "{out}.dxf"],
         "demo": ["demo", "-o", "{out}"],
     }
 

@@ -76,7 +76,7 @@ def _alternative(route: Route, best: Route) -> Alternative:
         route.time_s - best.time_s,
         route.inversions - best.inversions,
     )
-    reasons = [f"{more_s:.1f} s longer"]
+    reasons = [f"{more_s:.1f} s longer" if more_s >= _SHORTER_S else "as quick"]
     reasons += [f"{abs(more_m):.1f} m {'more' if more_m > 0 else 'less'}"] if abs(more_m) >= _SHORTER_S else []
     if inversions:
         word = "inversion" if abs(inversions) == 1 else "inversions"

@@ -35,7 +35,10 @@ class Reach:
     def __init__(self, planner: RoutePlanner) -> None:
         movement, topology = planner.movement, planner.topology
         edges = movement.edges
-        graph = csr_matrix((np.ones(len(edges.to)), edges.to, edges.first), shape=(movement.state_count,) * 2)
+        graph = csr_matrix(
+            (np.ones(len(edges.to)), edges.to, edges.first), shape=(movement.state_count,) * 2, copy=True
+        )
+        graph.sum_duplicates()  # with parallel edges SciPy's search for strong components does not end
         labels = connected_components(graph, connection="strong")[1].reshape(-1, STATE_COUNT)
         self.labels: Labels = labels[:, STANDING_ALONG:]
         self._points: dict[str, list[int]] = {}
@@ -102,8 +105,9 @@ def inversion_findings(topology: TopologicalMap, reach: Reach, machine: Machine)
     for node in topology.intersections:
         yield from _arm_findings(topology, node, reach, inside.get(node.id, []), shut)
     length_m = machine.dimensions.length_m
+    worked = {one.node for one in topology.waypoints if one.purpose in _FACES}
     for tunnel in topology.tunnels:
-        if DEAD_END in tunnel.ends and tunnel.length_m < length_m:
+        if DEAD_END in tunnel.ends and tunnel.length_m < length_m and tunnel.id not in worked:
             text = f"a dead end of {tunnel.length_m:.1f} m: a machine of {length_m:g} m that changes gear in it"
             yield Finding("warning", "inversion", tunnel.name, f"{text} still stands in the intersection")
     yield from _heading_findings(topology, reach)
@@ -159,10 +163,13 @@ def _face_findings(topology: TopologicalMap, reach: Reach) -> Iterator[Finding]:
 
 
 def _face_label(topology: TopologicalMap, reach: Reach, index: dict[str, int], one: Waypoint) -> int | None:
-    """Return the part of the map in which the machine stands bucket first at a face; None where that is not told by a dead end."""
+    """Return the part of the map in which the machine stands bucket first at a face.
+
+    None where no dead end tells which way that is, or nothing leads there.
+    """
     points = list(topology.points.values())
     entries = [points[k] for k in reach.of(one.node) if getattr(points[k], "joins", None) is not None]
-    if len(entries) != 1:
+    if len(entries) != 1 or not reach.reached[index[one.id]].any():
         return None
     inward = one.pose[:2] - entries[0].pose[:2]
     along = float(inward @ [np.cos(one.pose[3]), np.sin(one.pose[3])]) >= 0.0

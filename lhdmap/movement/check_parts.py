@@ -86,7 +86,13 @@ def room_findings(topology: TopologicalMap, settings: MovementSettings, machine:
             yield Finding("error" if least < width else "warning", "narrow", one.name, text)
     for way in topology.connections:
         if way.feasible and way.clearance_m < settings.room_m:
-            text = f"{way.clearance_m:.2f} m of room beside the machine; {settings.room_m:g} m was wanted"
+            room = f"{way.clearance_m:.2f} m of room beside the machine"
+            room = (
+                room
+                if way.clearance_m >= 0.0
+                else f"the bodies reach {-way.clearance_m:.2f} m into the walls as mapped"
+            )
+            text = f"{room}; {settings.room_m:g} m was wanted"
             yield Finding("warning", "narrow", f"{way.start}:{way.end}", text)
 
 

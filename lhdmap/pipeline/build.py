@@ -19,6 +19,7 @@ from lhdmap.logs.source import LogSource
 from lhdmap.machine import Machine
 from lhdmap.mapfolder import Diagnostics, MapFolderWriter
 from lhdmap.messages import Message
+from lhdmap.movement.costs import connection_times
 from lhdmap.outputs import free_folder
 from lhdmap.pipeline.beside import Beside, HelperDied, Here
 from lhdmap.pipeline.cost import CompileClock, Spent, cost, peak_memory_mib
@@ -168,8 +169,11 @@ def _write(
     folder.finished(folder.path / "cloud.ply")
     if outcome.pile is not None:
         folder.write_json("pile.json", outcome.pile.to_json())
+    if evidence := outcome.pipeline.smoother.evidence:
+        folder.write_json("closures.json", {"closures": [one.to_json() for one in evidence]})
     if outcome.topology is not None:
-        folder.write_json("topology.geojson", to_geojson(outcome.topology.map))
+        times_s = connection_times(outcome.topology.map, request.settings.movement)
+        folder.write_json("topology.geojson", to_geojson(outcome.topology.map, times_s))
         folder.finished(write_sheets(folder.path / "free_space.npz", outcome.topology.sheets))
     try:
         spent = inspector.ask(Inspection.spent)

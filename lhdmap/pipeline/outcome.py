@@ -35,7 +35,7 @@ from lhdmap.proprioception.wheels import WheelOdometry
 from lhdmap.report.bounded import bounded
 from lhdmap.report.data import ReportData, Summary, TopicRow
 from lhdmap.roles import BUILD_MAP, GIVEN_POSES, read_by
-from lhdmap.smoothing.smoother import corrected
+from lhdmap.smoothing.smoother import Correction, corrected
 from lhdmap.smoothing.trust import expected_error
 from lhdmap.topology.build import Topology, topology_of
 from lhdmap.topology.edits import NO_EDITS, TopologyEdits
@@ -90,7 +90,7 @@ def ways_of(pipeline: MappingPipeline, given: Rows | None) -> Ways:
     """
     stamps, times = _moments(pipeline)
     rows = pipeline.path.final.rows() if given is None else given
-    correction = None if given is not None else pipeline.smoother.correction(pipeline.path.correction())
+    correction = None if given is not None else _correction(pipeline, rows)
     if given is not None and not any(map(FinalTrack(given).covers, times.tolist())):
         raise InputError(
             f"the given poses are of {given.times_ns[0] / 1e9:.3f} to {given.times_ns[-1] / 1e9:.3f} s, "
@@ -102,6 +102,15 @@ def ways_of(pipeline: MappingPipeline, given: Rows | None) -> Ways:
     moved = given is not None or correction is not None
     closed = (0, None) if correction is None else (correction.closures, correction.end_covariance)
     return Ways(odometry_of(pipeline), final, rows, moved, *closed)
+
+
+def _correction(pipeline: MappingPipeline, rows: Rows) -> Correction | None:
+    """Return how closed loops move the path; heights close where an inclinometer tells them."""
+
+    def heights_m(times_ns: npt.NDArray[np.int64]) -> FloatArray:
+        return resample(rows, times_ns).poses[:, 2]
+
+    return pipeline.smoother.correction(pipeline.path.correction(), heights_m if pipeline.has_inclinometer else None)
 
 
 class Outcome:

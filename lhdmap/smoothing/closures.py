@@ -29,29 +29,66 @@ _LEVEL_M, _CLIMB_DRIFT = 1.0, 0.02  # a degree of bias in pitch: levels of a min
 _CELL_M, _WINDOW_CELLS = 0.04, 512
 # One start for each heading: with more, niches that look alike cost a closure here and there (Intel: 396, not 397).
 _GRID, _TURN_RAD = SearchGrid(0.15, math.radians(2.5), apart_m=math.inf), math.radians(25.0)
+UNLIKE, SMOOTH, ALONE = (
+    "the walls are not alike",
+    "the walls do not tell one direction",
+    "no neighbour says the same",
+)
+"""Why a place is no closure."""
 _MOST_UNEVEN = 10.0  # of the sigmas: noise of straight walls' directions looks like a little information along them
 
 
 class Closure(NamedTuple):
-    """Key `current` seen from key `earlier` (indices): planar pose (3,) and its covariance (3, 3) in the earlier's axes."""
+    """Key `current` seen from key `earlier` (indices): planar pose (3,) and its covariance (3, 3) in the earlier's axes.
+
+    `support`: share of the hits that agree.
+    """
 
     earlier: int
     current: int
     T_earlier_current: FloatArray
     covariance: FloatArray
+    support: float = 1.0
+
+    @property
+    def sigma_m(self) -> float:
+        """Standard deviation in the worse direction of the plane, metres."""
+        return math.sqrt(float(np.linalg.eigvalsh(self.covariance[:2, :2])[-1]))
 
 
-def find_closures(keys: list[KeyScan], settings: SmoothingSettings) -> list[Closure]:
-    """Return the closures that neighbours confirm. The cost grows with the keys, not with their square."""
+class Refusal(NamedTuple):
+    """A place that was looked at and is no closure: both keys (indices), why not, share of hits that agree, deviation (m)."""
+
+    earlier: int
+    current: int
+    reason: str
+    support: float
+    sigma_m: float = math.nan
+
+
+def find_closures(
+    keys: list[KeyScan], settings: SmoothingSettings, refused: list[Refusal] | None = None
+) -> list[Closure]:
+    """Return the closures that neighbours confirm; `refused` receives the others, with what speaks against them.
+
+    The cost grows with the keys, not with their square.
+    """
+    refused = [] if refused is None else refused
     places = np.array([(*key.pose, float(key.points[:, 2].mean())) for key in keys]).reshape(-1, 4)
     travelled = np.array([key.travelled_m for key in keys])
     found: list[Closure] = []
     nearby = Nearby(places[:, :2], settings.reach_limit_m)
     for current in range(len(keys)):
         closure = _close(keys, places, travelled, nearby, current, settings)
-        if closure is not None:
+        if isinstance(closure, Closure):
             found.append(closure)
-    return _confirmed(found, keys, settings)
+        elif closure is not None:
+            refused.append(closure)
+    kept = _confirmed(found, keys, settings)
+    names = {(one.earlier, one.current) for one in kept}
+    alone = [one for one in found if (one.earlier, one.current) not in names]
+    refused += [Refusal(one.earlier, one.current, ALONE, one.support, one.sigma_m) for one in alone]
+    return kept
 
 
 def _close(
@@ -61,7 +98,7 @@ def _close(
     nearby: Nearby,
     current: int,
     settings: SmoothingSettings,
-) -> Closure | None:
+) -> Closure | Refusal | None:
     """Try the earlier key nearest to this one on its level; `places` (N, 4): poses and heights of the keys' hits."""
     early = int(np.searchsorted(travelled, travelled[current] - settings.apart_m))
     nearby.add_until(early)
@@ -81,13 +118,13 @@ def _close(
     predicted = se2.between(places[candidate, :3], places[current, :3])
     result = _found(keys[current], _surroundings(keys, candidate, early), predicted, reach_m)
     if result is None or result.support < settings.min_support:
-        return None
+        return Refusal(candidate, current, UNLIKE, 0.0 if result is None else result.support)
     sigma = 1.0 / np.sqrt(np.maximum(marginal_information(result.information), 1e-12))
     if sigma[:2].max() > min(settings.max_sigma_m, _MOST_UNEVEN * sigma[:2].min()):
-        return None
+        return Refusal(candidate, current, SMOOTH, result.support, float(sigma[:2].max()))
     covariance: FloatArray = np.linalg.inv(result.information).astype(np.float64)
     covariance += np.diag([0.01**2, 0.01**2, math.radians(0.05) ** 2])
-    return Closure(candidate, current, result.pose, covariance)
+    return Closure(candidate, current, result.pose, covariance, result.support)
 
 
 def _surroundings(keys: list[KeyScan], centre: int, before: int) -> Submap:

@@ -61,6 +61,11 @@ def smoothed(keys: list[KeyScan], closures: list[Closure], settings: SmoothingSe
     return Smoothed(np.array([[pose.x(), pose.y(), pose.theta()] for pose in found]), end)
 
 
+def step_covariances(keys: list[KeyScan], settings: SmoothingSettings) -> list[FloatArray]:
+    """Return the covariances (3, 3) of the steps from key to key, each in the axes of its end."""
+    return [_step_covariance(before, after, settings) for before, after in pairwise(keys)]
+
+
 def _step_covariance(before: KeyScan, after: KeyScan, settings: SmoothingSettings) -> FloatArray:
     """Return the covariance (3, 3) of a step: what was measured, and what no drive is better than."""
     travel_m = max(after.travelled_m - before.travelled_m, _SHORTEST_M)

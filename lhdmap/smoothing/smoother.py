@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
@@ -10,9 +11,12 @@ import numpy.typing as npt
 from lhdmap.geometry import se2
 from lhdmap.messages import FloatArray
 from lhdmap.scan_matching.key_scan import KeyScan
-from lhdmap.smoothing.closures import find_closures
-from lhdmap.smoothing.graph import smoothed
+from lhdmap.smoothing.closures import Closure, Refusal, find_closures
+from lhdmap.smoothing.evidence import Evidence, evidence_of
+from lhdmap.smoothing.graph import smoothed, step_covariances
+from lhdmap.smoothing.heights import closed_heights
 from lhdmap.smoothing.keys import KeyScans
+from lhdmap.smoothing.robust import Tie, judged
 from lhdmap.smoothing.settings import SmoothingSettings
 
 _PLANAR = [0, 1, 5]  # of a pose: x, y, heading
@@ -22,13 +26,14 @@ _BLOCK = 50_000  # poses moved at a time: what is needed on the way is ten times
 class Correction(NamedTuple):
     """Planar corrections of the odometry: `T_map_odom` (N, 3) at `times_ns` (N,), and the number of closures behind them.
 
-    `end_covariance` (3, 3): of the last key, in its axes, where closures were used.
+    `end_covariance` (3, 3): of the last key, in its axes, where closures were used; `raised_m` (N,): what the heights change by.
     """
 
     times_ns: npt.NDArray[np.int64]
     T_map_odom: FloatArray
     closures: int
     end_covariance: FloatArray | None = None
+    raised_m: FloatArray | None = None
 
 
 class Smoother:
@@ -37,20 +42,37 @@ class Smoother:
     def __init__(self, settings: SmoothingSettings) -> None:
         self._settings = settings
         self.keys = KeyScans(settings)
+        self.evidence: list[Evidence] = []  # of all places that were looked at, once `correction` was asked for
 
-    def correction(self, realigned: Correction | None = None) -> Correction | None:
+    def correction(
+        self,
+        realigned: Correction | None = None,
+        heights_m: Callable[[npt.NDArray[np.int64]], FloatArray] | None = None,
+    ) -> Correction | None:
         """Return how the path is to be moved, or None where no place was seen twice.
 
-        The path is the odometry's, or what the realignment has made of it.
+        The path is the odometry's, or what the realignment has made of it. `heights_m` tells that of the floor at times (N,).
         """
         keys = self.keys.keys if realigned is None else _moved_keys(self.keys.keys, realigned)
-        closures = find_closures(keys, self._settings) if self._settings.closures else []
+        refused: list[Refusal] = []
+        found = find_closures(keys, self._settings, refused) if self._settings.closures else []
+        closures = self._believed(keys, found, refused)
         if not closures:
             return None
         poses, end = smoothed(keys, closures, self._settings)
         moved = np.array([se2.compose(pose, se2.inverse(key.pose)) for pose, key in zip(poses, keys, strict=True)])
         moved[:, 2] = np.unwrap(moved[:, 2])
-        return Correction(np.array([key.time_ns for key in keys], dtype=np.int64), moved, len(closures), end)
+        times_ns = np.array([key.time_ns for key in keys], dtype=np.int64)
+        raised = None if heights_m is None else closed_heights(keys, heights_m(times_ns), closures)
+        return Correction(times_ns, moved, len(closures), end, raised)
+
+    def _believed(self, keys: list[KeyScan], found: list[Closure], refused: list[Refusal]) -> list[Closure]:
+        """Return the closures that agree with odometry and each other, and note what speaks for and against each."""
+        poses = np.array([key.pose for key in keys]).reshape(-1, 3)
+        ties = [Tie(one.earlier, one.current, one.T_earlier_current, one.covariance) for one in found]
+        judgement = judged(poses, step_covariances(keys, self._settings), ties)
+        self.evidence = evidence_of(keys, found, judgement, refused)
+        return [closure for closure, kept in zip(found, judgement.kept, strict=True) if kept]
 
 
 def corrected(poses: FloatArray, times_ns: npt.NDArray[np.int64], correction: Correction) -> FloatArray:
@@ -62,6 +84,9 @@ def corrected(poses: FloatArray, times_ns: npt.NDArray[np.int64], correction: Co
     for first in range(0, len(poses), _BLOCK):
         rows = slice(first, first + _BLOCK)
         out[rows][:, _PLANAR] = _planar(poses[rows], times_ns[rows], correction)
+    if correction.raised_m is not None:
+        since = (times_ns - correction.times_ns[0]).astype(float)
+        out[:, 2] += np.interp(since, (correction.times_ns - correction.times_ns[0]).astype(float), correction.raised_m)
     return out
 
 

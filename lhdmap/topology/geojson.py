@@ -275,7 +275,8 @@ def _points(coordinates: Any) -> FloatArray:
 
 
 def _read_pose(point: Any, heading_deg: float) -> FloatArray:
-    return np.array([*map(float, point), math.radians(heading_deg)])
+    x, y, z = map(float, point)
+    return np.array([x, y, z, math.radians(heading_deg)])
 
 
 def _rounded(values: FloatArray) -> Any:

@@ -48,6 +48,12 @@ def limited(topology: TopologicalMap) -> TopologicalMap:
     return replace(topology, waypoints=(replace(topology.waypoints[0], speed_limit_kmh=20.0),))
 
 
+def stub(topology: TopologicalMap) -> TopologicalMap:
+    """T3 is 8 m long, and nothing is done in it."""
+    passed = replace(topology, waypoints=(replace(topology.waypoints[0], purpose="pass"),))
+    return tunnel("t3", line_m=np.array([[0.0, -6.0, 0.0], [0.0, -14.0, 0.0]]))(passed)
+
+
 def lone(topology: TopologicalMap) -> TopologicalMap:
     """A tunnel that nothing joins."""
     line = np.array([[0.0, 200.0, 0.0], [40.0, 200.0, 0.0]])
@@ -86,7 +92,7 @@ def test_a_sound_map_has_no_findings() -> None:
         (connected("i2.t1", "i2.t2", feasible=False), "warning", "inversion", "i2.t1:i2.t2", "no inversion at I2"),
         (connected("t3.start", "w1", feasible=False), "error", "reach", "T3", ""),
         (lone, "error", "reach", "T9", "nothing joins it"),
-        (tunnel("t3", line_m=np.array([[0.0, -6.0, 0.0], [0.0, -14.0, 0.0]])), "warning", "inversion", "T3", "8.0 m"),
+        (stub, "warning", "inversion", "T3", "8.0 m"),
     ],
 )
 def test_each_fault_is_found(change: Change, severity: str, rule: str, where: str, told: str) -> None:
@@ -147,6 +153,28 @@ def test_settings_say_what_is_wanted() -> None:
 def test_a_closed_tunnel_is_no_fault_of_the_map() -> None:
     found = [(one.severity, one.rule) for one in topology_findings(tunnel("t2", closed=True)(ladder()))]
     assert found == [("note", "closed"), ("note", "heading")]  # without the ring nothing turns the machine
+
+
+def test_parallel_connections_are_no_fault() -> None:
+    topology = connected("i1.t1", "i1.t3", closed=True)(connected("i1.t2", "i1.t3", closed=True)(ladder()))
+    twice = replace(topology, connections=(*topology.connections, *topology.connections))
+    once = list(topology_findings(topology))
+    assert any(one.rule == "reach" for one in once)
+    assert {(one.rule, one.where) for one in topology_findings(twice)} == {(one.rule, one.where) for one in once}
+
+
+def test_the_machine_is_that_of_the_file_or_of_the_map(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    wide = tmp_path / "wide.toml"
+    wide.write_text('name = "wide"\n[dimensions]\nwidth_m = 4.2\nlength_m = 30.0\n', encoding="utf-8")
+    path = str(map_folder(tmp_path / "map"))
+    assert main(["check-map", path, "--machine", str(wide)]) == 0
+    text = capsys.readouterr().out
+    assert "narrow       T1: 4.50 m wide" in text
+    assert text.startswith("ready: 0 errors, 3 warnings")
+    with MapFolderWriter(tmp_path / "other") as folder:
+        folder.write_json("topology.geojson", to_geojson(ladder()))
+        folder.complete(RunInfo(options={"request": {"machine": "wide"}}))
+    assert [one.rule for one in check_map(tmp_path / "other").findings] == ["machine", "landmarks"]
 
 
 def test_an_empty_map_is_not_ready() -> None:
