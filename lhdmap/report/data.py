@@ -56,8 +56,8 @@ class SlipSeries(NamedTuple):
 class ClosureRow(NamedTuple):
     """A place that was taken for one seen before: `from_m` and `to_m` (3,) are where base_link was in `map`, first and later.
 
-    `accepted`: whether the map was closed there; `residual_m` between the scans once matched; `information`: what the match
-    says in its weakest direction, 1/m²; `reason`: why it was refused, or what it was accepted for.
+    `accepted`: whether the map was closed there; `residual_m`: between what was measured there and the final map, NaN where
+    nothing was; `information`: what the match says in its weakest direction, 1/m²; `reason`: why it was refused.
     """
 
     from_m: FloatArray

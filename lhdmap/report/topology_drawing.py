@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING, Any
 
@@ -131,8 +132,8 @@ def draw_marks(axes: Axes, points_m: Sequence[FloatArray], marker: str, colour: 
 
 
 def draw_closures(axes: Axes, closures: Iterable[ClosureRow]) -> None:
-    """Draw loop closures as thin lines between the two places."""
-    rows = list(closures)
+    """Draw loop closures as thin lines between the two places; of those refused the ones that were measured."""
+    rows = [one for one in closures if one.accepted or math.isfinite(one.residual_m)][:MOST_MARKS]
     for accepted, colour, style, words in (
         (True, charts.TRUTH, "-", "loop closure"),
         (False, charts.FLAGGED, ":", "loop closure, refused"),

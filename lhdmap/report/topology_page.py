@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+from collections import Counter
 from collections.abc import Sequence
 
 import numpy as np
@@ -14,6 +16,7 @@ from lhdmap.report.topology_levels import Level, Levels, counted, summary
 from lhdmap.topology.model import DEAD_END, TopologicalMap, Tunnel
 
 MOST_LEVELS, MOST_ROWS = 12, 400
+_MOST_REASONS = 6
 _FOLDED = 12  # rows from which on a table is folded away
 _STATE = {"driven": "driven", "seen": "only seen", "closed": "closed"}
 
@@ -92,39 +95,50 @@ def _tunnel_row(one: Tunnel, names: dict[str, str]) -> Sequence[object]:
 
 
 def _table(
-    title: str, head: Sequence[str], rows: Sequence[Sequence[object]], count: int, numbers_from: int = 99
+    title: str,
+    head: Sequence[str],
+    rows: Sequence[Sequence[object]],
+    count: int,
+    numbers_from: int = 99,
+    numbers_to: int = 99,
+    file: str = "topology.geojson",
 ) -> str:
-    """Return a table with its title, a long one folded away; nothing where there are no rows."""
+    """Return a table with its title, a long one folded away; nothing where there are no rows. The `file` has all of them."""
     if not rows:
         return ""
-    table = markup.table(head, rows, numbers_from=numbers_from)
+    table = markup.table(head, rows, numbers_from=numbers_from, numbers_to=numbers_to)
     if count > len(rows):
-        table += markup.paragraph(f"{count - len(rows)} more stand in topology.geojson.")
+        table += markup.paragraph(f"{count - len(rows)} more stand in {file}.")
     folded = "" if len(rows) > _FOLDED else " open"
     return f"<details{folded}><summary>{title} ({count})</summary>\n{table}</details>\n"
 
 
 def closures(rows: Sequence[ClosureRow]) -> str:
-    """Return what is known of each place that was taken for one seen before."""
+    """Return what is known of places taken for ones seen before; where nothing was measured, the reason is counted."""
     if not rows:
         return ""
     accepted = sum(row.accepted for row in rows)
+    reasons = Counter(row.reason for row in rows if not row.accepted).most_common(_MOST_REASONS)
+    refused = "; ".join(f"{count} {reason or 'for no reason given'}" for reason, count in reasons)
+    words = f"{accepted} of {counted(len(rows), 'candidate')} accepted{f'. Refused: {refused}' if refused else ''}."
+    measured = [row for row in rows if row.accepted or math.isfinite(row.residual_m)]
     told = [
         (
             _place(row.from_m),
             _place(row.to_m),
-            f"{100.0 * row.residual_m:.1f}",
-            f"{row.information:.2g}",
+            _figure(100.0 * row.residual_m, ".1f"),
+            _figure(row.information, ".2g"),
             "yes" if row.accepted else "no",
             row.reason,
         )
-        for row in rows[:MOST_ROWS]
+        for row in measured[:MOST_ROWS]
     ]
     head = ("first: x y z, m", "later: x y z, m", "residual, cm", "information, 1/m²", "accepted", "reason")
-    words = f"{accepted} of {counted(len(rows), 'candidate')} accepted; those refused have not moved the map."
-    table = markup.table(head, told, numbers_from=0, numbers_to=5)
-    more = markup.paragraph(f"{len(rows) - len(told)} more are not shown.") if len(rows) > len(told) else ""
-    return markup.paragraph(words) + table + more
+    return markup.paragraph(words) + _table("Measured", head, told, len(measured), 0, 5, "closures.json")
+
+
+def _figure(value: float, form: str) -> str:
+    return format(value, form) if math.isfinite(value) else "–"
 
 
 def _place(point_m: Sequence[float] | np.ndarray) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -164,8 +165,9 @@ def _add_connections(writer: RecordingWriter, topology: TopologicalMap) -> None:
 
 
 def _add_closures(writer: RecordingWriter, closures: Sequence[ClosureRow]) -> None:
+    measured = [one for one in closures if one.accepted or math.isfinite(one.residual_m)]
     for accepted, name, rgba, drawn in _CLOSURES:
-        lines = [raised(np.array([one.from_m, one.to_m])) for one in closures if one.accepted == accepted]
+        lines = [raised(np.array([one.from_m, one.to_m])) for one in measured if one.accepted == accepted]
         if lines:
             _add_lines(writer, f"map/topology/closures/{name}", lines, rgba, 0.8)
             writer.explain(drawn, f"loop closure, {name}")

@@ -27,6 +27,8 @@ BASE = replace(report_data(scans=60, points=100), evaluation=None)
 CLOSURE = ClosureRow(np.array([0.0, 0.0, 0.0]), np.array([1.5, 0.5, 0.0]), True, 0.031, 2.5e4)
 REFUSED = CLOSURE._replace(accepted=False, reason="walls <alike> along the tunnel")
 
+UNMEASURED = REFUSED._replace(residual_m=float("nan"), information=float("nan"), reason="too far away")
+
 
 def drawn(topology: TopologicalMap, **more: object) -> str:
     with charts.styled():
@@ -144,11 +146,12 @@ def test_a_section_of_which_there_is_nothing_is_left_out(part: str) -> None:
 
 def test_closures_are_told_with_their_evidence() -> None:
     with charts.styled():
-        page = sections(replace(BASE, closures=[CLOSURE, REFUSED]))
-    assert "1 of 2 candidates accepted" in page
+        page = sections(replace(BASE, closures=[CLOSURE, REFUSED, UNMEASURED, UNMEASURED]))
+    assert "1 of 4 candidates accepted. Refused: 2 too far away; 1 walls &lt;alike&gt; along the tunnel." in page
     rows = [re.findall(r"<td[^>]*>([^<]*)</td>", row) for row in re.findall(r"<tr>(.*?)</tr>", page)]
     assert ["0.0 0.0 0.0", "1.5 0.5 0.0", "3.1", "2.5e+04", "yes", ""] in rows
     assert ["0.0 0.0 0.0", "1.5 0.5 0.0", "3.1", "2.5e+04", "no", "walls &lt;alike&gt; along the tunnel"] in rows
+    assert len(rows) == 3  # the head, and what was measured
 
 
 def test_a_drive_without_a_tunnel_says_so() -> None:
