@@ -119,7 +119,7 @@ def closures(rows: Sequence[ClosureRow]) -> str:
         return ""
     accepted = sum(row.accepted for row in rows)
     reasons = Counter(row.reason for row in rows if not row.accepted).most_common(_MOST_REASONS)
-    refused = "; ".join(f"{count} {reason or 'for no reason given'}" for reason, count in reasons)
+    refused = "; ".join(f"{reason or 'no reason given'} ({count})" for reason, count in reasons)
     words = f"{accepted} of {counted(len(rows), 'candidate')} accepted{f'. Refused: {refused}' if refused else ''}."
     measured = [row for row in rows if row.accepted or math.isfinite(row.residual_m)]
     told = [

@@ -147,7 +147,7 @@ def test_a_section_of_which_there_is_nothing_is_left_out(part: str) -> None:
 def test_closures_are_told_with_their_evidence() -> None:
     with charts.styled():
         page = sections(replace(BASE, closures=[CLOSURE, REFUSED, UNMEASURED, UNMEASURED]))
-    assert "1 of 4 candidates accepted. Refused: 2 too far away; 1 walls &lt;alike&gt; along the tunnel." in page
+    assert "1 of 4 candidates accepted. Refused: too far away (2); walls &lt;alike&gt; along the tunnel (1)." in page
     rows = [re.findall(r"<td[^>]*>([^<]*)</td>", row) for row in re.findall(r"<tr>(.*?)</tr>", page)]
     assert ["0.0 0.0 0.0", "1.5 0.5 0.0", "3.1", "2.5e+04", "yes", ""] in rows
     assert ["0.0 0.0 0.0", "1.5 0.5 0.0", "3.1", "2.5e+04", "no", "walls &lt;alike&gt; along the tunnel"] in rows
