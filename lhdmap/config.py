@@ -11,6 +11,7 @@ from typing import Any
 
 from lhdmap.errors import ConfigError
 from lhdmap.integration.integrator import IntegrationSettings
+from lhdmap.landmarks.settings import LandmarkSettings
 from lhdmap.movement.settings import MovementSettings
 from lhdmap.odometry.cloud_settings import CloudOdometrySettings
 from lhdmap.odometry.settings import AnchorSettings, OdometrySettings, RangeFlowSettings, SearchSettings
@@ -48,6 +49,7 @@ class Settings:
     integration: IntegrationSettings = field(default_factory=IntegrationSettings)
     smoothing: SmoothingSettings = field(default_factory=SmoothingSettings)
     topology: TopologySettings = field(default_factory=TopologySettings)
+    landmarks: LandmarkSettings = field(default_factory=LandmarkSettings)
     pile: PileSettings = field(default_factory=PileSettings)
     figure9: Figure9Constants = field(default_factory=Figure9Constants)
     figure9_repaired: RepairedConstants = field(default_factory=RepairedConstants)

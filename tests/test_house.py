@@ -40,6 +40,7 @@ FLOORS = [
     {"movement", "landmarks"},
     {"exports"},
     {"smoothing", "simulation", "evaluation"},
+    {"update"},
     {"report"},
     {"config"},
     {"pipeline"},

@@ -37,6 +37,7 @@ from lhdmap.runfolder import RunInfo
 from lhdmap.topology.edits import load_edits
 from lhdmap.topology.geojson import to_geojson
 from lhdmap.topology.sheet import write_sheets
+from lhdmap.topology.views_file import write_views
 from lhdmap.trajectory import Trajectory
 
 _ASKED = "interrupted: what was read so far is being written; Ctrl-C once more ends at once"
@@ -175,6 +176,7 @@ def _write(
         times_s = connection_times(outcome.topology.map, request.settings.movement)
         folder.write_json("topology.geojson", to_geojson(outcome.topology.map, times_s))
         folder.finished(write_sheets(folder.path / "free_space.npz", outcome.topology.sheets))
+        folder.finished(write_views(folder.path / "views.npz", list(outcome.pipeline.views)))
     try:
         spent = inspector.ask(Inspection.spent)
     except HelperDied as error:

@@ -21,7 +21,7 @@ def seen_of(pipeline: MappingPipeline, rows: Rows, piles_m: Sequence[FloatArray]
     """Return what a run saw along its final path `rows`; views beyond its ends are left out (given poses may be fewer)."""
     views = [view for view in pipeline.views if rows.times_ns[0] <= view.time_ns <= rows.times_ns[-1]]
     times = np.array([view.time_ns for view in views], dtype=np.int64)
-    chosen = _each_step(rows)
+    chosen = each_step(rows)
     path_ns = rows.times_ns[chosen]
     return Seen(
         views,
@@ -47,7 +47,7 @@ def counts_of(topology: Topology) -> dict[str, Any]:
     }
 
 
-def _each_step(rows: Rows) -> npt.NDArray[np.int64]:
+def each_step(rows: Rows) -> npt.NDArray[np.int64]:
     """Return the rows each quarter metre of a path, the first and the last among them."""
     steps = np.linalg.norm(np.diff(rows.poses[:, :2], axis=0), axis=1)
     travelled = np.concatenate([[0.0], np.cumsum(steps)])

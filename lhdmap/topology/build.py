@@ -38,7 +38,8 @@ _NARROW_M = 3.2  # tunnels of robots: finer cells
 class Seen(NamedTuple):
     """What a drive saw: views with their poses (N, 4: x, y, z, heading), its path (M, 4) each quarter metre with times (M,).
 
-    `said` (M): what the operator called each pose of the path, empty where nothing; `piles_m`: middles (3,) of piles found.
+    `said` (M): what the operator called each pose of the path, empty where nothing; `piles_m`: middles (3,) of piles found;
+    `weights` (N): how often each view counts.
     """
 
     views: Sequence[View]
@@ -48,6 +49,7 @@ class Seen(NamedTuple):
     said: Sequence[str]
     machine: Machine | None = None
     piles_m: Sequence[FloatArray] = ()
+    weights: npt.NDArray[np.int64] | None = None
 
 
 class Topology(NamedTuple):
@@ -112,7 +114,8 @@ def _sheet(seen: Seen, chosen: npt.NDArray[np.bool_], cell_m: float, settings: T
     rows = np.flatnonzero(chosen)
     fans = [(fan, number) for number, row in enumerate(rows.tolist()) for fan in seen.views[row].fans]
     of_fan = np.array([number for _, number in fans], dtype=np.int64)
-    return free_space([fan for fan, _ in fans], seen.view_poses[rows], of_fan, cell_m, settings)
+    weights = None if seen.weights is None else seen.weights[rows]
+    return free_space([fan for fan, _ in fans], seen.view_poses[rows], of_fan, cell_m, settings, weights)
 
 
 def _assembled(

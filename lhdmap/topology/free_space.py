@@ -27,15 +27,23 @@ _PULLED_CELLS = 0.7  # a beam is free up to so many cells before its hit
 
 
 def free_space(
-    fans: Sequence[Fan], poses: FloatArray, of_fan: npt.NDArray[np.int64], cell_m: float, settings: TopologySettings
+    fans: Sequence[Fan],
+    poses: FloatArray,
+    of_fan: npt.NDArray[np.int64],
+    cell_m: float,
+    settings: TopologySettings,
+    weights: npt.NDArray[np.int64] | None = None,
 ) -> Sheet:
-    """Return the grid of fans seen from poses (N, 4: x, y, z, heading) of the machine; `of_fan` (M,) is each fan's pose."""
+    """Return the grid of fans seen from poses (N, 4: x, y, z, heading) of the machine; `of_fan` (M,) is each fan's pose.
+
+    `weights` (N,): how often a pose's fans count; what was seen later tells more of what is there now.
+    """
     reach = settings.reach_m
     low = poses[:, :2].min(axis=0) - reach - 2.0
     size = np.ceil((poses[:, :2].max(axis=0) + reach + 2.0 - low) / cell_m).astype(int)
     free, walls = np.zeros((size[1], size[0]), np.uint16), np.zeros((size[1], size[0]), np.uint16)
     for fan, row in zip(fans, of_fan, strict=True):
-        _draw(fan, poses[row], low, cell_m, reach, free, walls)
+        _draw(fan, poses[row], (low, cell_m, reach), 1 if weights is None else int(weights[row]), free, walls)
     cells = np.full(free.shape, UNKNOWN, np.uint8)
     cells[free > 0] = FREE
     cells[walls > np.maximum(_WALL_SHARE * free, 0.0)] = OCCUPIED
@@ -47,13 +55,13 @@ def free_space(
 def _draw(
     fan: Fan,
     pose: FloatArray,
-    low_m: FloatArray,
-    cell_m: float,
-    reach_m: float,
+    grid: tuple[FloatArray, float, float],
+    weight: int,
     free: npt.NDArray[np.uint16],
     walls: npt.NDArray[np.uint16],
 ) -> None:
-    """Count a fan's free cells and its hits."""
+    """Count a fan's free cells and its hits; `grid`: corner (2,), size of a cell, how far is looked (m)."""
+    low_m, cell_m, reach_m = grid
     c, s = math.cos(pose[3]), math.sin(pose[3])
     R = np.array([[c, -s], [s, c]])
     beams = fan.hits_m[:, :2].astype(float) - fan.origin_m
@@ -71,14 +79,14 @@ def _draw(
     patch = np.zeros((size, size), np.uint8)
     for part in _parts(beams):
         ring = np.vstack([middle, ends[part]]) - 0.5
-        cv2.fillPoly(patch, [np.round(ring * (1 << _SHIFT)).astype(np.int32)], 1, shift=_SHIFT)
+        cv2.fillPoly(patch, [np.round(ring * (1 << _SHIFT)).astype(np.int32)], weight, shift=_SHIFT)
     rows, columns = slice(corner[1], corner[1] + size), slice(corner[0], corner[0] + size)
     _add(free, patch, rows, columns)
     near = ranges < reach_m
     hits = np.floor((origin + beams[near] @ R.T - low_m) / cell_m).astype(int)
     inside = ((hits >= 0) & (hits < [walls.shape[1], walls.shape[0]])).all(axis=1)
     hits = np.unique(hits[inside], axis=0)
-    walls[hits[:, 1], hits[:, 0]] += 1
+    walls[hits[:, 1], hits[:, 0]] += weight
 
 
 def _add(counts: npt.NDArray[np.uint16], patch: npt.NDArray[np.uint8], rows: slice, columns: slice) -> None:

@@ -30,6 +30,9 @@ FILES = {
     "diagnostics.parquet",
     "cloud.ply",
     "pile.json",
+    "topology.geojson",
+    "free_space.npz",
+    "views.npz",
     "recording.rrd",
     "report.html",
 }

@@ -5,6 +5,7 @@ A probe takes settings and runs the same small scenario with them. Two runs with
 
 from __future__ import annotations
 
+import functools
 import hashlib
 import json
 import tempfile
@@ -19,6 +20,8 @@ from lhdmap.cli.main import main
 from lhdmap.config import Settings, settings_toml
 from lhdmap.integration.cloud import Cloud
 from lhdmap.integration.cloud_io import write_cloud
+from lhdmap.landmarks.build import landmarks_of
+from lhdmap.landmarks.scans import NodeScan
 from lhdmap.machine import Machine
 from lhdmap.messages import FloatArray
 from lhdmap.movement.check import topology_findings
@@ -34,6 +37,7 @@ from lhdmap.rockbreaker.machine import Rockbreaker
 from lhdmap.simulation.grizzly import simulate_grizzly
 from lhdmap.smoothing.trust import expected_error
 
+from tests.landmarks.worlds import MODERATE, TunnelWorld, drive, tunnel
 from tests.movement.mines import fast_ladder
 from tests.report.synthetic import START_NS, report_data
 from tests.report.test_recording import read
@@ -197,6 +201,19 @@ def _untimed(values: Any) -> Any:
     return [_untimed(value) for value in values] if isinstance(values, list) else values
 
 
+@functools.cache
+def _taught() -> tuple[TunnelWorld, list[NodeScan]]:
+    world = tunnel(5, MODERATE, 44.0, bends=True, niches=True)
+    return world, drive(world, seed=1)
+
+
+def landmarks(settings: Settings) -> str:
+    """Return the digest of the landmarks of a tunnel with bends and niches."""
+    world, scans = _taught()
+    made = landmarks_of(scans, {"t": world.frame()}, {"t"}, settings.landmarks)
+    return digest(made, made.not_distinctive_m("t", settings.landmarks))
+
+
 def _mapped(stream: Callable[[], Stream], primary: Literal["front", "points"] = "front", *, own: bool = False) -> Probe:
     return lambda settings: run(settings, stream(), primary, own=own)
 
@@ -215,6 +232,7 @@ PROBES: dict[str, Probe] = {
     "returning": _mapped(streams.returning, "points"),
     "cut": _mapped(streams.cut, "points"),
     "lap": lap,
+    "landmarks": landmarks,
     "pile": pile,
     "recording": recording,
     "plan": plan,

@@ -12,6 +12,7 @@ from pathlib import Path
 os.environ.setdefault("OMP_NUM_THREADS", "1")
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
+from tools.bench.landmarks import landmark_figures
 from tools.bench.movement import movement_figures
 from tools.bench.rockbreaker import rockbreaker_figures
 from tools.bench.runs import build_figures, simulate, startup_figures
@@ -35,6 +36,7 @@ def measure(durations_s: tuple[float, ...]) -> Iterator[Figure]:
     stages = list(stage_figures())
     yield from stages
     yield from movement_figures()
+    yield from landmark_figures()
     yield from rockbreaker_figures(10_000 if durations_s[-1] > 60.0 else 1_000)
     with tempfile.TemporaryDirectory() as folder:
         logs = [simulate(Path(folder), duration_s) for duration_s in durations_s]

@@ -1,0 +1,292 @@
+"""`update-map` as a function: a map and another drive in, a new version of the map out; the old one stays as it is.
+
+drive -> its own map -> placed in the map (all headings and shifts) -> fitted scan by scan -> path, views, cloud of both
+-> topology -> difference
+"""
+
+from __future__ import annotations
+
+import tempfile
+import warnings
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from lhdmap.config import Settings, settings_table
+from lhdmap.errors import InputError, LhdmapWarning, UsageError
+from lhdmap.integration.cloud import Cloud
+from lhdmap.integration.cloud_io import read_cloud, write_cloud
+from lhdmap.machine import Machine
+from lhdmap.mapfolder import Diagnostics, MapFolder, MapFolderWriter
+from lhdmap.messages import FloatArray
+from lhdmap.outputs import free_folder
+from lhdmap.pipeline.build import BuildRequest, Progress, build_map
+from lhdmap.pipeline.topology import each_step
+from lhdmap.pipeline.track import Rows
+from lhdmap.provenance import file_entry
+from lhdmap.report.data import ReportData, Summary
+from lhdmap.report.page import write_report
+from lhdmap.runfolder import RunInfo
+from lhdmap.smoothing.smoother import Correction
+from lhdmap.topology.build import Seen, Topology, topology_of
+from lhdmap.topology.edits import load_edits
+from lhdmap.topology.files import read_topology
+from lhdmap.topology.geojson import to_geojson
+from lhdmap.topology.lookup import Lookup
+from lhdmap.topology.model import TopologicalMap
+from lhdmap.topology.sheet import Sheet, read_sheets, write_sheets
+from lhdmap.topology.views import View
+from lhdmap.topology.views_file import read_views, write_views
+from lhdmap.trajectory import Trajectory
+from lhdmap.update import fit, merge
+from lhdmap.update.difference import Walls, difference
+from lhdmap.update.place import placed
+
+_NEWER_WEIGHT = 4  # of what was seen later
+_LEAST_MARGIN = 0.08
+_NAMED_WITHIN_M = 3.0
+
+
+@dataclass(frozen=True, slots=True)
+class UpdateRequest:
+    """What is to be done: map, logs of one drive, the folder to make, settings, edits, `start` (3,): about where the drive begins.
+
+    `progress`, `topics`, `machine`, `force` as for `build_map`.
+    """
+
+    map: Path
+    logs: Sequence[Path]
+    target: Path
+    settings: Settings = field(default_factory=Settings)
+    topics: Mapping[str, str] = field(default_factory=dict)
+    machine: Machine | None = None
+    progress: Progress | None = None
+    edits: Path | None = None
+    start: FloatArray | None = None
+    force: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class UpdateResult:
+    """What came of it: the folder, its version, the difference report, warnings."""
+
+    folder: Path
+    version: int
+    difference: dict[str, Any]
+    warnings: list[str]
+
+
+@dataclass(frozen=True, slots=True)
+class _Map:
+    """What is read of a map folder."""
+
+    folder: MapFolder
+    trajectory: Trajectory
+    views: list[View]
+    sheets: list[Sheet]
+    topology: TopologicalMap
+    cloud: Cloud
+
+    @classmethod
+    def read(cls, path: Path) -> _Map:
+        """Read a map folder; raises InputError where something is missing that `build-map` writes today."""
+        folder = MapFolder.open(path)
+        return cls(
+            folder,
+            folder.trajectory(),
+            read_views(folder.file("views.npz")),
+            read_sheets(folder.file("free_space.npz")),
+            read_topology(path),
+            read_cloud(folder.file("cloud.ply")),
+        )
+
+    @property
+    def seen(self) -> fit.Seen:
+        """Views and their poses."""
+        return fit.Seen(self.views, merge.view_poses(self.trajectory, self.views))
+
+
+def update_map(request: UpdateRequest) -> UpdateResult:
+    """Add a drive to a map and write the new version.
+
+    Raises:
+        UsageError: the folder is there already, or is that of the old map.
+        InputError: the map or a log cannot be used, or the drive does not lie in the map.
+    """
+    inputs = [request.map, *request.logs]
+    if request.target.resolve() == request.map.resolve():
+        raise UsageError(f"{request.target}: a new version is a folder of its own; name another one with -o")
+    free_folder(request.target, force=request.force, inputs=inputs)
+    known = _Map.read(request.map)
+    with tempfile.TemporaryDirectory(prefix="lhdmap_drive_") as scratch:
+        drive_folder = Path(scratch) / "drive"
+        built = build_map(
+            BuildRequest(
+                request.logs, drive_folder, request.settings, request.topics, request.machine, request.progress
+            )
+        )
+        drive = _Map.read(drive_folder)
+        correction = _in_the_map(known, drive, request)
+        with MapFolderWriter(request.target, force=request.force, inputs=inputs) as folder:
+            return _written(folder, request, known, drive, correction, built.warnings)
+
+
+def _in_the_map(known: _Map, drive: _Map, request: UpdateRequest) -> Correction:
+    """Return how the drive is to be moved into the map's frame."""
+    log = request.logs[0]
+    place = placed(known.sheets, drive.sheets[0], request.start)
+    if place is None:
+        raise InputError(
+            f"{log}: its walls are nowhere in {request.map}; say where it begins with --start, or build it apart"
+        )
+    if place.margin < _LEAST_MARGIN and request.start is None:
+        raise InputError(
+            f"{log}: two places of {request.map} look alike to it (the second {100 * place.margin:.0f} % worse); "
+            "say where it begins with --start X,Y,HEADING_DEG"
+        )
+    found = fit.fitted(known.seen, drive.seen, place.T_map_drive, request.settings.smoothing)
+    if found is None:
+        raise InputError(f"{log}: its scans do not fit the walls of {request.map}; build it apart")
+    if found.tied < 0.2 * found.keys:
+        warnings.warn(
+            f"{log}: only {found.tied} of {found.keys} places of the drive are held by the map's walls",
+            LhdmapWarning,
+            stacklevel=2,
+        )
+    return found.correction
+
+
+def _written(
+    folder: MapFolderWriter,
+    request: UpdateRequest,
+    known: _Map,
+    drive: _Map,
+    correction: Correction,
+    remarks: list[str],
+) -> UpdateResult:
+    """Write the new version from both."""
+    moved = merge.moved_trajectory(drive.trajectory, correction)
+    final = _both(known.trajectory, moved)
+    views, seen = _seen(known, drive, moved, request)
+    topology = topology_of(seen, request.settings.topology, load_edits(request.edits))
+    version = known.topology.version + 1
+    newer = replace(topology.map, version=version, registration=known.topology.registration)
+    table, walls = difference(known.topology, newer, (known.sheets, topology.sheets))
+    went = np.concatenate([np.zeros((0, 2)), *(one.went_m for one in walls)])
+    cloud = merge.joined_clouds(known.cloud, merge.moved_cloud(drive.cloud, correction), went, seen.path)
+    _write_files(folder, known, drive, final, views, (newer, topology), cloud, table)
+    distance_m = float(np.linalg.norm(np.diff(final.positions_m, axis=0), axis=1).sum())
+    counts = {
+        "map_version": version,
+        "scans": len(final.stamps_ns),
+        "distance_m": distance_m,
+        "tied": correction.closures,
+        "tunnels": len(newer.tunnels),
+        "intersections": len(newer.intersections),
+    }
+    _write_pictures(folder, request, newer, topology, walls, cloud, final, counts, remarks)
+    info = RunInfo(
+        request.logs,
+        {**settings_table(request.settings), "request": {"update_of": _entry(known)}},
+        counts,
+        remarks,
+        {},
+        {"version": version, "previous": _entry(known), "earlier_sources": known.folder.info.get("sources", [])},
+    )
+    return UpdateResult(folder.complete(info), version, table, remarks)
+
+
+def _seen(known: _Map, drive: _Map, moved: Trajectory, request: UpdateRequest) -> tuple[list[View], Seen]:
+    """Return the views of both, and what the topology is made of: names stay, the newer views tell more."""
+    views = [*known.views, *drive.views]
+    poses = np.vstack([known.seen.poses, merge.view_poses(moved, drive.views)])
+    paths = [_path(known.trajectory), _path(moved)]
+    lookup = Lookup(known.topology)
+    said = [*lookup.names_at(paths[0][0][:, :3]), *lookup.names_at(paths[1][0][:, :3], _NAMED_WITHIN_M)]
+    weights = np.concatenate([np.ones(len(known.views)), np.full(len(drive.views), _NEWER_WEIGHT)]).astype(np.int64)
+    path = np.vstack([paths[0][0], paths[1][0]])
+    times = np.concatenate([paths[0][1], paths[1][1]])
+    return views, Seen(views, poses, path, times, said, request.machine, [], weights)
+
+
+def _path(trajectory: Trajectory) -> tuple[FloatArray, npt.NDArray[np.int64]]:
+    """Return a trajectory each quarter metre: poses (M, 4) and times (M,)."""
+    rows = Rows(trajectory.stamps_ns, merge.poses_of(trajectory))
+    chosen = each_step(rows)
+    return rows.poses[chosen][:, merge.PLANAR_AND_HEIGHT], rows.times_ns[chosen]
+
+
+def _write_files(
+    folder: MapFolderWriter,
+    known: _Map,
+    drive: _Map,
+    final: Trajectory,
+    views: list[View],
+    found: tuple[TopologicalMap, Topology],
+    cloud: Cloud,
+    table: dict[str, Any],
+) -> None:
+    newer, topology = found
+    folder.write_trajectory(final)
+    folder.write_odometry(_both(known.folder.odometry(), drive.folder.odometry()))
+    folder.write_diagnostics(_diagnostics(known.folder.diagnostics(), drive.folder.diagnostics()))
+    write_cloud(folder.path / "cloud.ply", cloud)
+    folder.finished(folder.path / "cloud.ply")
+    folder.write_json("topology.geojson", to_geojson(newer))
+    folder.finished(write_sheets(folder.path / "free_space.npz", topology.sheets))
+    folder.finished(write_views(folder.path / "views.npz", views))
+    folder.write_json("difference.json", table)
+    for one in (drive.folder, known.folder):  # the newer drive's pile, where it looked for one
+        if (one.path / "pile.json").is_file():
+            folder.write_json("pile.json", one.json("pile.json"))
+            break
+
+
+def _write_pictures(
+    folder: MapFolderWriter,
+    request: UpdateRequest,
+    newer: TopologicalMap,
+    topology: Topology,
+    walls: list[Walls],
+    cloud: Cloud,
+    final: Trajectory,
+    counts: dict[str, Any],
+    remarks: list[str],
+) -> None:
+    from lhdmap.report.difference_chart import difference_svg
+
+    path = folder.path / "difference.svg"
+    path.write_text(difference_svg(newer, topology.sheets, walls), encoding="utf-8")
+    folder.finished(path)
+    summary = Summary(counts["scans"], counts["scans"], 0.0, counts["distance_m"])
+    report = ReportData(
+        request.target.name, summary, [], final, cloud=cloud, pile_reason="see pile.json", warnings=remarks
+    )
+    write_report(report, folder.path / "report.html")
+    folder.finished(folder.path / "report.html")
+
+
+def _both(first: Trajectory, second: Trajectory) -> Trajectory:
+    """Return both trajectories in the order of time."""
+    stamps = np.concatenate([first.stamps_ns, second.stamps_ns])
+    order = np.argsort(stamps, kind="stable")
+    positions = np.vstack([first.positions_m, second.positions_m])
+    return Trajectory(
+        stamps[order], positions[order], np.vstack([first.quaternions_xyzw, second.quaternions_xyzw])[order]
+    )
+
+
+def _diagnostics(first: Diagnostics, second: Diagnostics) -> Diagnostics:
+    columns: dict[str, Any] = {}
+    for name, a, b in zip(Diagnostics._fields, first, second, strict=True):
+        columns[name] = None if a is None or b is None else np.concatenate([np.asarray(a), np.asarray(b)])
+    return Diagnostics(**columns)
+
+
+def _entry(known: _Map) -> dict[str, Any]:
+    file = known.folder.file("topology.geojson")
+    return {"map": str(known.folder.path.name), "version": known.topology.version, "topology": file_entry(file)}

@@ -1,0 +1,1 @@
+"""A map and another drive: where the drive lies in the map, both as one map, and what has changed."""

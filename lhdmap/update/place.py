@@ -1,0 +1,155 @@
+"""Where a drive lies in a map, from nothing: its walls are laid over the map's in all headings and shifts.
+
+For each heading one correlation (FFT) of the map's field (walls count for, free room against) with the drive's walls tells the
+score of all shifts. The best place has to be better than the second best elsewhere by a margin; it is then refined scan by scan
+(`lhdmap.update.fit`).
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+from scipy.fft import irfft2, next_fast_len, rfft2
+
+from lhdmap.messages import FloatArray
+from lhdmap.topology.sheet import FREE, OCCUPIED, Sheet
+
+_CELL_M = 0.4
+_STEP_RAD = math.radians(2.0)
+_FREE_COSTS = 0.6
+_APART_M, _APART_RAD = 5.0, math.radians(20.0)
+_LEAST_SCORE = 0.25  # of the drive's walls: less is chance
+
+
+class Placed(NamedTuple):
+    """A place of a drive in a map: `T_map_drive` (3,) and the number of the map's sheet.
+
+    `score`: share of the drive's walls that are the map's, less what contradicts; `margin`: by what share of the score the next
+    best place is worse.
+    """
+
+    T_map_drive: FloatArray
+    score: float
+    margin: float
+    sheet: int
+
+
+def placed(sheets: list[Sheet], drive: Sheet, start: FloatArray | None = None) -> Placed | None:
+    """Return where a drive's sheet lies best in a map's sheets, None where it is nowhere.
+
+    `start` (3,): about where its first pose is, where somebody knows; then only places within 10 m and 20° are looked at.
+    """
+    walls = drive.middles_m(np.argwhere(drive.cells == OCCUPIED))
+    if len(walls) < 50:
+        return None
+    found = [_best(sheet, walls, start, number) for number, sheet in enumerate(sheets)]
+    best = max(found, key=lambda one: one.score)
+    others = [one.score for one in found if one is not best]
+    margin = min([best.margin, *(1.0 - other / max(best.score, 1e-9) for other in others)])
+    return None if best.score < _LEAST_SCORE else best._replace(margin=margin)
+
+
+def _best(sheet: Sheet, walls: FloatArray, start: FloatArray | None, number: int) -> Placed:
+    """Return the best place of walls (N, 2) in one sheet of the map."""
+    field = _field(sheet)
+    centre = walls.mean(axis=0)
+    radius = float(np.linalg.norm(walls - centre, axis=1).max())
+    size = int(2 * radius / _CELL_M) + 3
+    shape = tuple(next_fast_len(extent + size) for extent in field.shape)
+    spectrum = rfft2(field, shape)
+    scored: list[tuple[float, FloatArray]] = []
+    for heading in _headings(start):
+        scores = _scores(spectrum, shape, walls - centre, heading, size)
+        for row, column in _peaks(scores, 3):
+            # Shifts to before the field's first cell wrap around to the end.
+            first = [
+                at - extent * (at >= wide) for at, extent, wide in zip((row, column), shape, field.shape, strict=True)
+            ]
+            shift = sheet.origin_m + _CELL_M * (np.array(first[::-1]) + size // 2 + 0.5)
+            pose = _pose(shift, centre, heading)
+            if start is None or _is_near(pose, start):
+                scored.append((float(scores[row, column]), pose))
+    if not scored:
+        return Placed(np.zeros(3), 0.0, 0.0, number)
+    scored.sort(key=lambda one: -one[0])
+    score, pose = scored[0]
+    second = next((s for s, other in scored if not _same(other, pose, centre)), 0.0)
+    return Placed(pose, score, 1.0 - max(second, 0.0) / max(score, 1e-9), number)
+
+
+def _field(sheet: Sheet) -> npt.NDArray[np.float32]:
+    """Return the map's field in coarse cells: 1 at walls, negative in free room away from them."""
+    factor = _CELL_M / sheet.cell_m
+    size = (int(sheet.cells.shape[1] / factor) + 1, int(sheet.cells.shape[0] / factor) + 1)
+    walls = _shrunk(sheet.cells == OCCUPIED, size, factor)
+    free = _shrunk(sheet.cells == FREE, size, factor)
+    near = cv2.dilate(walls, np.ones((3, 3), np.uint8))
+    field = near.astype(np.float32)
+    field[(near == 0) & (free > 0)] = -_FREE_COSTS
+    return field
+
+
+def _shrunk(cells: npt.NDArray[np.bool_], size: tuple[int, int], factor: float) -> npt.NDArray[np.uint8]:
+    rows, columns = np.nonzero(cells)
+    out = np.zeros((size[1], size[0]), np.uint8)
+    out[(rows / factor).astype(int), (columns / factor).astype(int)] = 1
+    return out
+
+
+def _headings(start: FloatArray | None) -> FloatArray:
+    if start is None:
+        return np.arange(0.0, 2.0 * math.pi, _STEP_RAD)
+    return start[2] + np.arange(-10, 11) * _STEP_RAD
+
+
+def _scores(
+    spectrum: npt.NDArray[np.complex64], shape: tuple[int, ...], walls: FloatArray, heading: float, size: int
+) -> FloatArray:
+    """Return the mean of the field under the walls for each shift of their middle."""
+    c, s = math.cos(heading), math.sin(heading)
+    turned = walls @ np.array([[c, s], [-s, c]])
+    cells = np.floor(turned / _CELL_M).astype(int) + size // 2
+    kernel = np.zeros((size, size), np.float32)
+    kernel[cells[:, 1].clip(0, size - 1), cells[:, 0].clip(0, size - 1)] = 1.0
+    total = float(kernel.sum())
+    scores: FloatArray = irfft2(spectrum * np.conj(rfft2(kernel, shape)), shape) / total
+    return scores
+
+
+def _peaks(scores: FloatArray, count: int) -> list[tuple[int, int]]:
+    """Return the places of the highest scores, a few metres apart; shifts beyond the field wrap to negative ones."""
+    work, found = scores.copy(), []
+    reach = int(_APART_M / _CELL_M)
+    for _ in range(count):
+        row, column = np.unravel_index(int(work.argmax()), work.shape)
+        found.append((int(row), int(column)))
+        work[max(row - reach, 0) : row + reach, max(column - reach, 0) : column + reach] = -1.0
+    return found
+
+
+def _pose(middle_m: FloatArray, centre: FloatArray, heading: float) -> FloatArray:
+    c, s = math.cos(heading), math.sin(heading)
+    x = middle_m[0] - (c * centre[0] - s * centre[1])
+    y = middle_m[1] - (s * centre[0] + c * centre[1])
+    return np.array([x, y, math.remainder(heading, 2.0 * math.pi)])
+
+
+def _is_near(pose: FloatArray, start: FloatArray) -> bool:
+    turn = abs(math.remainder(pose[2] - start[2], 2.0 * math.pi))
+    return math.hypot(pose[0] - start[0], pose[1] - start[1]) < 10.0 and turn < _APART_RAD
+
+
+def _same(a: FloatArray, b: FloatArray, centre: FloatArray) -> bool:
+    """Return whether two placings put the drive's middle at one place, with about one heading."""
+    turn = abs(math.remainder(a[2] - b[2], 2.0 * math.pi))
+    apart = _moved(a, centre) - _moved(b, centre)
+    return turn < _APART_RAD and float(np.hypot(*apart)) < 2.0 * _APART_M
+
+
+def _moved(pose: FloatArray, point: FloatArray) -> FloatArray:
+    c, s = math.cos(pose[2]), math.sin(pose[2])
+    return np.array([pose[0] + c * point[0] - s * point[1], pose[1] + s * point[0] + c * point[1]])
