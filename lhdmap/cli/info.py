@@ -117,7 +117,7 @@ def _result_lines(folder: Path) -> list[str]:
     """Return what the run found, of its own JSON files."""
     import json
 
-    lines = []
+    lines = _topology_lines(folder)
     for name, line_of in _RESULTS.items():
         if not (folder / name).is_file():
             continue
@@ -128,6 +128,21 @@ def _result_lines(folder: Path) -> list[str]:
             continue
         lines.append(line_of(found))
     return lines
+
+
+def _topology_lines(folder: Path) -> list[str]:
+    from lhdmap.errors import InputError
+    from lhdmap.report.topology_levels import summary
+    from lhdmap.topology.files import NAME, read_topology
+    from lhdmap.topology.sheet import read_sheets
+
+    if not (folder / NAME).is_file():
+        return []
+    sheets = folder / "free_space.npz"
+    try:
+        return [f"topology     {summary(read_topology(folder), read_sheets(sheets) if sheets.is_file() else ())}"]
+    except InputError:
+        return ["topology     not readable"]
 
 
 def _pile_line(found: Mapping[str, Any]) -> str:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 from lhdmap.cli.console import Console
 from lhdmap.cli.options import add_settings
 from lhdmap.errors import EvaluationShortfall
+from lhdmap.outputs import OutputFiles, free_files
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -16,6 +17,7 @@ if TYPE_CHECKING:
     from lhdmap.movement.route import Route, Step
     from lhdmap.topology.model import TopologicalMap
 
+PICTURES = (".svg", ".png", ".rrd")
 _HEADING = "along or against the heading of the point, or degrees in the map"
 
 
@@ -32,7 +34,18 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--avoid", action="append", default=[], metavar="NAME", help="point, node, or A:B not to pass; repeatable"
     )
     parser.add_argument("--loaded", action="store_true", help="with a full bucket: its speed limit")
+    parser.add_argument(
+        "--picture", type=_picture, metavar="FILE", help="draw the route: .svg, .png, or .rrd for Rerun"
+    )
+    parser.add_argument("--force", action="store_true", help="replace an existing picture")
     add_settings(parser, ["movement"])
+
+
+def _picture(text: str) -> Path:
+    path = Path(text)
+    if path.suffix.lower() not in PICTURES:
+        raise argparse.ArgumentTypeError(f"'{text}': a name that ends in {', '.join(PICTURES)} was wanted")
+    return path
 
 
 def run(arguments: argparse.Namespace, console: Console) -> int:
@@ -42,13 +55,37 @@ def run(arguments: argparse.Namespace, console: Console) -> int:
     from lhdmap.movement.routes import RouteOptions, route
     from lhdmap.topology.files import read_topology
 
+    if arguments.picture is not None:
+        free_files([arguments.picture], force=arguments.force, inputs=[arguments.map])
     settings = load_settings(arguments.config, arguments.set).movement
     topology = read_topology(arguments.map)
     options = RouteOptions(arguments.heading, arguments.goal_heading, tuple(arguments.avoid))
     found = route(topology, arguments.start, arguments.goal, options, settings, loaded=arguments.loaded)
+    if arguments.picture is not None and found.feasible:
+        _draw(arguments, topology, found)
+        console.note(f"picture: {arguments.picture}")
     failure = None if found.feasible else EvaluationShortfall(f"no route: {found.reason}")
     console.result(route_json(found), _text(arguments, found, topology), failure=failure)
     return 0 if failure is None else failure.exit_code
+
+
+def _draw(arguments: argparse.Namespace, topology: TopologicalMap, route: Route) -> None:
+    """Draw the route over the map, with the free space where the map folder has it."""
+    from lhdmap.report import charts
+    from lhdmap.report.topology_charts import route_figure
+    from lhdmap.report.topology_recording import write_topology_recording
+    from lhdmap.topology.sheet import read_sheets
+
+    target: Path = arguments.picture
+    sheets = arguments.map / "free_space.npz"
+    with OutputFiles(target, force=arguments.force, inputs=[arguments.map]) as files:
+        if target.suffix.lower() == ".rrd":
+            title = f"{arguments.start} to {arguments.goal}"
+            write_topology_recording(files.at(target), title, topology, route.states)
+            return
+        with charts.styled():
+            figure = route_figure(topology, route.states, read_sheets(sheets) if sheets.is_file() else ())
+            charts.write_figure(figure, files.at(target), target.suffix.lower()[1:])
 
 
 def _text(arguments: argparse.Namespace, route: Route, topology: TopologicalMap) -> str:

@@ -32,7 +32,9 @@ RECORDINGS = ("recording.rrd", "pile.rrd")
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the options of `lhdmap view`."""
-    parser.add_argument("path", type=Path, metavar="PATH", help="map or run folder, recording (.rrd) or log")
+    parser.add_argument(
+        "path", type=Path, metavar="PATH", help="map or run folder, topology.geojson, recording (.rrd) or log"
+    )
     how = parser.add_mutually_exclusive_group()
     how.add_argument("--web", action="store_true", help="serve to a browser on this machine until interrupted")
     how.add_argument("--screenshot", type=Path, metavar="PNG", help="no window: write a picture of the viewer")
@@ -92,6 +94,8 @@ def _recording(arguments: argparse.Namespace, folder: Path, console: Console) ->
     path: Path = arguments.path
     if path.suffix == ".rrd" and path.is_file():
         return path
+    if path.suffix == ".geojson":
+        return _recorded_topology(path, folder)
     if path.is_dir():
         found = recording_of(path)
         if found is not None:
@@ -110,6 +114,15 @@ def recording_of(folder: Path) -> Path | None:
         if found:
             return found[0]
     return None
+
+
+def _recorded_topology(path: Path, folder: Path) -> Path:
+    from lhdmap.report.topology_recording import write_topology_recording
+    from lhdmap.topology.files import read_topology
+
+    target = folder / "topology.rrd"
+    write_topology_recording(target, name_of(path), read_topology(path))
+    return target
 
 
 def _recorded_log(arguments: argparse.Namespace, folder: Path, console: Console) -> Path:

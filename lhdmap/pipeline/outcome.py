@@ -23,6 +23,7 @@ from lhdmap.messages import FloatArray, Joints, LaserScan, PointCloud
 from lhdmap.names import name_of
 from lhdmap.pile.result import PileReport
 from lhdmap.pipeline.beside import HelperDied
+from lhdmap.pipeline.closures import closure_rows
 from lhdmap.pipeline.given import GROUND_TRUTH
 from lhdmap.pipeline.identify import identify_along
 from lhdmap.pipeline.landmarks import landmarks_for, with_stretches
@@ -218,6 +219,9 @@ class Outcome:
             has_inclinometer=self.pipeline.has_inclinometer,
             pile=self.pile,
             pile_reason=self.pile_reason,
+            topology=None if self.topology is None else self.topology.map,
+            sheets=() if self.topology is None else self.topology.sheets,
+            closures=closure_rows(self.pipeline.smoother.evidence, self.ways.rows),
             warnings=self.warnings,
             settings_text=settings_toml(inputs.settings),
             provenance={"log": ", ".join(name_of(path) for path in inputs.logs)} | _given(inputs),

@@ -14,9 +14,14 @@ import numpy.typing as npt
 from lhdmap.mapfolder import Diagnostics
 from lhdmap.messages import FloatArray
 from lhdmap.report.data import AngleSeries, ReportData, SpeedSeries
+from lhdmap.report.topology_levels import coarser
 from lhdmap.trajectory import Trajectory
 
 MOST_ROWS = 100_000  # more than an hour of scans at 25 Hz
+MOST_CELLS, MOST_CLOSURES = (
+    2000,
+    5000,
+)  # to a side of a sheet; the topology itself grows with the mine, not with the log
 Indices = npt.NDArray[np.int64]
 _Series = TypeVar("_Series", SpeedSeries, AngleSeries)
 
@@ -31,6 +36,8 @@ def bounded(data: ReportData, most: int = MOST_ROWS) -> ReportData:
         odometry_speed=_extremes(data.odometry_speed, most),
         tachometer_speed=_extremes(data.tachometer_speed, most),
         articulation=_extremes(data.articulation, most),
+        sheets=[coarser(sheet, MOST_CELLS) for sheet in data.sheets],
+        closures=data.closures[:MOST_CLOSURES],
     )
 
 

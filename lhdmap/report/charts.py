@@ -5,6 +5,7 @@ from __future__ import annotations
 import base64
 import importlib
 import io
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -19,6 +20,7 @@ if TYPE_CHECKING:
 FINAL, ODOMETRY, TRUTH, WHEELS, FLAGGED = "#2f86c9", "#e69f00", "#009e73", "#d55e00", "#cc79a7"
 """Okabe and Ito's colours, which differ for colour-blind eyes too; the blue a little lighter for dark ground."""
 WIDTH_IN = 9.4
+_PNG_DPI = 150
 Reals = npt.NDArray[np.floating[Any]]
 INK = "#010203"
 _STYLE = (
@@ -74,11 +76,23 @@ def new_figure(height_in: float, *, right_in: float = 0.12) -> Figure:
 
 def svg_uri(figure: Figure) -> str:
     """Return the figure as a data URI; its ink follows the reader's light or dark setting."""
+    return "data:image/svg+xml;base64," + base64.b64encode(svg_text(figure).encode()).decode("ascii")
+
+
+def svg_text(figure: Figure) -> str:
+    """Return the figure as SVG; its ink follows the reader's light or dark setting."""
     buffer = io.StringIO()
     figure.savefig(buffer, format="svg", metadata={"Date": None, "Creator": None})
     svg = buffer.getvalue().replace(INK, "currentColor").replace("font-family: 'DejaVu Sans'", "")
-    svg = svg[svg.index("<svg") :].replace("<defs>", _STYLE + "<defs>", 1)
-    return "data:image/svg+xml;base64," + base64.b64encode(svg.encode()).decode("ascii")
+    return svg[svg.index("<svg") :].replace("<defs>", _STYLE + "<defs>", 1)
+
+
+def write_figure(figure: Figure, path: Path, kind: str) -> None:
+    """Write a figure as `svg` or `png`, the latter on white ground."""
+    if kind == "svg":
+        path.write_text(svg_text(figure), encoding="utf-8")
+    else:
+        figure.savefig(path, format="png", dpi=_PNG_DPI, facecolor="white")
 
 
 def plan_height_in(points_m: Reals, least: float = 2.2, most: float = 6.5) -> float:

@@ -14,6 +14,8 @@ from lhdmap.integration.cloud import Cloud
 from lhdmap.mapfolder import Diagnostics
 from lhdmap.messages import FloatArray
 from lhdmap.pile.result import PileReport
+from lhdmap.topology.model import TopologicalMap
+from lhdmap.topology.sheet import Sheet
 from lhdmap.trajectory import Trajectory
 
 STANDS_MPS = 0.2
@@ -51,6 +53,28 @@ class SlipSeries(NamedTuple):
     share: FloatArray
 
 
+class ClosureRow(NamedTuple):
+    """A place that was taken for one seen before: `from_m` and `to_m` (3,) are where base_link was in `map`, first and later.
+
+    `accepted`: whether the map was closed there; `residual_m`: between what was measured there and the final map, NaN where
+    nothing was; `information`: what the match says in its weakest direction, 1/m²; `reason`: why it was refused.
+    """
+
+    from_m: FloatArray
+    to_m: FloatArray
+    accepted: bool
+    residual_m: float
+    information: float
+    reason: str = ""
+
+
+class Picture(NamedTuple):
+    """A picture that is drawn already: a data URI (`charts.svg_uri`) and its caption."""
+
+    uri: str
+    caption: str
+
+
 @dataclass(frozen=True, slots=True)
 class Summary:
     """The headline figures; the names are those of `build-map --json`."""
@@ -74,7 +98,8 @@ class ReportData:
     """All that the HTML page shows; each part that is None or empty is said in words.
 
     `witness`: which sensors told of the motion beside the scans (empty: none); `poses`: where given poses came from (empty: the
-    path is that of the odometry); `pile_reason`: why no pile was looked for.
+    path is that of the odometry); `pile_reason`: why no pile was looked for. `sheets`: free space of the levels of `topology`;
+    `closures`: places recognised, also those refused; `landmark_pictures`: heat maps of the landmarks.
     """
 
     title: str
@@ -91,6 +116,10 @@ class ReportData:
     has_inclinometer: bool = True
     pile: PileReport | None = None
     pile_reason: str = ""
+    topology: TopologicalMap | None = None
+    sheets: Sequence[Sheet] = ()
+    closures: Sequence[ClosureRow] = ()
+    landmark_pictures: Sequence[Picture] = ()
     witness: str = ""
     poses: str = ""
     warnings: Sequence[str] = ()

@@ -18,6 +18,11 @@ class Term(NamedTuple):
 
 TERMS = (
     Term(
+        "access point",
+        "Where a node of the topology ends, facing outward. Two nodes meet where their access points are one place, facing each "
+        "other.",
+    ),
+    Term(
         "adaptive rate",
         "Scans are matched only when the machine has moved far enough for one to tell something new; the others get their pose "
         "from the motion between.",
@@ -33,6 +38,12 @@ TERMS = (
         "left, z up.",
     ),
     Term("boulder", "A rock that stands out of the face by more than 0.28 m and is too large for loose rubble."),
+    Term(
+        "connection",
+        "A way within one node of the topology, between two of its points, with its length, least radius and room. Infeasible: "
+        "the machine cannot drive it; closed: an operator has closed it.",
+        r"\bconnections?\b",
+    ),
     Term(
         "degenerate",
         "Said of a scan that does not show the motion in one direction: between two smooth parallel walls every place along them "
@@ -69,8 +80,17 @@ TERMS = (
         r"\binformation\b",
     ),
     Term(
+        "intersection",
+        "A node of the topology where three or more tunnels meet; its degree says how many.",
+    ),
+    Term(
         "key scan",
         "A scan that is kept, so that its place can be recognised when the machine comes there again.",
+    ),
+    Term(
+        "level",
+        "What of a mine lies at one height, and is drawn on one sheet; a ramp leads from one to another.",
+        r"\blevels?\b(?! (2D )?scanner| floor)",
     ),
     Term(
         "limits E_L, E_R",
@@ -130,7 +150,23 @@ TERMS = (
         "The share of a scan's hits that agree with the map once the scan is matched; a column of diagnostics.parquet.",
         r"\bsupport\b",
     ),
+    Term(
+        "topology",
+        "The map as a graph of nodes, tunnels and intersections, with access points, waypoints and connections; "
+        "topology.geojson. Routes are planned on it.",
+    ),
     Term("toe", "The foot of the pile: the line where its face meets the floor.", r"\btoe\b"),
+    Term(
+        "tunnel",
+        "A node of the topology that is a single way between two ends: intersections, a dead end, or unexplored, where the drift "
+        "goes on but the machine has not been. Only seen: the machine has looked into it and was not in it.",
+        r"\btunnels?\b",
+    ),
+    Term(
+        "waypoint",
+        "A pose in a node of the topology where something is done: draw point, dump, park, turning bay, passing bay, a stop, or "
+        "a place to pass.",
+    ),
     Term(
         "weak scan",
         "A scan that fixes one direction badly (see degenerate). The motion there comes from the wheels, or is carried on from "

@@ -7,7 +7,17 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from lhdmap.report import charts, cloud_charts, glossary, markup, path_charts, pile_page, series_charts, text
+from lhdmap.report import (
+    charts,
+    cloud_charts,
+    glossary,
+    markup,
+    path_charts,
+    pile_page,
+    series_charts,
+    text,
+    topology_page,
+)
 from lhdmap.report.data import ReportData, TopicRow
 
 DEVIATION_NOTE = (
@@ -33,6 +43,7 @@ def render_report(data: ReportData) -> str:
             markup.section("Path", _path(data)),
             markup.section("Against the truth", _truth(data)),
             markup.section("Cloud", _cloud(data)),
+            topology_page.sections(data),
             _pile(data),
             *_of_odometry(data),
             markup.section("What was in the log", _topics(data.topics)),

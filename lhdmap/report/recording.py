@@ -1,6 +1,7 @@
 """The Rerun recording of a run: written to a file without a display, in bulk where it can be, so that it costs little.
 
 Entities: `map/cloud/NNN` (parts of the cloud, each shown from the time it was first seen), `map/path/…` (static lines),
+`map/topology/…` (tunnels, intersections, access points, waypoints, connections, closures; static), `map/route/…` (static),
 `map/base_link` (the machine, moved over time), `map/scan/…`, `motion/…` and `scan_match/…` (curves), `log` (texts).
 The timeline `time` is the duration since the first scan.
 """
@@ -102,7 +103,7 @@ class RecordingWriter:
         self._bounds: FloatArray | None = None
         self._drawn: set[str] = set()
         self._legend: dict[str, None] = {}  # in the order of the first mention
-        self.curves = RUN_CURVES
+        self.curves, self.has_topology = RUN_CURVES, False
         self._scans: deque[tuple[int, FloatArray, str]] = deque()
         loader = ThreadPoolExecutor(max_workers=1, thread_name_prefix="recording")
         self._opened = loader.submit(_open, path, title, start_ns, live_port)  # loading Rerun takes most of a second
@@ -269,7 +270,8 @@ class RecordingWriter:
         self._lay_out(self.curves, round(1e9 * duration_s))
 
     def _lay_out(self, used: Curves, duration_ns: int) -> None:
-        self._stream.send_blueprint(blueprint(self._bounds, duration_ns, used, legend=bool(self._legend)))
+        words, graph = bool(self._legend), self.has_topology
+        self._stream.send_blueprint(blueprint(self._bounds, duration_ns, used, legend=words, topology=graph))
 
     def _has(self, pattern: str) -> bool:
         """Return whether a curve of this entity, or below it (`…/**`), was recorded."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -27,25 +28,27 @@ REPLAY_CURVES: Curves = (
     ("Clearance, m", ("motion/clearance",)),
     ("States", ("state/**",)),
 )
+GRAPH = ("+ map/topology/**", "+ map/route/**", "+ map/pile/**")
 LOG_CURVES: Curves = (("Speed, m/s", ("motion/speed/**",)), ("Angles, deg", ("angles/**",)))
 
 
-def blueprint(bounds_m: FloatArray | None, duration_ns: int, curves: Curves, *, legend: bool = False) -> Any:
+def blueprint(
+    bounds_m: FloatArray | None, duration_ns: int, curves: Curves, *, legend: bool = False, topology: bool = False
+) -> Any:
     """Return the layout for a map within `bounds_m` (lower and upper corner, (2, 3); None: not known) and its drive.
 
     It opens at the end of the drive, where the whole cloud is seen; the views of `curves` (name and entities of each)
-    show the whole drive.
+    show the whole drive. `topology`: it has a view of its own, in front of that from above, and is left out of the others.
     """
     import rerun.blueprint as rrb
 
     boundary = rrb.TimeRangeBoundary.absolute
     whole = rrb.TimeAxis(view_range=rrb.TimeRange(boundary(nanos=0), boundary(nanos=max(duration_ns, 1))))
-    scene = ["+ map/**"]
-    views = rrb.Vertical(
-        rrb.Spatial3DView(name="Map", origin="map", contents=scene, eye_controls=_eye(bounds_m, oblique=True)),
-        rrb.Spatial3DView(name="From above", origin="map", contents=scene, eye_controls=_eye(bounds_m, oblique=False)),
-        row_shares=[3, 2],
-    )
+    scene = ["+ map/**", *(["- map/topology/**"] if topology else [])]
+    above = _view("From above", scene, bounds_m, oblique=False)
+    if topology:
+        above = rrb.Tabs(_view("Topology", GRAPH, bounds_m, oblique=False), above, active_tab=0)
+    views = rrb.Vertical(_view("Map", scene, bounds_m, oblique=True), above, row_shares=[1, 1] if topology else [3, 2])
     plots = [rrb.TimeSeriesView(name=name, contents=list(entities), axis_x=whole) for name, entities in curves]
     groups = [rrb.Vertical(*group, name=name) for name, group in (("Drive", plots[:4]), ("Pile", plots[4:])) if group]
     middle = [rrb.Tabs(*groups) if len(groups) > 1 else group for group in groups[:1]]
@@ -58,6 +61,13 @@ def blueprint(bounds_m: FloatArray | None, duration_ns: int, curves: Curves, *, 
         rrb.SelectionPanel(state="collapsed"),
         rrb.BlueprintPanel(state="collapsed"),
     )
+
+
+def _view(name: str, contents: Sequence[str], bounds_m: FloatArray | None, *, oblique: bool) -> Any:
+    import rerun.blueprint as rrb
+
+    eye = _eye(bounds_m, oblique=oblique)
+    return rrb.Spatial3DView(name=name, origin="map", contents=list(contents), eye_controls=eye)
 
 
 def _eye(bounds_m: FloatArray | None, *, oblique: bool) -> Any:

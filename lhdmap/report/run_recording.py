@@ -7,6 +7,7 @@ import numpy as np
 from lhdmap.machine import Machine
 from lhdmap.report.data import ReportData
 from lhdmap.report.recording import PathStyle, RecordingWriter
+from lhdmap.report.topology_recording import add_topology
 from lhdmap.trajectory import Trajectory
 
 FINAL_PATH = PathStyle("final path", "blue", 0x2F86C9FF, 0.5)
@@ -41,5 +42,7 @@ def record_run(writer: RecordingWriter, data: ReportData, machine: Machine) -> N
     slip = data.slip()
     if slip is not None:
         writer.add_curve("motion/slip", slip.stamps_ns, 100.0 * slip.share, 0xD55E00FF, "slip, %")
+    if data.topology is not None:
+        add_topology(writer, data.topology, data.closures)
     for text in data.warnings:
         writer.add_text(text)
