@@ -220,6 +220,8 @@ class Outcome:
             pile=self.pile,
             pile_reason=self.pile_reason,
             topology=None if self.topology is None else self.topology.map,
+            landmarks=self.landmarks,
+            landmark_settings=inputs.settings.landmarks,
             sheets=() if self.topology is None else self.topology.sheets,
             closures=closure_rows(self.pipeline.smoother.evidence, self.ways.rows),
             warnings=self.warnings,

@@ -11,6 +11,8 @@ import numpy.typing as npt
 
 from lhdmap.evaluation.trajectory import TrajectoryEvaluation
 from lhdmap.integration.cloud import Cloud
+from lhdmap.landmarks.model import Landmarks
+from lhdmap.landmarks.settings import LandmarkSettings
 from lhdmap.mapfolder import Diagnostics
 from lhdmap.messages import FloatArray
 from lhdmap.pile.result import PileReport
@@ -68,13 +70,6 @@ class ClosureRow(NamedTuple):
     reason: str = ""
 
 
-class Picture(NamedTuple):
-    """A picture that is drawn already: a data URI (`charts.svg_uri`) and its caption."""
-
-    uri: str
-    caption: str
-
-
 @dataclass(frozen=True, slots=True)
 class Summary:
     """The headline figures; the names are those of `build-map --json`."""
@@ -99,7 +94,7 @@ class ReportData:
 
     `witness`: which sensors told of the motion beside the scans (empty: none); `poses`: where given poses came from (empty: the
     path is that of the odometry); `pile_reason`: why no pile was looked for. `sheets`: free space of the levels of `topology`;
-    `closures`: places recognised, also those refused; `landmark_pictures`: heat maps of the landmarks.
+    `closures`: places recognised, also those refused; `landmarks` of its nodes.
     """
 
     title: str
@@ -119,7 +114,8 @@ class ReportData:
     topology: TopologicalMap | None = None
     sheets: Sequence[Sheet] = ()
     closures: Sequence[ClosureRow] = ()
-    landmark_pictures: Sequence[Picture] = ()
+    landmarks: Landmarks | None = None
+    landmark_settings: LandmarkSettings = field(default_factory=LandmarkSettings)
     witness: str = ""
     poses: str = ""
     warnings: Sequence[str] = ()

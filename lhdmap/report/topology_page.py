@@ -10,6 +10,7 @@ import numpy as np
 
 from lhdmap.report import charts, markup
 from lhdmap.report.data import ClosureRow, ReportData
+from lhdmap.report.landmark_page import landmarks_section
 from lhdmap.report.topology_charts import level_figure
 from lhdmap.report.topology_drawing import kind_of
 from lhdmap.report.topology_levels import Level, Levels, counted, summary
@@ -23,7 +24,7 @@ _STATE = {"driven": "driven", "seen": "only seen", "closed": "closed"}
 
 def sections(data: ReportData) -> str:
     """Return the sections of the map as a graph, of loop closures and of landmarks; each is left out where there is none."""
-    landmarks = "".join(markup.picture(one.uri, one.caption) for one in data.landmark_pictures)
+    landmarks = "" if data.landmarks is None else landmarks_section(data, data.landmarks)
     return (
         markup.section("Topology", _topology(data))
         + markup.section("Loop closures", closures(data.closures))

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from lhdmap.report import charts
 from lhdmap.report.bounded import MOST_CELLS, bounded
-from lhdmap.report.data import ClosureRow, Picture, ReportData
+from lhdmap.report.data import ClosureRow, ReportData
 from lhdmap.report.page import render_report
 from lhdmap.report.topology_charts import level_figure, route_figure
 from lhdmap.report.topology_levels import Levels, coarser, middle, summary
@@ -134,12 +134,12 @@ def test_everything_is_drawn_within_the_picture() -> None:
     assert scales[0] == pytest.approx(scales[1])
 
 
-@pytest.mark.parametrize("part", ["topology", "closures", "landmark_pictures"])
+@pytest.mark.parametrize("part", ["topology", "closures"])
 def test_a_section_of_which_there_is_nothing_is_left_out(part: str) -> None:
-    filled = {"topology": ladder(), "closures": [CLOSURE], "landmark_pictures": [Picture("data:,", "of T1")]}
+    filled = {"topology": ladder(), "closures": [CLOSURE]}
     with charts.styled():
         page = sections(replace(BASE, **{part: filled[part]}))  # type: ignore[arg-type]
-    headings = {"topology": "Topology", "closures": "Loop closures", "landmark_pictures": "Landmarks"}
+    headings = {"topology": "Topology", "closures": "Loop closures"}
     assert re.findall(r"<h2>(.*?)</h2>", page) == [headings[part]]
     assert sections(BASE) == ""
 
