@@ -31,7 +31,8 @@ class Lookup:
             points += inner
             owner += [node.id] * sum(map(len, inner))
         self._owner = owner
-        self._tree = KDTree(np.vstack([np.full((1, 3), np.inf) if not points else np.vstack(points)]) * [1, 1, _HEIGHT])
+        places = np.vstack(points) if points else np.zeros((1, 3))
+        self._tree = KDTree(places * [1.0, 1.0, _HEIGHT])
 
     def nodes_at(self, points_m: FloatArray, within_m: float = np.inf) -> list[str]:
         """Return the ids of the nodes that points (N, 3) are in; empty where none is nearer than `within_m`."""
