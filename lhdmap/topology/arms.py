@@ -22,7 +22,8 @@ from lhdmap.topology.driven import arc_m
 from lhdmap.topology.room import Room
 from lhdmap.topology.skeleton import Line
 
-_FROM_RADII, _FIT_M = 1.6, 9.0  # the axis is fitted from 1.6 R on, over 9 m
+_NARROW_QUANTILE, _NARROW_M, _LEAST_STRAIGHT_M = 0.3, 0.35, 4.0
+FROM_RADII, FIT_M = 1.6, 9.0  # the axis is fitted from 1.6 R on, over 9 m
 _FEWEST_M = 2.0
 _NEARLY_STRAIGHT_RAD = math.radians(9.0)  # neighbours that are one line have no corner between them
 _SHARPEST_CUT_M = 0.45  # gaps below it are roughness
@@ -53,27 +54,51 @@ def axis_of(line: Line, centre_m: FloatArray, radius_m: float, room: Room, far_r
     own, the axis goes to the other end, `fitted_m` is 0, and the half width is the least room.
     """
     away, along = np.linalg.norm(line.points_m - centre_m, axis=1), arc_m(line.points_m)
-    outside = away > _FROM_RADII * radius_m
+    outside = away > FROM_RADII * radius_m
     begin = float(along[int(np.argmax(outside))]) if outside.any() else float(along[-1])
-    end = min(begin + _FIT_M, float(along[-1]) - _FROM_RADII * far_radius_m)
+    end = min(begin + FIT_M, float(along[-1]) - FROM_RADII * far_radius_m)
     points: FloatArray = line.points_m[(along >= begin) & (along <= end)]
     if end - begin < _FEWEST_M or len(points) < 3:
-        direction = _unit(line.points_m[-1] - centre_m)
+        direction = unit(line.points_m[-1] - centre_m)
         middle = line.points_m[len(along) // 4 : max(3 * len(along) // 4, len(along) // 4 + 1)]
-        left, right = _sides(middle, direction, room)
+        left, right = sides(middle, direction, room)
         return Axis(direction, centre_m, 0.5 * float((left + right).min()), 0.0)
+    return _axis(_straight(line.points_m, along, (begin, end, float(along[-1]) - FROM_RADII * far_radius_m), room), centre_m, room)
+
+
+def _axis(points: FloatArray, centre_m: FloatArray, room: Room) -> Axis:
+    """Return the axis through the middles between both walls at points (N, 2)."""
     outward = points[-1] - centre_m
     for _ in range(_ROUNDS):
-        direction, point = _fitted(points, outward)
-        left, right = _sides(points, direction, room)
-        points = points + 0.5 * (left - right)[:, None] * _normal(direction)
-    direction, point = _fitted(points, outward)
-    return Axis(direction, point, 0.5 * float(np.median(left + right)), end - begin)
+        direction, point = fitted(points, outward)
+        left, right = sides(points, direction, room)
+        points = points + 0.5 * (left - right)[:, None] * normal(direction)
+    direction, point = fitted(points, outward)
+    length = float(np.ptp((points - point) @ direction))
+    return Axis(direction, point, 0.5 * float(np.median(left + right)), length)
+
+
+def _straight(points_m: FloatArray, along: FloatArray, span_m: tuple[float, float, float], room: Room) -> FloatArray:
+    """Return the first 9 m of points that lie between straight walls: from a first to a last, or farther on where corners widen it.
+
+    `span_m`: where along the line these are, and how far one may look.
+    """
+    begin, end, last = span_m
+    looked = (along >= begin) & (along <= min(end + FIT_M, last))
+    points, at = points_m[looked], along[looked]
+    direction, _ = fitted(points, points[-1] - points[0])
+    width = np.add(*sides(points, direction, room))
+    narrow = width <= float(np.quantile(width, _NARROW_QUANTILE)) + _NARROW_M
+    first = at[narrow][0]
+    chosen = narrow & (at <= first + FIT_M)
+    if float(np.ptp(at[chosen])) < min(_LEAST_STRAIGHT_M, end - begin):
+        chosen = at <= end
+    return points[chosen]
 
 
 def through(axis: Axis, middle_m: FloatArray, far_m: FloatArray) -> Axis:
     """Return an arm without walls of its own as the straight way from one junction's middle (2,) to the next (2,)."""
-    return axis._replace(along=_unit(far_m - middle_m), point_m=middle_m)
+    return axis._replace(along=unit(far_m - middle_m), point_m=middle_m)
 
 
 def meeting_m(axes: list[Axis], centre_m: FloatArray, radius_m: float) -> FloatArray:
@@ -81,8 +106,8 @@ def meeting_m(axes: list[Axis], centre_m: FloatArray, radius_m: float) -> FloatA
 
     What lies far from there is no meeting: in a room arms have no axes.
     """
-    normals = np.array([_normal(axis.along) for axis in axes])
-    weighted = np.array([min(axis.fitted_m / _FIT_M, 1.0) ** 3 for axis in axes])[:, None] * normals
+    normals = np.array([normal(axis.along) for axis in axes])
+    weighted = np.array([min(axis.fitted_m / FIT_M, 1.0) ** 3 for axis in axes])[:, None] * normals
     offsets = (normals * np.array([axis.point_m for axis in axes])).sum(axis=1)
     A, b = _PULL * np.eye(2) + weighted.T @ normals, _PULL * centre_m + weighted.T @ offsets
     found: FloatArray = np.linalg.solve(A, b)
@@ -111,8 +136,8 @@ def _cut_m(own: Axis, other: Axis, own_corner: float, middle_m: FloatArray, room
     """Return how far beyond the corner of two walls the rounding of that corner begins."""
     angle = _between(own, other)
     side = 1.0 if own.along[0] * other.along[1] - own.along[1] * other.along[0] > 0.0 else -1.0
-    corner = middle_m + own_corner * own.along + side * own.half_m * _normal(own.along)
-    bisector = _unit(own.along + other.along)
+    corner = middle_m + own_corner * own.along + side * own.half_m * normal(own.along)
+    bisector = unit(own.along + other.along)
     inner = corner - 0.5 * bisector
     gap = float(room.to_wall_m(inner[None], bisector[None])[0]) - 0.5
     if gap < _SHARPEST_CUT_M:
@@ -133,29 +158,31 @@ def _between(a: Axis, b: Axis) -> float:
     return float(np.arccos(np.clip(a.along @ b.along, -1.0, 1.0)))
 
 
-def _fitted(points: FloatArray, outward: FloatArray) -> tuple[FloatArray, FloatArray]:  # direction and middle
+def fitted(points: FloatArray, outward: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return direction (2,) and middle (2,) of points (N, 2): total least squares, the farthest fifth left out once."""
     keep = np.ones(len(points), bool)
     for _ in range(2):
         middle: FloatArray = points[keep].mean(axis=0)
         direction: FloatArray = np.linalg.svd(points[keep] - middle)[2][0]
-        off = np.abs((points - middle) @ _normal(direction))
+        off = np.abs((points - middle) @ normal(direction))
         keep = off <= max(float(np.quantile(off, 0.8)), 1e-9)
     if direction @ outward < 0.0:
         direction = -direction
     return direction, middle
 
 
-def _sides(points: FloatArray, direction: FloatArray, room: Room) -> tuple[FloatArray, FloatArray]:
+def sides(points: FloatArray, direction: FloatArray, room: Room) -> tuple[FloatArray, FloatArray]:
     """Return the room (N,) to the left and to the right of points (N, 2)."""
-    normals = np.broadcast_to(_normal(direction), points.shape)
+    normals = np.broadcast_to(normal(direction), points.shape)
     return room.to_wall_m(points, normals), room.to_wall_m(points, -normals)
 
 
-def _normal(direction: FloatArray) -> FloatArray:
+def normal(direction: FloatArray) -> FloatArray:
+    """Return the unit vector (2,) to the left of a direction (2,)."""
     return np.array([-direction[1], direction[0]])
 
 
-def _unit(vector: FloatArray) -> FloatArray:
-    unit: FloatArray = vector / max(float(np.linalg.norm(vector)), 1e-9)
-    return unit
+def unit(vector: FloatArray) -> FloatArray:
+    """Return a vector (2,) scaled to length 1."""
+    scaled: FloatArray = vector / max(float(np.linalg.norm(vector)), 1e-9)
+    return scaled

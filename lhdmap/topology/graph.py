@@ -13,6 +13,7 @@ from scipy.ndimage import maximum_filter
 
 from lhdmap.messages import FloatArray
 from lhdmap.topology.arms import Axis, axis_of, meeting_m, through
+from lhdmap.topology.collinear import COLLINEAR, LONG_M, axis_of_parts, direction_of, fitted_part, inner_part
 from lhdmap.topology.driven import DrivenShare, driven_shares
 from lhdmap.topology.free_space import filled
 from lhdmap.topology.room import Room
@@ -23,7 +24,7 @@ from lhdmap.topology.skeleton import Line, Skeleton, core_of, skeleton_of
 PAPER_WIDTH_M = 2.45
 _BUILDING_OBSTACLE_M = 1.0
 _RIDGE_M = 1.5
-_FILLS = 0.45  # of the tunnels' width: a machine that wide is in a mine, where openings count that were only seen
+_FILLS = 0.35  # of the tunnels' width: a machine that wide is in a mine, where openings count that were only seen
 _LINE_DRIVEN = 0.5
 _AT_CUT_M = 6.0
 
@@ -99,19 +100,43 @@ class Graph:
 
     def axes(self, vertex: int) -> tuple[FloatArray, list[Axis]]:
         """Return the middle of a junction (2,) and its arms' axes, in the order of `arms`."""
-        middle, axes = self._own_axes(vertex)
-        for k, (arm, axis) in enumerate(zip(self.arms(vertex), axes, strict=True)):
+        centre, radius = self.skeleton.vertices[vertex]
+        arms, own = self.arms(vertex), self._own_axes(vertex)
+        axes = [self._with_more(arm, k, arms, own) for k, arm in enumerate(arms)]
+        middle = meeting_m(axes, centre, radius)
+        for k, (arm, axis) in enumerate(zip(arms, axes, strict=True)):
             if axis.fitted_m == 0.0 and arm.end != vertex and self.skeleton.degree(arm.end) > 2:
-                axes[k] = through(axis, middle, self._own_axes(arm.end)[0])
+                axes[k] = through(axis, middle, self._middle(arm.end))
         return middle, axes
 
-    def _own_axes(self, vertex: int) -> tuple[FloatArray, list[Axis]]:
+    def _own_axes(self, vertex: int) -> list[Axis]:
         centre, radius = self.skeleton.vertices[vertex]
-        axes = [axis_of(arm, centre, radius, self.room, self._far_radius_m(arm)) for arm in self.arms(vertex)]
-        return meeting_m(axes, centre, radius), axes
+        return [axis_of(arm, centre, radius, self.room, self._far_radius_m(arm)) for arm in self.arms(vertex)]
+
+    def _middle(self, vertex: int) -> FloatArray:
+        return meeting_m(self._own_axes(vertex), *self.skeleton.vertices[vertex])
 
     def _far_radius_m(self, arm: Line) -> float:
         return self.skeleton.vertices[arm.end].radius_m if self.skeleton.degree(arm.end) > 2 else 0.0
+
+    def _with_more(self, arm: Line, number: int, arms: list[Line], own: list[Axis]) -> Axis:
+        """Return the axis of an arm; a short one is fitted together with those that go on beyond either of its ends."""
+        if own[number].fitted_m >= LONG_M:
+            return own[number]
+        centre, radius = self.skeleton.vertices[arm.start]
+        chord = direction_of(arm, centre, radius)
+        parts = [inner_part(arm, centre, radius, self._far_radius_m(arm))]
+        others = [(one, axis, -1.0) for k, (one, axis) in enumerate(zip(arms, own, strict=True)) if k != number]
+        if arm.end != arm.start and self.skeleton.degree(arm.end) > 2:
+            others += [
+                (one, axis, 1.0)
+                for one, axis in zip(self.arms(arm.end), self._own_axes(arm.end), strict=True)
+                if one.end != arm.start
+            ]
+        for one, axis, sign in others:
+            if sign * float(axis.along @ chord) > COLLINEAR and axis.fitted_m > 0.0:
+                parts.append(fitted_part(one, *self.skeleton.vertices[one.start], self._far_radius_m(one)))
+        return axis_of_parts(own[number], chord, parts, self.room) if len(parts) > 1 else own[number]
 
 
 def whole_graph(sheet: Sheet, driven_m: FloatArray, scale: Scale, cuts: Sequence[FloatArray] = ()) -> Graph:
