@@ -18,6 +18,7 @@ from typing import NamedTuple
 import numpy as np
 
 from lhdmap.messages import FloatArray
+from lhdmap.topology.corners import rounding_m
 from lhdmap.topology.driven import arc_m
 from lhdmap.topology.room import Room
 from lhdmap.topology.skeleton import Line
@@ -26,8 +27,6 @@ _NARROW_QUANTILE, _NARROW_M, _LEAST_STRAIGHT_M = 0.3, 0.35, 4.0
 FROM_RADII, FIT_M = 1.6, 9.0  # the axis is fitted from 1.6 R on, over 9 m
 _FEWEST_M = 2.0
 _NEARLY_STRAIGHT_RAD = math.radians(9.0)  # neighbours that are one line have no corner between them
-_SHARPEST_CUT_M = 0.45  # gaps below it are roughness
-_LONGEST_CUT_M = 9.0
 _FARTHEST_RADII = 1.3
 _ROUNDS = 2
 _PULL = 0.02  # weight of the skeleton's own place: where all axes are parallel
@@ -125,7 +124,7 @@ def corner_m(own: Axis, other: Axis) -> float | None:
 def reach_m(own: Axis, others: list[Axis], middle_m: FloatArray, room: Room | None = None) -> float:
     """Return where along `own` the junction ends; with `room`, rounded corners count as well."""
     found = []
-    for other in _neighbours(own, others):
+    for other in neighbours(own, others):
         corner = corner_m(own, other)
         if corner is not None:
             found.append(corner + (0.0 if room is None else _cut_m(own, other, corner, middle_m, room)))
@@ -134,19 +133,12 @@ def reach_m(own: Axis, others: list[Axis], middle_m: FloatArray, room: Room | No
 
 def _cut_m(own: Axis, other: Axis, own_corner: float, middle_m: FloatArray, room: Room) -> float:
     """Return how far beyond the corner of two walls the rounding of that corner begins."""
-    angle = _between(own, other)
     side = 1.0 if own.along[0] * other.along[1] - own.along[1] * other.along[0] > 0.0 else -1.0
     corner = middle_m + own_corner * own.along + side * own.half_m * normal(own.along)
-    bisector = unit(own.along + other.along)
-    inner = corner - 0.5 * bisector
-    gap = float(room.to_wall_m(inner[None], bisector[None])[0]) - 0.5
-    if gap < _SHARPEST_CUT_M:
-        return 0.0
-    radius = gap / (1.0 / math.sin(0.5 * angle) - 1.0)
-    return min(radius / math.tan(0.5 * angle), _LONGEST_CUT_M)
+    return rounding_m(corner, own.along, other.along, room)
 
 
-def _neighbours(own: Axis, others: list[Axis]) -> list[Axis]:
+def neighbours(own: Axis, others: list[Axis]) -> list[Axis]:
     """Return the next arm on either side."""
     turns = [(other.heading_rad - own.heading_rad) % (2.0 * math.pi) for other in others]
     if not turns:
