@@ -17,12 +17,12 @@ from lhdmap.topology.driven import arc_m
 from lhdmap.topology.room import Room
 from lhdmap.topology.skeleton import Line
 
-LONG_M = 6.0
+LONG_M = 8.0
 """An arm with so much straight wall needs no other."""
 COLLINEAR = math.cos(math.radians(20.0))
 _OWN_FROM = 0.8  # free radii
 _NARROW_QUANTILE, _NARROW_M = 0.2, 0.5
-_FEWEST, _SHORTEST_M, _OFF_M = 8, 6.0, 0.35
+_FEWEST, _SHORTEST_M, _OFF_M = 8, 6.0, 0.3
 _ROUNDS = 2
 
 

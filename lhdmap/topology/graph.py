@@ -12,9 +12,9 @@ import numpy.typing as npt
 from scipy.ndimage import maximum_filter
 
 from lhdmap.messages import FloatArray
-from lhdmap.topology.arms import Axis, axis_of, meeting_m, through
+from lhdmap.topology.arms import Axis, axis_of, fitted, meeting_m, through, unit
 from lhdmap.topology.collinear import COLLINEAR, LONG_M, axis_of_parts, direction_of, fitted_part, inner_part
-from lhdmap.topology.driven import DrivenShare, driven_shares
+from lhdmap.topology.driven import DrivenShare, arc_m, driven_shares
 from lhdmap.topology.free_space import filled
 from lhdmap.topology.room import Room
 from lhdmap.topology.settings import TopologySettings
@@ -27,6 +27,7 @@ _RIDGE_M = 1.5
 _FILLS = 0.35  # of the tunnels' width: a machine that wide is in a mine, where openings count that were only seen
 _LINE_DRIVEN = 0.5
 _AT_CUT_M = 6.0
+_TAIL_M = 6.0  # of a line, that tell how it goes on
 
 
 class Scale(NamedTuple):
@@ -182,18 +183,24 @@ def barrier_m(room: Room, cut: FloatArray) -> FloatArray:
     return ends
 
 
-def last_direction(line: Line) -> FloatArray:
-    """Return the unit vector (2,) in which a line ends."""
-    back = line.points_m[-min(len(line.points_m), 8)]
-    way = line.points_m[-1] - back
-    unit: FloatArray = way / max(float(np.linalg.norm(way)), 1e-9)
-    return unit
+def end_of(arm: Line, scale: Scale) -> tuple[FloatArray, FloatArray, float]:
+    """Return where a dead end's line is still in the middle (2,), its direction there (2,), and its length up to there (m).
+
+    Before the face it turns into a corner.
+    """
+    along = arc_m(arm.points_m)
+    last = float(along[-1]) - min(0.5 * scale.tunnel_m, 0.3 * float(along[-1]))
+    kept = arm.points_m[along <= last]
+    tail = kept[along[: len(kept)] >= last - _TAIL_M]
+    if len(tail) < 3:
+        return kept[-1], unit(arm.points_m[-1] - arm.points_m[0]), last
+    return kept[-1], fitted(tail, tail[-1] - tail[0])[0], last
 
 
 def closed_share(graph: Graph, line: Line, vertex: int) -> float:
     """Return the share of the view ahead of a line's end at `vertex` that ends at walls, and not in the unknown."""
     leaving = line.leaving(vertex).reversed() if line.start == vertex else line
-    direction, end = last_direction(leaving), leaving.points_m[-1]
+    end, direction, _ = end_of(leaving, graph.scale)
     heading = math.atan2(direction[1], direction[0])
     angles = heading + np.radians(np.arange(-45.0, 46.0, 5.0))
     rays = np.column_stack([np.cos(angles), np.sin(angles)])
