@@ -24,7 +24,8 @@ from lhdmap.topology.room import Room
 from lhdmap.topology.skeleton import Line
 
 _NARROW_QUANTILE, _NARROW_M, _LEAST_STRAIGHT_M = 0.3, 0.35, 4.0
-FROM_RADII, FIT_M = 1.6, 9.0  # the axis is fitted from 1.6 R on, over 9 m
+FROM_RADII, FIT_M = 1.6, 15.0  # the axis is fitted from 1.6 R on, over so much,
+_FIT_BENT_M, _BENT_M = 8.0, 0.35  # or, where the arm bends away by more than this, over less
 _FEWEST_M = 2.0
 _NEARLY_STRAIGHT_RAD = math.radians(9.0)  # neighbours that are one line have no corner between them
 _FARTHEST_RADII = 1.3
@@ -33,12 +34,16 @@ _PULL = 0.02  # weight of the skeleton's own place: where all axes are parallel
 
 
 class Axis(NamedTuple):
-    """An arm's straight beginning: unit vector `along` (2,) outward, a point (2,) on it, half width `half_m`; `fitted_m` long."""
+    """An arm's straight beginning: unit vector `along` (2,) outward, a point (2,) on it, half width `half_m`; `fitted_m` long.
+
+    `rough_m`: standard deviation of its walls.
+    """
 
     along: FloatArray
     point_m: FloatArray
     half_m: float
     fitted_m: float
+    rough_m: float = 0.12
 
     @property
     def heading_rad(self) -> float:
@@ -55,43 +60,52 @@ def axis_of(line: Line, centre_m: FloatArray, radius_m: float, room: Room, far_r
     away, along = np.linalg.norm(line.points_m - centre_m, axis=1), arc_m(line.points_m)
     outside = away > FROM_RADII * radius_m
     begin = float(along[int(np.argmax(outside))]) if outside.any() else float(along[-1])
-    end = min(begin + FIT_M, float(along[-1]) - FROM_RADII * far_radius_m)
-    points: FloatArray = line.points_m[(along >= begin) & (along <= end)]
-    if end - begin < _FEWEST_M or len(points) < 3:
-        direction = unit(line.points_m[-1] - centre_m)
-        middle = line.points_m[len(along) // 4 : max(3 * len(along) // 4, len(along) // 4 + 1)]
-        left, right = sides(middle, direction, room)
-        return Axis(direction, centre_m, 0.5 * float((left + right).min()), 0.0)
-    return _axis(_straight(line.points_m, along, (begin, end, float(along[-1]) - FROM_RADII * far_radius_m), room), centre_m, room)
+    last = float(along[-1]) - FROM_RADII * far_radius_m
+    if min(begin + FIT_M, last) - begin < _FEWEST_M or ((along >= begin) & (along <= last)).sum() < 3:
+        return _chord(line, along, centre_m, room)
+    for fit_m in (FIT_M, _FIT_BENT_M):
+        axis, sag_m = _axis(_straight(line.points_m, along, (begin, last, fit_m), room), centre_m, room)
+        if sag_m < _BENT_M:
+            break
+    return axis
 
 
-def _axis(points: FloatArray, centre_m: FloatArray, room: Room) -> Axis:
-    """Return the axis through the middles between both walls at points (N, 2)."""
+def _chord(line: Line, along: FloatArray, centre_m: FloatArray, room: Room) -> Axis:
+    """Return an arm without a wall of its own as the way to its end, with its least room."""
+    direction = unit(line.points_m[-1] - centre_m)
+    middle = line.points_m[len(along) // 4 : max(3 * len(along) // 4, len(along) // 4 + 1)]
+    left, right = sides(middle, direction, room)
+    return Axis(direction, centre_m, 0.5 * float((left + right).min()), 0.0)
+
+
+def _axis(points: FloatArray, centre_m: FloatArray, room: Room) -> tuple[Axis, float]:
+    """Return the axis through the middles between both walls at points (N, 2), and by how much they bend away from it (m)."""
     outward = points[-1] - centre_m
     for _ in range(_ROUNDS):
         direction, point = fitted(points, outward)
         left, right = sides(points, direction, room)
         points = points + 0.5 * (left - right)[:, None] * normal(direction)
     direction, point = fitted(points, outward)
-    length = float(np.ptp((points - point) @ direction))
-    return Axis(direction, point, 0.5 * float(np.median(left + right)), length)
+    at, off = (points - point) @ direction, (points - point) @ normal(direction)
+    length = float(np.ptp(at))
+    sag = abs(float(np.polyfit(at, off, 2)[0])) * (0.5 * length) ** 2 if len(at) > 3 else 0.0
+    return Axis(direction, point, 0.5 * float(np.median(left + right)), length, roughness_m(left, right)), sag
 
 
 def _straight(points_m: FloatArray, along: FloatArray, span_m: tuple[float, float, float], room: Room) -> FloatArray:
-    """Return the first 9 m of points that lie between straight walls: from a first to a last, or farther on where corners widen it.
+    """Return points that lie between straight walls, the first ones: corners at the beginning, and mouths, are wider.
 
-    `span_m`: where along the line these are, and how far one may look.
+    `span_m`: where along the line one may begin, where it ends, and how long it is to be.
     """
-    begin, end, last = span_m
-    looked = (along >= begin) & (along <= min(end + FIT_M, last))
+    begin, last, fit_m = span_m
+    looked = (along >= begin) & (along <= min(begin + 2.0 * fit_m, last))
     points, at = points_m[looked], along[looked]
     direction, _ = fitted(points, points[-1] - points[0])
     width = np.add(*sides(points, direction, room))
     narrow = width <= float(np.quantile(width, _NARROW_QUANTILE)) + _NARROW_M
-    first = at[narrow][0]
-    chosen = narrow & (at <= first + FIT_M)
-    if float(np.ptp(at[chosen])) < min(_LEAST_STRAIGHT_M, end - begin):
-        chosen = at <= end
+    chosen = narrow & (at <= at[narrow][0] + fit_m)
+    if float(np.ptp(at[chosen])) < min(_LEAST_STRAIGHT_M, at[-1] - begin) or chosen.sum() < 3:
+        chosen = at <= begin + fit_m
     return points[chosen]
 
 
@@ -135,7 +149,7 @@ def _cut_m(own: Axis, other: Axis, own_corner: float, middle_m: FloatArray, room
     """Return how far beyond the corner of two walls the rounding of that corner begins."""
     side = 1.0 if own.along[0] * other.along[1] - own.along[1] * other.along[0] > 0.0 else -1.0
     corner = middle_m + own_corner * own.along + side * own.half_m * normal(own.along)
-    return rounding_m(corner, own.along, other.along, room)
+    return rounding_m(corner, own.along, other.along, 0.5 * (own.rough_m + other.rough_m), room)
 
 
 def neighbours(own: Axis, others: list[Axis]) -> list[Axis]:
@@ -167,6 +181,11 @@ def sides(points: FloatArray, direction: FloatArray, room: Room) -> tuple[FloatA
     """Return the room (N,) to the left and to the right of points (N, 2)."""
     normals = np.broadcast_to(normal(direction), points.shape)
     return room.to_wall_m(points, normals), room.to_wall_m(points, -normals)
+
+
+def roughness_m(left: FloatArray, right: FloatArray) -> float:
+    """Return the standard deviation of walls from the room (N,) to both sides, whatever stands out alone."""
+    return float(np.mean([1.4826 * np.median(np.abs(side - np.median(side))) for side in (left, right)]))
 
 
 def normal(direction: FloatArray) -> FloatArray:

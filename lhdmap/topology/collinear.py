@@ -12,7 +12,7 @@ import math
 import numpy as np
 
 from lhdmap.messages import FloatArray
-from lhdmap.topology.arms import FIT_M, FROM_RADII, Axis, fitted, normal, sides, unit
+from lhdmap.topology.arms import FIT_M, FROM_RADII, Axis, fitted, normal, roughness_m, sides, unit
 from lhdmap.topology.driven import arc_m
 from lhdmap.topology.room import Room
 from lhdmap.topology.skeleton import Line
@@ -65,7 +65,8 @@ def axis_of_parts(own: Axis, chord: FloatArray, parts: list[FloatArray], room: R
     length = float(along.max() - along.min())
     if length < _SHORTEST_M or float(np.quantile(off, 0.8)) > _OFF_M or float(direction @ chord) < COLLINEAR:
         return own
-    return Axis(direction, point, 0.5 * float(np.median(width[narrow])), min(0.5 * length, FIT_M))
+    half = 0.5 * float(np.median(width[narrow]))
+    return Axis(direction, point, half, min(0.5 * length, FIT_M), roughness_m(left[narrow], right[narrow]))
 
 
 def _part(arm: Line, centre_m: FloatArray, from_m: float, before_m: float) -> FloatArray:

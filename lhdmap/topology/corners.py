@@ -20,12 +20,15 @@ from lhdmap.topology.room import WALL_CELLS, Room
 
 _STEP_M = 0.15
 _LONGEST_M = 10.0  # from the corner to where the rounding begins
-_SHARPEST_M = 0.35  # gaps between corner and rock below it are roughness
+_LEAST_M2, _ROUGH = 0.1, 0.7  # of rock cut away; and for each metre as much as the walls are rough: less is roughness
 _WIDEST_RAD = math.radians(150.0)  # walls so nearly straight have no corner that could be rounded
 
 
-def rounding_m(corner_m: FloatArray, along: FloatArray, other: FloatArray, room: Room) -> float:
-    """Return how far beyond a corner (2,) its rounding begins, along the walls in the directions `along` and `other` (2,)."""
+def rounding_m(corner_m: FloatArray, along: FloatArray, other: FloatArray, rough_m: float, room: Room) -> float:
+    """Return how far beyond a corner (2,) its rounding begins, along the walls in the directions `along` and `other` (2,).
+
+    `rough_m`: standard deviation of the walls.
+    """
     angle = float(np.arccos(np.clip(along @ other, -1.0, 1.0)))
     if angle > _WIDEST_RAD:
         return 0.0
@@ -33,13 +36,10 @@ def rounding_m(corner_m: FloatArray, along: FloatArray, other: FloatArray, room:
     bisector = (along + other) / np.linalg.norm(along + other)
     free = room.holds(points - WALL_CELLS * room.sheet.cell_m / math.sin(0.5 * angle) * bisector)
     order = np.argsort(radii)
-    gain = np.cumsum(np.where(free[order], 1.0, -1.0))
-    best = int(gain.argmax())
-    if gain[best] <= 0.0:
-        return 0.0
-    radius = float(radii[order][best])
-    gap = radius * (1.0 / math.sin(0.5 * angle) - 1.0)
-    return radius / math.tan(0.5 * angle) if gap >= _SHARPEST_M else 0.0
+    begins = radii[order] / math.tan(0.5 * angle)
+    gain_m2 = _STEP_M**2 * np.cumsum(np.where(free[order], 1.0, -1.0)) - _ROUGH * rough_m * begins
+    best = int(gain_m2.argmax())
+    return float(begins[best]) if gain_m2[best] > _LEAST_M2 else 0.0
 
 
 def _between(

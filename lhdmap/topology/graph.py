@@ -27,6 +27,7 @@ _RIDGE_M = 1.5
 _FILLS = 0.35  # of the tunnels' width: a machine that wide is in a mine, where openings count that were only seen
 _LINE_DRIVEN = 0.5
 _AT_CUT_M = 6.0
+_SHORT_M, _STRAIGHT = 6.0, 1.15
 _TAIL_M = 6.0  # of a line, that tell how it goes on
 
 
@@ -106,9 +107,16 @@ class Graph:
         axes = [self._with_more(arm, k, arms, own) for k, arm in enumerate(arms)]
         middle = meeting_m(axes, centre, radius)
         for k, (arm, axis) in enumerate(zip(arms, axes, strict=True)):
-            if axis.fitted_m == 0.0 and arm.end != vertex and self.skeleton.degree(arm.end) > 2:
+            if self._ends_soon(arm, axis):
                 axes[k] = through(axis, middle, self._middle(arm.end))
         return middle, axes
+
+    def _ends_soon(self, arm: Line, axis: Axis) -> bool:
+        """Return whether an arm with little wall of its own goes straight to another junction."""
+        if axis.fitted_m >= _SHORT_M or arm.end == arm.start or self.skeleton.degree(arm.end) < 3:
+            return False
+        chord = float(np.linalg.norm(arm.points_m[-1] - arm.points_m[0]))
+        return axis.fitted_m == 0.0 or arm.length_m < _STRAIGHT * chord
 
     def _own_axes(self, vertex: int) -> list[Axis]:
         centre, radius = self.skeleton.vertices[vertex]
