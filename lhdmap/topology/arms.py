@@ -16,6 +16,7 @@ import math
 from typing import NamedTuple
 
 import numpy as np
+import numpy.typing as npt
 
 from lhdmap.messages import FloatArray
 from lhdmap.topology.corners import rounding_m
@@ -23,7 +24,8 @@ from lhdmap.topology.driven import arc_m
 from lhdmap.topology.room import Room
 from lhdmap.topology.skeleton import Line
 
-_NARROW_QUANTILE, _NARROW_M, _LEAST_STRAIGHT_M = 0.3, 0.35, 4.0
+_LOWEST_QUANTILE, _NARROW_QUANTILE, _BETWEEN = 0.05, 0.3, 1.12  # of widths; standard deviations between them
+_SPREADS, _NARROW_M, _MOST_NARROW_M, _LEAST_STRAIGHT_M = 2.2, 0.35, 1.0, 4.0
 FROM_RADII, FIT_M = 1.6, 15.0  # the axis is fitted from 1.6 R on, over so much,
 _FIT_BENT_M, _BENT_M = 8.0, 0.35  # or, where the arm bends away by more than this, over less
 _FEWEST_M = 2.0
@@ -102,7 +104,7 @@ def _straight(points_m: FloatArray, along: FloatArray, span_m: tuple[float, floa
     points, at = points_m[looked], along[looked]
     direction, _ = fitted(points, points[-1] - points[0])
     width = np.add(*sides(points, direction, room))
-    narrow = width <= float(np.quantile(width, _NARROW_QUANTILE)) + _NARROW_M
+    narrow = is_narrow(width)
     chosen = narrow & (at <= at[narrow][0] + fit_m)
     if float(np.ptp(at[chosen])) < min(_LEAST_STRAIGHT_M, at[-1] - begin) or chosen.sum() < 3:
         chosen = at <= begin + fit_m
@@ -181,6 +183,13 @@ def sides(points: FloatArray, direction: FloatArray, room: Room) -> tuple[FloatA
     """Return the room (N,) to the left and to the right of points (N, 2)."""
     normals = np.broadcast_to(normal(direction), points.shape)
     return room.to_wall_m(points, normals), room.to_wall_m(points, -normals)
+
+
+def is_narrow(width_m: FloatArray) -> npt.NDArray[np.bool_]:
+    """Return where of widths (N,) a drift is as wide as it is, give or take its roughness, and not a mouth or a corner."""
+    low, usual = np.quantile(width_m, [_LOWEST_QUANTILE, _NARROW_QUANTILE])
+    spread = (usual - low) / _BETWEEN
+    return np.asarray(width_m <= usual + float(np.clip(_SPREADS * spread, _NARROW_M, _MOST_NARROW_M)))
 
 
 def roughness_m(left: FloatArray, right: FloatArray) -> float:

@@ -12,7 +12,7 @@ import math
 import numpy as np
 
 from lhdmap.messages import FloatArray
-from lhdmap.topology.arms import FIT_M, FROM_RADII, Axis, fitted, normal, roughness_m, sides, unit
+from lhdmap.topology.arms import FIT_M, FROM_RADII, Axis, fitted, is_narrow, normal, roughness_m, sides, unit
 from lhdmap.topology.driven import arc_m
 from lhdmap.topology.room import Room
 from lhdmap.topology.skeleton import Line
@@ -21,7 +21,6 @@ LONG_M = 8.0
 """An arm with so much straight wall needs no other."""
 COLLINEAR = math.cos(math.radians(20.0))
 _OWN_FROM = 0.8  # free radii
-_NARROW_QUANTILE, _NARROW_M = 0.2, 0.5
 _FEWEST, _SHORTEST_M, _OFF_M = 8, 6.0, 0.3
 _ROUNDS = 2
 
@@ -55,7 +54,7 @@ def axis_of_parts(own: Axis, chord: FloatArray, parts: list[FloatArray], room: R
     for _ in range(_ROUNDS):
         left, right = sides(points, direction, room)
         width = left + right
-        narrow = width <= float(np.quantile(width, _NARROW_QUANTILE)) + _NARROW_M
+        narrow = is_narrow(width)
         middles = points[narrow] + 0.5 * (left - right)[narrow, None] * normal(direction)
         if len(middles) < _FEWEST:
             return own

@@ -19,7 +19,8 @@ from lhdmap.messages import FloatArray
 from lhdmap.topology.room import WALL_CELLS, Room
 
 _STEP_M = 0.15
-_LONGEST_M = 10.0  # from the corner to where the rounding begins
+_LONGEST_M = 12.0  # from the corner to where the rounding begins
+_WIDEST_RADIUS_M = 9.0  # loaders turn in less
 _LEAST_M2, _ROUGH = 0.1, 0.7  # of rock cut away; and for each metre as much as the walls are rough: less is roughness
 _WIDEST_RAD = math.radians(150.0)  # walls so nearly straight have no corner that could be rounded
 
@@ -57,5 +58,5 @@ def _between(
     cosine = away @ bisector / r
     root = np.sqrt(np.maximum(cosine**2 - math.cos(half) ** 2, 0.0))
     radii = r * (cosine + root) * math.sin(half) / math.cos(half) ** 2
-    near = radii <= _LONGEST_M * math.tan(half)
+    near = radii <= min(_LONGEST_M * math.tan(half), _WIDEST_RADIUS_M)
     return points[near], radii[near]
