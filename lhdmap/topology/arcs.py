@@ -155,7 +155,7 @@ def _to_the_wall(graph: Graph, line: Line) -> FloatArray:
     """Return the points of a line, dead ends prolonged to the wall: the core ends its radius before it."""
     points = line.points_m
     for vertex, at_end in ((line.start, False), (line.end, True)):
-        if graph.skeleton.degree(vertex) != 1:
+        if graph.skeleton.degree(vertex) != 1 or graph.goes_on(vertex):
             continue
         arm = line if at_end else line.reversed()
         end, direction, length = end_of(arm, graph.scale)
