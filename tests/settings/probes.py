@@ -30,6 +30,8 @@ from lhdmap.pipeline.pile import PileWatch, PlacedScan
 from lhdmap.rockbreaker.machine import Rockbreaker
 from lhdmap.simulation.grizzly import simulate_grizzly
 from lhdmap.smoothing.trust import expected_error
+from lhdmap.topology.build import Seen, topology_of
+from lhdmap.topology.geojson import to_geojson
 
 from tests.report.synthetic import START_NS, report_data
 from tests.report.test_recording import read
@@ -179,6 +181,14 @@ def _untimed(values: Any) -> Any:
     return [_untimed(value) for value in values] if isinstance(values, list) else values
 
 
+def topology(settings: Settings, seen: Callable[[], Seen]) -> str:
+    """Return the digest of the topological map, as its file has it, and of the free space of a drive; None where it is off."""
+    if settings.topology.method == "off":
+        return digest(None)
+    found = topology_of(seen(), settings.topology)
+    return digest(json.dumps(to_geojson(found.map)), found.sheets, found.niches)
+
+
 def _mapped(stream: Callable[[], Stream], primary: Literal["front", "points"] = "front", *, own: bool = False) -> Probe:
     return lambda settings: run(settings, stream(), primary, own=own)
 
@@ -201,4 +211,6 @@ PROBES: dict[str, Probe] = {
     "recording": recording,
     "plan": plan,
     "rock": rock,
+    "topology": partial(topology, seen=streams.side_chambers),
+    "levels": partial(topology, seen=streams.two_levels),
 }
