@@ -148,7 +148,7 @@ _SETTINGS = {
     "rockbreaker.clearance_m": Case("rock"),
     "topology.arms": Case("topology", "driven"),
     "topology.opening_machine": Case("topology", 1.0),
-    "topology.radius_tunnel": Case("topology", 0.15),
+    "topology.radius_tunnel": Case("topology", 0.1),
     "topology.merge": Case("topology", 2.0),
     "topology.throat_margin_m": Case("topology", 1.6),
     "topology.level_gap_m": Case("levels", 20.0),
