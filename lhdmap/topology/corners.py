@@ -43,9 +43,7 @@ def rounding_m(corner_m: FloatArray, along: FloatArray, other: FloatArray, rough
     return float(begins[best]) if gain_m2[best] > _LEAST_M2 else 0.0
 
 
-def _between(
-    corner_m: FloatArray, along: FloatArray, other: FloatArray, angle: float
-) -> tuple[FloatArray, FloatArray]:
+def _between(corner_m: FloatArray, along: FloatArray, other: FloatArray, angle: float) -> tuple[FloatArray, FloatArray]:
     """Return points (N, 2) between two walls, and for each the least radius (N,) of a rounding that cuts it away."""
     half = 0.5 * angle
     at = np.arange(0.5 * _STEP_M, _LONGEST_M, _STEP_M)

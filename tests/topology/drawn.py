@@ -1,7 +1,8 @@
-"""Drifts drawn into a grid, and drives through them: their geometry is known, and rays are cast in it without the code under test."""
+"""Drifts drawn into a grid, and drives through them: known geometry, and rays that are cast without the code under test."""
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Sequence
 
@@ -34,7 +35,7 @@ class World:
         x, y = np.meshgrid(*((np.arange(n) + 0.5) * CELL_M + low for n, low in zip(size, self.low, strict=True)))
         self.free = np.zeros(x.shape, bool)
         for line, width in drifts:
-            for a, b in zip(line[:-1], line[1:], strict=True):
+            for a, b in itertools.pairwise(line):
                 self.free |= _within(x, y, np.array(a, dtype=float), np.array(b, dtype=float), 0.5 * width)
         self._x, self._y = x, y
         for rock in rocks:
@@ -48,7 +49,11 @@ class World:
         px, py = self._x - corner[0], self._y - corner[1]
         cross = along[0] * other[1] - along[1] * other[0]
         u, v = (px * other[1] - py * other[0]) / cross, (along[0] * py - along[1] * px) / cross
-        tip = (u >= 0) & (v >= 0) & (px * bisector[0] + py * bisector[1] < radius_m / math.sin(half) * math.cos(half) ** 2)
+        tip = (
+            (u >= 0)
+            & (v >= 0)
+            & (px * bisector[0] + py * bisector[1] < radius_m / math.sin(half) * math.cos(half) ** 2)
+        )
         self.free |= tip & (np.hypot(self._x - centre[0], self._y - centre[1]) > radius_m)
 
     def sheet(self) -> Sheet:

@@ -9,14 +9,14 @@ import pytest
 from lhdmap.machine import Machine
 from lhdmap.messages import FloatArray
 from lhdmap.topology.connections import Walls, connection, drivable, way_between
-from lhdmap.topology.model import Connection
+from lhdmap.topology.model import Connection, Kind
 from lhdmap.topology.reduce import graph_of
 from lhdmap.topology.settings import TopologySettings
 
 from tests.topology.drawn import SCALE, World, steps
 
 BODY = drivable(Machine())
-NAMES = ("a", "b", "front_back")
+NAMES: tuple[str, str, Kind] = ("a", "b", "front_back")
 HALF_M = max(float(np.abs(BODY.front_m[:, 1]).max()), float(np.abs(BODY.rear_m[:, 1]).max()))
 
 
@@ -40,13 +40,15 @@ def made(way: FloatArray | None, room: Walls | None) -> Connection:
 def test_the_clearance_of_a_straight_corridor(width_m: float, y_m: float) -> None:
     found = made(along(y_m), walls(width_m))
     assert found.clearance_m == pytest.approx(0.5 * width_m - y_m - HALF_M, abs=0.12)
-    assert found.feasible and found.min_radius_m > 1e3
+    assert found.feasible
+    assert found.min_radius_m > 1e3
     assert found.length_m == pytest.approx(35.0, abs=0.01)
 
 
 def test_a_corridor_narrower_than_the_machine_cannot_be_driven() -> None:
     found = made(along(), walls(2.0 * HALF_M - 0.3))
-    assert not found.feasible and "touch the wall" in found.reason
+    assert not found.feasible
+    assert "touch the wall" in found.reason
 
 
 def arc(radius_m: float) -> FloatArray:
@@ -54,9 +56,13 @@ def arc(radius_m: float) -> FloatArray:
     a = np.arange(0.0, 0.5 * math.pi, 0.25 / radius_m)
     turn = np.column_stack([10.0 + radius_m * np.sin(a), radius_m * (1.0 - np.cos(a))])
     s = np.arange(0.25, 10.0, 0.25)
-    line = np.vstack([
-        np.column_stack([s, np.zeros(len(s))]), turn, np.column_stack([np.full(len(s), 10.0 + radius_m), radius_m + s])
-    ])
+    line = np.vstack(
+        [
+            np.column_stack([s, np.zeros(len(s))]),
+            turn,
+            np.column_stack([np.full(len(s), 10.0 + radius_m), radius_m + s]),
+        ]
+    )
     return np.column_stack([line, np.zeros(len(line))])
 
 
@@ -74,19 +80,23 @@ def test_a_turn_tighter_than_the_joint_allows() -> None:
     least = (size.joint_to_front_axle_m * math.cos(gamma) + size.joint_to_rear_axle_m) / math.sin(gamma)
     assert BODY.least_radius_m == pytest.approx(least)
     found = made(arc(0.6 * least), None)
-    assert not found.feasible and found.reason.startswith("radius")
+    assert not found.feasible
+    assert found.reason.startswith("radius")
 
 
 def test_no_way_without_a_loop() -> None:
     found = made(None, None)
-    assert not found.feasible and found.length_m == 5.0 and "loop" in found.reason
+    assert not found.feasible
+    assert found.length_m == 5.0
+    assert "loop" in found.reason
 
 
 def test_a_way_between_two_poses_begins_and_ends_there() -> None:
     start, end = np.array([0.0, 0.0, 1.0, 0.0]), np.array([12.0, 10.0, 1.0, 0.5 * math.pi])
     way = way_between(start, end)
     assert way is not None
-    assert np.allclose(way[0, :2], start[:2], atol=1e-6) and np.allclose(way[-1, :2], end[:2], atol=1e-6)
+    assert np.allclose(way[0, :2], start[:2], atol=1e-6)
+    assert np.allclose(way[-1, :2], end[:2], atol=1e-6)
     first, last = way[1] - way[0], way[-1] - way[-2]
     assert abs(math.atan2(first[1], first[0])) < 0.05
     assert abs(math.remainder(math.atan2(last[1], last[0]) - end[3], 2 * math.pi)) < 0.05

@@ -33,7 +33,8 @@ def test_without_edits_nothing_changes() -> None:
 )
 def test_rename_by_name_id_or_place(what: str, old: str, tmp_path: Path) -> None:
     found = changed(f'[[rename]]\n{what}\nname = "new"\n', tmp_path)
-    assert "new" in found.names() and old not in found.names()
+    assert "new" in found.names()
+    assert old not in found.names()
 
 
 def test_rename_at_an_intersection_means_the_intersection(tmp_path: Path) -> None:
@@ -52,7 +53,8 @@ def test_a_limit_is_that_of_the_tunnel_and_its_connections(tmp_path: Path) -> No
     found = changed('[[limit]]\nat_m = [20, 1]\nspeed_limit_kmh = 7.0\nwall_preference = "left"\n', tmp_path)
     assert (found.tunnels[0].speed_limit_kmh, found.tunnels[0].wall_preference) == (7.0, "left")
     limits = {one.start.split(".")[0]: one.speed_limit_kmh for one in found.connections}
-    assert limits["t1"] == 7.0 and limits["t2"] == 12.0
+    assert limits["t1"] == 7.0
+    assert limits["t2"] == 12.0
 
 
 def test_an_added_waypoint_lies_on_the_tunnel_s_line(tmp_path: Path) -> None:
@@ -64,7 +66,8 @@ def test_an_added_waypoint_lies_on_the_tunnel_s_line(tmp_path: Path) -> None:
 
 def test_merge_and_split_are_places(tmp_path: Path) -> None:
     wanted = edits("[[merge]]\nat_m = [1, 2]\n[[split]]\nat_m = [3, 4]\n[[split]]\nat_m = [5, 6]\n", tmp_path)
-    assert wanted.together_m.tolist() == [[1.0, 2.0]] and wanted.apart_m.tolist() == [[3.0, 4.0], [5.0, 6.0]]
+    assert wanted.together_m.tolist() == [[1.0, 2.0]]
+    assert wanted.apart_m.tolist() == [[3.0, 4.0], [5.0, 6.0]]
     assert NO_EDITS.apart_m.shape == (0, 2)
 
 

@@ -27,7 +27,9 @@ def at(sheet: Sheet, *points: tuple[float, float]) -> list[int]:
 
 def test_beams_are_free_up_to_their_hits_and_tell_nothing_beyond() -> None:
     angles = np.radians(np.arange(-90.0, 90.5, 0.5))
-    sheet = free_space([fan(angles, np.full(361, 8.0))], np.array([[100.0, 50.0, 3.0, 0.0]]), ONE, 0.2, TopologySettings())
+    sheet = free_space(
+        [fan(angles, np.full(361, 8.0))], np.array([[100.0, 50.0, 3.0, 0.0]]), ONE, 0.2, TopologySettings()
+    )
     assert at(sheet, (104.0, 50.0), (107.5, 50.0), (100.5, 57.0)) == [FREE] * 3
     assert at(sheet, (108.05, 50.05), (100.0 + 8.02 * math.cos(0.5), 50.0 + 8.02 * math.sin(0.5))) == [OCCUPIED] * 2
     assert at(sheet, (109.0, 50.0), (96.0, 50.0)) == [UNKNOWN] * 2
@@ -75,14 +77,16 @@ def test_an_island_is_filled_by_its_diagonal_not_by_its_area() -> None:
     cells[40:73, 100:133] = UNKNOWN  # 6.6 x 6.6 m: 9.3 m
     cells[150, 200:240] = OCCUPIED  # a thin wall of 8 m
     found = filled(cells, 0.2, 6.5)
-    assert found[50, 50] and not found[50, 120] and not found[150, 220]
+    assert found[50, 50]
+    assert not found[50, 120]
+    assert not found[150, 220]
     assert not found[0, 10]
 
 
 def test_neighbouring_hits_are_thinned_but_not_the_ends_before_a_leap() -> None:
     x = np.arange(0.0, 2.0, 0.01)
     wall = np.column_stack([x, np.full(len(x), 2.0), np.zeros(len(x))])
-    behind = wall + [2.5, 4.0, 0.0]
+    behind = wall + np.array([2.5, 4.0, 0.0])
     kept = thin(np.vstack([wall, behind]))
     steps = np.linalg.norm(np.diff(kept, axis=0), axis=1)
     assert len(kept) < 0.15 * 2 * len(x) + 4
@@ -104,7 +108,8 @@ def _kept(poses: list[tuple[float, float, float]], height_m: float = 0.0) -> lis
 def test_views_are_kept_each_half_metre_and_grow_with_the_map() -> None:
     once = [(0.1 * k, 0.0, 0.0) for k in range(101)]
     kept = _kept(once)
-    assert kept[0] == 0 and abs(len(kept) - 10.0 / STEP_M) <= 1
+    assert kept[0] == 0
+    assert abs(len(kept) - 10.0 / STEP_M) <= 1
     assert len(_kept((once + once[::-1]) * 6)) < 5 * len(kept)
 
 

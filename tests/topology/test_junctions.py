@@ -10,7 +10,7 @@ import pytest
 from lhdmap.messages import FloatArray
 from lhdmap.topology.arms import Axis, corner_m, meeting_m, reach_m
 from lhdmap.topology.edits import Spot, TopologyEdits
-from lhdmap.topology.graph import Graph
+from lhdmap.topology.graph import Graph, Scale
 from lhdmap.topology.reduce import graph_of
 from lhdmap.topology.room import Room
 from lhdmap.topology.settings import TopologySettings
@@ -46,7 +46,7 @@ def test_where_only_driven_arms_count_one_that_was_seen_does_not() -> None:
     assert len(graph_of(world.sheet(), into, scale, TopologySettings()).junctions()) == 1
 
 
-def replace_scale(*, seen: bool) -> type(SCALE):  # type: ignore[valid-type]
+def replace_scale(*, seen: bool) -> Scale:
     return SCALE._replace(seen=seen, obstacle_m=SCALE.obstacle_m if seen else 1.0)
 
 

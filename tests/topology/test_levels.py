@@ -30,13 +30,16 @@ def test_a_level_drive_is_one_sheet() -> None:
 def test_a_drive_over_itself_is_cut_between_both_heights() -> None:
     way = poses(RAMP)
     bounds = boundaries_m(way, 3.0)
-    assert len(bounds) == 1 and 0.5 < bounds[0] < 9.0
+    assert len(bounds) == 1
+    assert 0.5 < bounds[0] < 9.0
     sheets = sheets_of(way, bounds)
     cuts = cuts_of(way, sheets)
-    assert len(cuts) == 1 and cuts[0].lower == 0
+    assert len(cuts) == 1
+    assert cuts[0].lower == 0
     assert cuts[0].pose[2] == pytest.approx(bounds[0], abs=0.3)
     over = np.linalg.norm(way[:, :2] - [30.0, 0.0], axis=1) < 5.0
-    assert set(sheets[over & (way[:, 2] < 3.0)]) == {0} and set(sheets[over & (way[:, 2] > 6.0)]) == {1}
+    assert set(sheets[over & (way[:, 2] < 3.0)]) == {0}
+    assert set(sheets[over & (way[:, 2] > 6.0)]) == {1}
 
 
 def test_back_and_forth_through_a_boundary_is_one_cut() -> None:
@@ -59,10 +62,15 @@ def test_in_a_spiral_no_sheet_has_two_turns_above_each_other() -> None:
 
 def test_where_a_ramp_crosses_above_there_is_no_junction() -> None:
     """The same plan without heights has one, with four arms."""
-    lower, upper = World([([(0, 0), (60, 0), (60, 50), (30, 50)], 4.6)]), World([([(60, 20), (60, 50), (30, 50), (30, -40)], 4.6)])
+    lower, upper = (
+        World([([(0, 0), (60, 0), (60, 50), (30, 50)], 4.6)]),
+        World([([(60, 20), (60, 50), (30, 50), (30, -40)], 4.6)]),
+    )
     seen = drive([lower, upper], RAMP, world_at=((0.0, 0), (100.0, 1)))
     found = topology_of(seen, TopologySettings())
-    assert not found.map.intersections and len(found.map.tunnels) == 1 and len(found.sheets) == 2
+    assert not found.map.intersections
+    assert len(found.map.tunnels) == 1
+    assert len(found.sheets) == 2
     assert found.map.tunnels[0].length_m == pytest.approx(230.0, abs=8.0)
     assert found.map.tunnels[0].grade_max_pct == pytest.approx(15.0, abs=1.5)
     flat = World([([(0, 0), (60, 0), (60, 50), (30, 50), (30, -40)], 4.6)])

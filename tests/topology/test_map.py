@@ -62,7 +62,11 @@ def test_a_branch() -> None:
 def test_access_points_are_where_the_walls_corner_and_face_outward() -> None:
     topology = found(tee())
     own = [point for point in topology.access_points if point.node == "i1"]
-    assert sorted(round(math.degrees(point.pose[3])) % 360 // 10 * 10 for point in own) in ([0, 90, 180], [0, 80, 180], [90, 170, 350])
+    assert sorted(round(math.degrees(point.pose[3])) % 360 // 10 * 10 for point in own) in (
+        [0, 90, 180],
+        [0, 80, 180],
+        [90, 170, 350],
+    )
     for point in own:
         assert np.linalg.norm(point.pose[:2] - [30.0, 0.0]) == pytest.approx(2.3, abs=0.45)
         out = point.pose[:2] - np.array([30.0, 0.0])
@@ -75,7 +79,8 @@ def test_access_points_join_in_pairs_at_one_place_facing_each_other() -> None:
         for point in topology.access_points:
             assert point.joins is not None
             twin = points[point.joins]
-            assert twin.joins == point.id and twin.node != point.node
+            assert twin.joins == point.id
+            assert twin.node != point.node
             assert np.allclose(point.pose[:3], twin.pose[:3])
             assert abs(math.remainder(point.pose[3] - twin.pose[3], 2 * math.pi)) == pytest.approx(math.pi)
 
@@ -136,11 +141,10 @@ def moved(poses: FloatArray, turn: float, shift: tuple[float, float]) -> FloatAr
 @given(turn=st.floats(-math.pi, math.pi), x=st.floats(-500.0, 500.0), y=st.floats(-500.0, 500.0))
 def test_turning_and_shifting_the_mine_turns_and_shifts_the_map(turn: float, x: float, y: float) -> None:
     seen = tee()
-    other = seen._replace(
-        view_poses=moved(seen.view_poses, turn, (x, y)), path=moved(seen.path, turn, (x, y))
-    )
+    other = seen._replace(view_poses=moved(seen.view_poses, turn, (x, y)), path=moved(seen.path, turn, (x, y)))
     a, b = found(seen), found(other)
-    assert [tunnel.name for tunnel in a.tunnels] == [tunnel.name for tunnel in b.tunnels] and ends(a) == ends(b)
+    assert [tunnel.name for tunnel in a.tunnels] == [tunnel.name for tunnel in b.tunnels]
+    assert ends(a) == ends(b)
     before = moved(np.array([point.pose for point in a.access_points]), turn, (x, y))
     after = np.array([point.pose for point in b.access_points])
     assert [point.id for point in a.access_points] == [point.id for point in b.access_points]

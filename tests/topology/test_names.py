@@ -12,7 +12,10 @@ from lhdmap.topology.nodes import RawMap, RawNode, RawTunnel
 
 def raw(tunnels: int, nodes: int) -> RawMap:
     """Tunnels along x one after the other, 50 m each, intersections of 10 m between them."""
-    lines = [np.column_stack([np.linspace(60.0 * k, 60.0 * k + 50.0, 51), np.zeros(51), np.zeros(51)]) for k in range(tunnels)]
+    lines = [
+        np.column_stack([np.linspace(60.0 * k, 60.0 * k + 50.0, 51), np.zeros(51), np.zeros(51)])
+        for k in range(tunnels)
+    ]
     found = [
         RawTunnel(Arc(("dead_end", "dead_end"), line, np.ones((51, 2)), 0, True), line, np.ones((51, 2)), (None, None))
         for line in lines
@@ -35,7 +38,9 @@ def named(tunnels: int, nodes: int, words: list[tuple[float, float, str]]) -> Na
 
 def test_nodes_have_the_operator_s_names() -> None:
     found = named(2, 1, [(0.0, 51.0, "T7"), (51.0, 59.0, "X1"), (59.0, 110.0, "T9")])
-    assert found.tunnels == ["T7", "T9"] and found.nodes == ["X1"] and not found.places
+    assert found.tunnels == ["T7", "T9"]
+    assert found.nodes == ["X1"]
+    assert not found.places
 
 
 def test_what_was_not_named_gets_a_name_that_nothing_has() -> None:
@@ -46,13 +51,15 @@ def test_what_was_not_named_gets_a_name_that_nothing_has() -> None:
 
 def test_a_name_for_several_tunnels_is_numbered() -> None:
     found = named(2, 1, [(0.0, 51.0, "S1"), (51.0, 59.0, "I4"), (59.0, 110.0, "S1")])
-    assert found.tunnels == ["S1.1", "S1.2"] and found.nodes == ["I4"]
+    assert found.tunnels == ["S1.1", "S1.2"]
+    assert found.nodes == ["I4"]
 
 
 def test_a_name_said_a_moment_longer_does_not_name_the_intersection() -> None:
     """He said the tunnel's name until after its end: the intersection keeps its own."""
     found = named(2, 1, [(0.0, 56.0, "A"), (56.0, 110.0, "B")])
-    assert found.tunnels == ["A", "B"] and found.nodes == ["I1"]
+    assert found.tunnels == ["A", "B"]
+    assert found.nodes == ["I1"]
 
 
 def test_a_place_within_a_tunnel_is_a_place() -> None:
@@ -60,12 +67,20 @@ def test_a_place_within_a_tunnel_is_a_place() -> None:
     assert found.tunnels == ["T1"]
     place = found.places[0]
     assert (place.name, place.tunnel) == ("PB1", 0)
-    assert path(50.0)[place.rows, 0].min() == 20.0 and path(50.0)[place.rows, 0].max() == 29.75
+    assert path(50.0)[place.rows, 0].min() == 20.0
+    assert path(50.0)[place.rows, 0].max() == 29.75
 
 
 @pytest.mark.parametrize(
     ("name", "purpose"),
-    [("DP1", "draw_point"), ("OP2", "dump"), ("P1", "park"), ("TB1", "turning_bay"), ("PB3", "passing_bay"), ("T1", None)],
+    [
+        ("DP1", "draw_point"),
+        ("OP2", "dump"),
+        ("P1", "park"),
+        ("TB1", "turning_bay"),
+        ("PB3", "passing_bay"),
+        ("T1", None),
+    ],
 )
 def test_what_a_place_is_for(name: str, purpose: str | None) -> None:
     assert purpose_of(name) == purpose

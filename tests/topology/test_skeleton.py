@@ -17,7 +17,9 @@ from tests.topology.drawn import SCALE, Drift, World, steps
 ALONG: Drift = ([(0, 0), (80, 0)], 4.6)
 
 
-def graph(*drifts: Drift, driven: FloatArray | None = None, rocks: tuple[tuple[float, float, float, float], ...] = ()) -> Graph:
+def graph(
+    *drifts: Drift, driven: FloatArray | None = None, rocks: tuple[tuple[float, float, float, float], ...] = ()
+) -> Graph:
     """The graph of drifts that were all driven, or one that was driven elsewhere."""
     world = World(drifts, rocks)
     way = np.vstack([steps(line) for line, _ in drifts]) if driven is None else driven
@@ -46,7 +48,8 @@ def test_a_branch_is_one_junction_where_the_centre_lines_meet(angle_deg: float) 
 
 def test_a_cross_has_four_arms() -> None:
     found = graph(ALONG, ([(40, -35), (40, 35)], 4.6))
-    assert degrees(found) == [4] and len(found.skeleton.lines) == 4
+    assert degrees(found) == [4]
+    assert len(found.skeleton.lines) == 4
 
 
 def test_a_bend_is_no_junction() -> None:
@@ -72,7 +75,8 @@ def test_a_tunnel_that_ends_where_it_began() -> None:
     found = graph(([(0, 0), (77.3, 0)], 4.6), loop)
     assert degrees(found) == [3]
     own = [line for line in found.skeleton.lines if line.start == line.end]
-    assert len(own) == 1 and own[0].length_m == pytest.approx(150.0, abs=12.0)
+    assert len(own) == 1
+    assert own[0].length_m == pytest.approx(150.0, abs=12.0)
     assert found.skeleton.degree(own[0].start) == 3
 
 
@@ -80,7 +84,9 @@ def test_a_tunnel_that_ends_where_it_began() -> None:
 def test_a_parked_machine_is_filled_and_a_pillar_is_not(length_m: float, width_m: float, count: int) -> None:
     """In a hall of 20 m width: a box with a diagonal below 6.5 m, and one above it."""
     hall: Drift = ([(30, 0), (56, 0)], 20.0)
-    driven = np.vstack([steps([(2, 0), (32, 0), (36, 7), (50, 7), (54, 0), (78, 0), (54, 0), (50, -7), (36, -7), (32, 0)])])
+    driven = np.vstack(
+        [steps([(2, 0), (32, 0), (36, 7), (50, 7), (54, 0), (78, 0), (54, 0), (50, -7), (36, -7), (32, 0)])]
+    )
     found = graph(ALONG, hall, driven=driven, rocks=((43.0, 0.0, length_m, width_m),))
     assert len(found.junctions()) == count
 
@@ -91,12 +97,14 @@ def test_what_was_driven_exists_however_narrow_it_is() -> None:
     found = skeleton_of(core, distance, world.sheet())
     ends = [vertex for vertex in found.vertices if found.degree(vertex) == 1]
     xs = sorted(found.vertices[vertex].point_m[0] for vertex in ends)
-    assert xs[0] < 4.0 and xs[-1] > 76.0
+    assert xs[0] < 4.0
+    assert xs[-1] > 76.0
 
 
 def test_a_piece_that_nobody_was_in_is_left_out() -> None:
     found = graph(ALONG, ([(0, 30), (80, 30)], 4.6), driven=steps(ALONG[0]))
-    assert len(found.skeleton.lines) == 1 and abs(found.skeleton.lines[0].points_m[:, 1]).max() < 4.0
+    assert len(found.skeleton.lines) == 1
+    assert abs(found.skeleton.lines[0].points_m[:, 1]).max() < 4.0
 
 
 def _line(start: int, end: int, *points: tuple[float, float]) -> Line:
@@ -117,6 +125,7 @@ def test_a_loop_has_two_ends_at_its_vertex() -> None:
     found.lines = [loop, arm]
     assert found.degree(0) == 3
     found.remove(loop)
-    assert found.degree(0) == 1 and set(found.vertices) == {0, 1}
+    assert found.degree(0) == 1
+    assert set(found.vertices) == {0, 1}
     found.remove(arm)
     assert not found.vertices

@@ -110,9 +110,7 @@ def _simulated(name: str, seed: int) -> TopologyDrive:
         pipeline.finish()
         ways = ways_of(pipeline, None)
     own, true = seen_of(pipeline, ways.rows, []), seen_of(pipeline, _rows(truth), [])
-    return TopologyDrive(
-        name, plan.walls.roughness_m, seed, own, true, ways.closures, topology_json(network, machine)
-    )
+    return TopologyDrive(name, plan.walls.roughness_m, seed, own, true, ways.closures, topology_json(network, machine))
 
 
 def _pipeline(machine: Machine) -> _Pipeline:

@@ -1,4 +1,4 @@
-"""A topological map against the truth: which intersections, degrees, tunnels and names are right, how far access points are off."""
+"""A topological map against the truth: intersections, degrees, tunnels and names, and how far access points are off."""
 
 from __future__ import annotations
 
@@ -80,7 +80,11 @@ def score(found: TopologicalMap, truth: Mapping[str, Any], placement: Placement 
     named = {found.intersections[k].id: truth["intersections"][i]["name"] for k, i in pairs.items()}
     wanted = Counter(_ends(one["ends"]) for one in truth["tunnels"])
     there = Counter(_ends([named.get(end, end) for end in one.ends]) for one in found.tunnels)
-    rows = [row for k, i in pairs.items() for row in _access(found, found.intersections[k], truth["intersections"][i], placement)]
+    rows = [
+        row
+        for k, i in pairs.items()
+        for row in _access(found, found.intersections[k], truth["intersections"][i], placement)
+    ]
     errors = np.array([row[:3] for row in rows]).reshape(-1, 3)
     last = max(rows, key=lambda row: row[0], default=(0.0, 0.0, 0.0, ""))
     return Score(
