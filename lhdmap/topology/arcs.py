@@ -11,13 +11,13 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from scipy.ndimage import gaussian_filter1d
+from scipy.ndimage import gaussian_filter1d, percentile_filter
 from scipy.spatial import KDTree
 
 from lhdmap.messages import FloatArray
 from lhdmap.topology.arms import Axis, reach_m
 from lhdmap.topology.driven import arc_m
-from lhdmap.topology.graph import Graph, closed_share
+from lhdmap.topology.graph import Graph, closed_share, end_of
 from lhdmap.topology.levels import Cut
 from lhdmap.topology.model import DEAD_END, UNEXPLORED
 from lhdmap.topology.room import Room
@@ -28,6 +28,7 @@ SEVERAL = -1
 """The sheet of an arc that goes over more than one."""
 _SMOOTH_STEPS = 2.0
 _ROUNDS = 3
+_WALL_PERCENT, _WALL_STEPS = 35, 11  # of the room over some metres: niches are no part of it
 _WIDEST_M = 8.0  # to one side: beyond is a room or a branch
 _CLOSED = 0.55
 _AT_CUT_M = 6.0
@@ -113,6 +114,7 @@ def centred(points_m: FloatArray, room: Room) -> tuple[FloatArray, FloatArray]:
         normals = normals_of(line)
         left, right = room.to_wall_m(line, normals, _WIDEST_M), room.to_wall_m(line, -normals, _WIDEST_M)
         walled = (left < _WIDEST_M) & (right < _WIDEST_M)
+        left, right = (percentile_filter(side, _WALL_PERCENT, _WALL_STEPS, mode="nearest") for side in (left, right))
         shift = np.where(walled, 0.5 * (left - right), 0.0)
         moved = line + np.clip(shift, -2.0, 2.0)[:, None] * normals
         moved = gaussian_filter1d(moved, _SMOOTH_STEPS, axis=0, mode="nearest")
@@ -153,13 +155,14 @@ def _to_the_wall(graph: Graph, line: Line) -> FloatArray:
     """Return the points of a line, dead ends prolonged to the wall: the core ends its radius before it."""
     points = line.points_m
     for vertex, at_end in ((line.start, False), (line.end, True)):
-        if graph.skeleton.degree(vertex) != 1:
+        if graph.skeleton.degree(vertex) != 1 or graph.goes_on(vertex):
             continue
+        arm = line if at_end else line.reversed()
+        end, direction, length = end_of(arm, graph.scale)
         outward = points if at_end else points[::-1]
-        way = outward[-1] - outward[-min(len(outward), 10)]
-        direction = way / max(float(np.linalg.norm(way)), 1e-9)
-        more = min(float(graph.room.to_wall_m(outward[-1:], direction[None])[0]), 3.0 * graph.scale.tunnel_m)
-        outward = np.vstack([outward, outward[-1] + more * direction])
+        more = min(float(graph.room.to_wall_m(end[None], direction[None])[0]), 3.0 * graph.scale.tunnel_m)
+        kept = len(outward) - np.count_nonzero(arc_m(arm.points_m) > length)
+        outward = np.vstack([outward[:kept], end + more * direction])
         points = outward if at_end else outward[::-1]
     return points
 

@@ -23,6 +23,7 @@ from lhdmap.topology.views import Fan
 _SHIFT = 4  # bits of a fraction of a cell that polygons are drawn with
 _GAP_STEPS, _GAP_M = 2.2, 0.5  # hits so many beams apart, and so far in space, have unseen room between them
 _WALL_SHARE = 0.25  # hits in a cell for each time that it was seen to be free, from which on it is wall
+_FEWEST_SEEN, _FANS_EACH = 3, 20  # of many fans so many have to see a cell: a single one looks through a crack
 _PULLED_CELLS = 0.7  # a beam is free up to so many cells before its hit
 
 
@@ -45,7 +46,7 @@ def free_space(
     for fan, row in zip(fans, of_fan, strict=True):
         _draw(fan, poses[row], (low, cell_m, reach), 1 if weights is None else int(weights[row]), free, walls)
     cells = np.full(free.shape, UNKNOWN, np.uint8)
-    cells[free > 0] = FREE
+    cells[free >= min(_FEWEST_SEEN, max(len(fans) // _FANS_EACH, 1))] = FREE
     cells[walls > np.maximum(_WALL_SHARE * free, 0.0)] = OCCUPIED
     heights = poses[:, 2]
     span = float(heights.min()), float(heights.max())

@@ -12,8 +12,9 @@ import numpy.typing as npt
 from scipy.ndimage import maximum_filter
 
 from lhdmap.messages import FloatArray
-from lhdmap.topology.arms import Axis, axis_of, meeting_m, through
-from lhdmap.topology.driven import DrivenShare, driven_shares
+from lhdmap.topology.arms import Axis, axis_of, fitted, meeting_m, through, unit
+from lhdmap.topology.collinear import COLLINEAR, LONG_M, axis_of_parts, direction_of, fitted_part, inner_part
+from lhdmap.topology.driven import DrivenShare, arc_m, driven_shares
 from lhdmap.topology.free_space import filled
 from lhdmap.topology.room import Room
 from lhdmap.topology.settings import TopologySettings
@@ -23,9 +24,11 @@ from lhdmap.topology.skeleton import Line, Skeleton, core_of, skeleton_of
 PAPER_WIDTH_M = 2.45
 _BUILDING_OBSTACLE_M = 1.0
 _RIDGE_M = 1.5
-_FILLS = 0.45  # of the tunnels' width: a machine that wide is in a mine, where openings count that were only seen
+_FILLS = 0.35  # of the tunnels' width: a machine that wide is in a mine, where openings count that were only seen
 _LINE_DRIVEN = 0.5
 _AT_CUT_M = 6.0
+_SHORT_M, _STRAIGHT = 6.0, 1.15
+_TAIL_M = 6.0  # of a line, that tell how it goes on
 
 
 class Scale(NamedTuple):
@@ -99,19 +102,50 @@ class Graph:
 
     def axes(self, vertex: int) -> tuple[FloatArray, list[Axis]]:
         """Return the middle of a junction (2,) and its arms' axes, in the order of `arms`."""
-        middle, axes = self._own_axes(vertex)
-        for k, (arm, axis) in enumerate(zip(self.arms(vertex), axes, strict=True)):
-            if axis.fitted_m == 0.0 and arm.end != vertex and self.skeleton.degree(arm.end) > 2:
-                axes[k] = through(axis, middle, self._own_axes(arm.end)[0])
+        centre, radius = self.skeleton.vertices[vertex]
+        arms, own = self.arms(vertex), self._own_axes(vertex)
+        axes = [self._with_more(arm, k, arms, own) for k, arm in enumerate(arms)]
+        middle = meeting_m(axes, centre, radius)
+        for k, (arm, axis) in enumerate(zip(arms, axes, strict=True)):
+            if self._ends_soon(arm, axis):
+                axes[k] = through(axis, middle, self._middle(arm.end))
         return middle, axes
 
-    def _own_axes(self, vertex: int) -> tuple[FloatArray, list[Axis]]:
+    def _ends_soon(self, arm: Line, axis: Axis) -> bool:
+        """Return whether an arm with little wall of its own goes straight to another junction."""
+        if axis.fitted_m >= _SHORT_M or arm.end == arm.start or self.skeleton.degree(arm.end) < 3:
+            return False
+        chord = float(np.linalg.norm(arm.points_m[-1] - arm.points_m[0]))
+        return axis.fitted_m == 0.0 or arm.length_m < _STRAIGHT * chord
+
+    def _own_axes(self, vertex: int) -> list[Axis]:
         centre, radius = self.skeleton.vertices[vertex]
-        axes = [axis_of(arm, centre, radius, self.room, self._far_radius_m(arm)) for arm in self.arms(vertex)]
-        return meeting_m(axes, centre, radius), axes
+        return [axis_of(arm, centre, radius, self.room, self._far_radius_m(arm)) for arm in self.arms(vertex)]
+
+    def _middle(self, vertex: int) -> FloatArray:
+        return meeting_m(self._own_axes(vertex), *self.skeleton.vertices[vertex])
 
     def _far_radius_m(self, arm: Line) -> float:
         return self.skeleton.vertices[arm.end].radius_m if self.skeleton.degree(arm.end) > 2 else 0.0
+
+    def _with_more(self, arm: Line, number: int, arms: list[Line], own: list[Axis]) -> Axis:
+        """Return the axis of an arm; a short one is fitted together with those that go on beyond either of its ends."""
+        if own[number].fitted_m >= LONG_M:
+            return own[number]
+        centre, radius = self.skeleton.vertices[arm.start]
+        chord = direction_of(arm, centre, radius)
+        parts = [inner_part(arm, centre, radius, self._far_radius_m(arm))]
+        others = [(one, axis, -1.0) for k, (one, axis) in enumerate(zip(arms, own, strict=True)) if k != number]
+        if arm.end != arm.start and self.skeleton.degree(arm.end) > 2:
+            others += [
+                (one, axis, 1.0)
+                for one, axis in zip(self.arms(arm.end), self._own_axes(arm.end), strict=True)
+                if one.end != arm.start
+            ]
+        for one, axis, sign in others:
+            if sign * float(axis.along @ chord) > COLLINEAR and axis.fitted_m > 0.0:
+                parts.append(fitted_part(one, *self.skeleton.vertices[one.start], self._far_radius_m(one)))
+        return axis_of_parts(own[number], chord, parts, self.room) if len(parts) > 1 else own[number]
 
 
 def whole_graph(sheet: Sheet, driven_m: FloatArray, scale: Scale, cuts: Sequence[FloatArray] = ()) -> Graph:
@@ -157,18 +191,24 @@ def barrier_m(room: Room, cut: FloatArray) -> FloatArray:
     return ends
 
 
-def last_direction(line: Line) -> FloatArray:
-    """Return the unit vector (2,) in which a line ends."""
-    back = line.points_m[-min(len(line.points_m), 8)]
-    way = line.points_m[-1] - back
-    unit: FloatArray = way / max(float(np.linalg.norm(way)), 1e-9)
-    return unit
+def end_of(arm: Line, scale: Scale) -> tuple[FloatArray, FloatArray, float]:
+    """Return where a dead end's line is still in the middle (2,), its direction there (2,), and its length up to there (m).
+
+    Before the face it turns into a corner.
+    """
+    along = arc_m(arm.points_m)
+    last = float(along[-1]) - min(0.5 * scale.tunnel_m, 0.3 * float(along[-1]))
+    kept = arm.points_m[along <= last]
+    tail = kept[along[: len(kept)] >= last - _TAIL_M]
+    if len(tail) < 3:
+        return kept[-1], unit(arm.points_m[-1] - arm.points_m[0]), last
+    return kept[-1], fitted(tail, tail[-1] - tail[0])[0], last
 
 
 def closed_share(graph: Graph, line: Line, vertex: int) -> float:
     """Return the share of the view ahead of a line's end at `vertex` that ends at walls, and not in the unknown."""
     leaving = line.leaving(vertex).reversed() if line.start == vertex else line
-    direction, end = last_direction(leaving), leaving.points_m[-1]
+    end, direction, _ = end_of(leaving, graph.scale)
     heading = math.atan2(direction[1], direction[0])
     angles = heading + np.radians(np.arange(-45.0, 46.0, 5.0))
     rays = np.column_stack([np.cos(angles), np.sin(angles)])

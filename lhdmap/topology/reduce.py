@@ -17,7 +17,7 @@ from lhdmap.messages import FloatArray
 from lhdmap.topology.arms import reach_m
 from lhdmap.topology.driven import DrivenShare, arc_m
 from lhdmap.topology.edits import NO_EDITS, TopologyEdits
-from lhdmap.topology.graph import Graph, Niche, Scale, last_direction, whole_graph
+from lhdmap.topology.graph import Graph, Niche, Scale, end_of, whole_graph
 from lhdmap.topology.settings import TopologySettings
 from lhdmap.topology.sheet import Sheet
 from lhdmap.topology.skeleton import Line, Skeleton, Vertex
@@ -51,12 +51,21 @@ def graph_of(
     `cuts`: poses (4,) where the drive goes on in another sheet; `edits`: where junctions are to be one, or to stay apart.
     """
     graph = whole_graph(sheet, driven_m, scale, cuts)
+    _take_small_loops_off(graph.skeleton)
     _take_spurs_off(graph, _SPUR * scale.opening_m)
     _join_near_junctions(graph.skeleton, settings.merge, edits)
     _take_niches_off(graph, settings)
     _leave_out_what_was_not_reached(graph)
     _take_niches_off(graph, settings)
     return graph
+
+
+def _take_small_loops_off(skeleton: Skeleton) -> None:
+    """Remove lines from a vertex to itself that lie within its own room: pixels of the grid."""
+    for line in list(skeleton.lines):
+        if line.start == line.end and line.length_m < _LOOP_RADII * skeleton.vertices[line.start].radius_m:
+            skeleton.remove(line)
+    skeleton.straighten()
 
 
 def _take_spurs_off(graph: Graph, depth_m: float) -> None:
@@ -153,9 +162,9 @@ def _dead_ends(graph: Graph, vertex: int, driven: dict[int, DrivenShare], settin
         if degree(arm.end) > 1 or graph.goes_on(arm.end):
             continue
         begins = reach_m(own, axes[:k] + axes[k + 1 :], middle)
-        end = arm.points_m[-1]
-        beyond = float(graph.room.to_wall_m(end[None], last_direction(arm)[None])[0])
-        depth = float(np.linalg.norm(arm.points_m[0] - middle)) + arm.length_m + beyond - begins
+        end, direction, length = end_of(arm, graph.scale)
+        beyond = float(graph.room.to_wall_m(end[None], direction[None])[0])
+        depth = float(np.linalg.norm(arm.points_m[0] - middle)) + length + beyond - begins
         share = driven[id(line)]
         reached = share.from_start_m if line.start == vertex else share.from_end_m
         was_driven = reached - begins > 0.5 * graph.scale.machine_m + _REACHED_M

@@ -12,6 +12,8 @@ from lhdmap.topology.sheet import Sheet
 _STEPS_PER_CELL = 5.0
 _PULLED_CELLS = 0.3  # beams are free up to a little before their hits: measured against known widths
 MOST_M = 15.0
+WALL_CELLS = _PULLED_CELLS + 0.5 / _STEPS_PER_CELL
+"""How far walls are beyond the last free cells, on the average."""
 
 
 class Room:

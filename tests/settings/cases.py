@@ -49,6 +49,7 @@ _SECTIONS = {
     "movement": Case("route"),
     "recording": Case("recording"),
     "rockbreaker": Case("plan"),
+    "topology": Case("topology"),
 }
 
 
@@ -152,6 +153,12 @@ _SETTINGS = {
     "pile.likely": Case("pile", 0.99),
     "movement.turn_s": Case("route", 5.0),
     "rockbreaker.clearance_m": Case("rock"),
+    "topology.arms": Case("topology", "driven"),
+    "topology.opening_machine": Case("topology", 1.0),
+    "topology.radius_tunnel": Case("topology", 0.1),
+    "topology.merge": Case("topology", 2.0),
+    "topology.throat_margin_m": Case("topology", 1.6),
+    "topology.level_gap_m": Case("levels", 20.0),
     **_figure9("figure9", _FOUND),
     **_figure9("figure9_repaired", {"pile.method": "figure9_repaired"}),
 }

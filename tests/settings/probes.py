@@ -36,6 +36,8 @@ from lhdmap.pipeline.pile import PileWatch, PlacedScan
 from lhdmap.rockbreaker.machine import Rockbreaker
 from lhdmap.simulation.grizzly import simulate_grizzly
 from lhdmap.smoothing.trust import expected_error
+from lhdmap.topology.build import Seen, topology_of
+from lhdmap.topology.geojson import to_geojson
 
 from tests.landmarks.worlds import MODERATE, TunnelWorld, drive, tunnel
 from tests.movement.mines import fast_ladder
@@ -214,6 +216,14 @@ def landmarks(settings: Settings) -> str:
     return digest(made, made.not_distinctive_m("t", settings.landmarks))
 
 
+def topology(settings: Settings, seen: Callable[[], Seen]) -> str:
+    """Return the digest of the topological map, as its file has it, and of the free space of a drive; None where it is off."""
+    if settings.topology.method == "off":
+        return digest(None)
+    found = topology_of(seen(), settings.topology)
+    return digest(json.dumps(to_geojson(found.map)), found.sheets, found.niches)
+
+
 def _mapped(stream: Callable[[], Stream], primary: Literal["front", "points"] = "front", *, own: bool = False) -> Probe:
     return lambda settings: run(settings, stream(), primary, own=own)
 
@@ -238,4 +248,6 @@ PROBES: dict[str, Probe] = {
     "plan": plan,
     "rock": rock,
     "route": routes,
+    "topology": partial(topology, seen=streams.side_chambers),
+    "levels": partial(topology, seen=streams.two_levels),
 }

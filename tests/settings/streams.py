@@ -35,10 +35,12 @@ from lhdmap.simulation.scenario import DriftScenario
 from lhdmap.simulation.sections import DriftSettings, DriveSettings
 from lhdmap.simulation.sensing.sections import ScannerSettings
 from lhdmap.simulation.world import DriftWorld
+from lhdmap.topology.build import Seen
 
 from tests.odometry import cloud_drives
 from tests.pile.cast_drift import CastDrift
 from tests.smoothing import places
+from tests.topology.drawn import World, drive
 
 Stream = tuple[tuple[str, Message], ...]
 TILTED = DriftScenario(
@@ -234,3 +236,21 @@ def lap_scans() -> tuple[KeyScan, ...]:
 def towards_a_pile() -> tuple[ScanHits, ...]:
     """Return scans each 0.2 m of a drive of 23 m towards a shallow pile, which ends 3 m before it."""
     return tuple(CastDrift(31.0).scans(from_m=10.0, to_m=33.0))[::2]
+
+
+@functools.cache
+def side_chambers() -> Seen:
+    """Return a drive past chambers of 3, 5 and 20 m, branches 7 m apart, and others around a pillar of 7.4 x 4.2 m."""
+    chambers = [((x, 0.0), (x, 2.3 + deep)) for x, deep in ((12.0, 3.0), (26.0, 5.0), (42.0, 20.0))]
+    chambers += [((49.0, 0.0), (49.0, -20.0)), ((64.0, 0.0), (64.0, 12.0)), ((76.0, 0.0), (76.0, 12.0))]
+    drifts = [([(0.0, 0.0), (90.0, 0.0)], 4.6), *((line, 4.6) for line in chambers), ([(61.7, 9.0), (78.3, 9.0)], 5.0)]
+    return drive(
+        World(drifts), [(3.0, 0.0), (64.0, 0.0), (64.0, 9.0), (76.0, 9.0), (76.0, 0.0), (64.0, 0.0), (88.0, 0.0)]
+    )
+
+
+@functools.cache
+def two_levels() -> Seen:
+    """Return a drive that comes back 8 m above where it was."""
+    world = World([([(0.0, 0.0), (50.0, 0.0)], 4.6), ([(48.0, 0.0), (48.0, 25.0)], 4.6)])
+    return drive(world, [(3.0, 0.0, 0.0), (48.0, 0.0, 0.0), (48.0, 20.0, 4.0), (48.0, 0.5, 8.0), (5.0, 0.5, 8.0)])
