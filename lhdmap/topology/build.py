@@ -17,7 +17,7 @@ import numpy.typing as npt
 from lhdmap.machine import Machine
 from lhdmap.messages import FloatArray
 from lhdmap.topology.arcs import SEVERAL, Heights, Mouth, arcs_of, joined
-from lhdmap.topology.connections import Walls
+from lhdmap.topology.connections import Walls, machine_of_width
 from lhdmap.topology.edits import NO_EDITS, TopologyEdits, edited, waypoints_added
 from lhdmap.topology.free_space import free_space
 from lhdmap.topology.graph import Graph, Niche, Scale, scale_of
@@ -148,7 +148,9 @@ def _assembled(
     }
     of_node |= {f"i{number}": walls[node.junction[0]] for number, node in enumerate(raw.nodes, 1)}
     driven = driven_pairs(topology, where)
-    connections = connections_of(topology, of_node, driven, seen.machine or Machine(), settings)
+    connections = connections_of(
+        topology, of_node, driven, seen.machine or machine_of_width(graphs[0].scale.machine_m), settings
+    )
     return replace(topology, connections=tuple(connections))
 
 

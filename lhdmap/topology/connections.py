@@ -9,6 +9,7 @@ connection is not feasible.
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import NamedTuple
 
 import cv2
@@ -71,6 +72,31 @@ def drivable(machine: Machine) -> Drivable:
     front, rear = size.joint_to_front_axle_m, size.joint_to_rear_axle_m
     least = (front * math.cos(angle) + rear) / math.sin(angle)  # of the front axle: κ (L_f cos γ + L_r) = sin γ
     return Drivable(_outline(machine, "base_link"), _outline(machine, "rear_link"), front, rear, least, size.width_m)
+
+
+def machine_of_width(width_m: float) -> Machine:
+    """Return the default machine, made smaller or larger as a whole: what is known of a robot that nobody described."""
+    machine = Machine()
+    scale = width_m / machine.dimensions.width_m
+    if abs(scale - 1.0) < 1e-6:
+        return machine
+    size = machine.dimensions
+    dimensions = replace(
+        size,
+        joint_to_front_axle_m=scale * size.joint_to_front_axle_m,
+        joint_to_rear_axle_m=scale * size.joint_to_rear_axle_m,
+        width_m=width_m,
+    )
+    bodies = {
+        name: replace(box, min_m=_scaled(box.min_m, scale), max_m=_scaled(box.max_m, scale))
+        for name, box in machine.bodies.items()
+    }
+    return replace(machine, dimensions=dimensions, bodies=bodies)
+
+
+def _scaled(corner_m: tuple[float, float, float], scale: float) -> tuple[float, float, float]:
+    x, y, z = corner_m
+    return scale * x, scale * y, scale * z
 
 
 def way_between(start: FloatArray, end: FloatArray) -> FloatArray | None:

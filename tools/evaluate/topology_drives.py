@@ -109,7 +109,7 @@ def _simulated(name: str, seed: int) -> TopologyDrive:
                 pipeline.update(role, _message(record.message))
         pipeline.finish()
         ways = ways_of(pipeline, None)
-    own, true = seen_of(pipeline, ways.rows, []), seen_of(pipeline, _rows(truth))
+    own, true = seen_of(pipeline, ways.rows), seen_of(pipeline, _rows(truth))
     return TopologyDrive(name, plan.walls.roughness_m, seed, own, true, ways.closures, topology_json(network, machine))
 
 
