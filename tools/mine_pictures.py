@@ -1,10 +1,15 @@
 """Draw the plans that ship as their worlds are: walls at 1.4 m over the floor, centre lines, names, the teaching drive.
 
+And a route on the map of a teaching drive, by the commands that the README shows.
+
 python -m tools.mine_pictures
 """
 
 from __future__ import annotations
 
+import subprocess
+import sys
+import tempfile
 from pathlib import Path
 from typing import Any
 
@@ -33,7 +38,32 @@ def main() -> int:
         draw(axis, make_network(load_plan(find_plan(name))), Machine())
         axis.set_title(name)
     figure.savefig(TARGET, dpi=85)
+    route_picture(TARGET.with_name("route.png"))
     return 0
+
+
+def route_picture(target: Path) -> None:
+    """Simulate the teaching drive of the level, build its map and draw a route on it."""
+    with tempfile.TemporaryDirectory() as folder:
+        log, built = f"{folder}/level.mcap", f"{folder}/level_map"
+        for words in (
+            ["simulate", "mine", "level", "--names", "-o", log],
+            ["build-map", log, "-o", built],
+            [
+                "route",
+                built,
+                "DP1",
+                "OP2",
+                "--heading",
+                "along",
+                "--goal-heading",
+                "along",
+                "--picture",
+                str(target),
+                "--force",
+            ],
+        ):
+            subprocess.run([sys.executable, "-m", "lhdmap", *words, "--quiet"], check=True)
 
 
 def draw(axis: Any, network: Network, machine: Machine) -> None:
