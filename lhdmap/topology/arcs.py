@@ -30,7 +30,7 @@ _SMOOTH_STEPS = 2.0
 _ROUNDS = 3
 _WALL_PERCENT, _WALL_STEPS = 35, 11  # of the room over some metres: niches are no part of it
 _WIDEST_M = 8.0  # to one side: beyond is a room or a branch
-_CLOSED = 0.55
+_CLOSED = 0.7
 _AT_CUT_M = 6.0
 _SMOOTH_HEIGHT = 4.0
 

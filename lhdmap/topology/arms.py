@@ -171,7 +171,7 @@ def fitted(points: FloatArray, outward: FloatArray) -> tuple[FloatArray, FloatAr
     keep = np.ones(len(points), bool)
     for _ in range(2):
         middle: FloatArray = points[keep].mean(axis=0)
-        direction: FloatArray = np.linalg.svd(points[keep] - middle)[2][0]
+        direction: FloatArray = np.linalg.svd(points[keep] - middle, full_matrices=False)[2][0]
         off = np.abs((points - middle) @ normal(direction))
         keep = off <= max(float(np.quantile(off, 0.8)), 1e-9)
     if direction @ outward < 0.0:

@@ -86,8 +86,7 @@ def _draw(
     near = ranges < reach_m
     hits = np.floor((origin + beams[near] @ R.T - low_m) / cell_m).astype(int)
     inside = ((hits >= 0) & (hits < [walls.shape[1], walls.shape[0]])).all(axis=1)
-    hits = np.unique(hits[inside], axis=0)
-    walls[hits[:, 1], hits[:, 0]] += weight
+    walls.reshape(-1)[np.unique(hits[inside, 1] * walls.shape[1] + hits[inside, 0])] += weight
 
 
 def _add(counts: npt.NDArray[np.uint16], patch: npt.NDArray[np.uint8], rows: slice, columns: slice) -> None:

@@ -19,7 +19,7 @@ from lhdmap.topology.free_space import filled
 from lhdmap.topology.room import Room
 from lhdmap.topology.settings import TopologySettings
 from lhdmap.topology.sheet import OCCUPIED, Sheet
-from lhdmap.topology.skeleton import Line, Skeleton, core_of, skeleton_of
+from lhdmap.topology.skeleton import Line, Skeleton, Vertex, core_of, skeleton_of
 
 PAPER_WIDTH_M = 2.45
 _BUILDING_OBSTACLE_M = 1.0
@@ -53,6 +53,15 @@ class Niche:
     depth_m: float
 
 
+class _Kept(NamedTuple):
+    """Axes of a vertex at a place, and the lines and far free radii that they were made from."""
+
+    place: Vertex
+    lines: list[Line]
+    far_m: list[float]
+    axes: list[Axis]
+
+
 @dataclass(slots=True)
 class Graph:
     """Junctions and lines of a sheet, along a drive at `driven_m` (N, 2).
@@ -67,6 +76,7 @@ class Graph:
     driven_m: FloatArray
     cuts_m: FloatArray
     niches: list[Niche] = field(default_factory=list)
+    _kept: dict[int, _Kept] = field(default_factory=dict, repr=False)
 
     @property
     def driven_share(self) -> float:
@@ -119,8 +129,15 @@ class Graph:
         return axis.fitted_m == 0.0 or arm.length_m < _STRAIGHT * chord
 
     def _own_axes(self, vertex: int) -> list[Axis]:
-        centre, radius = self.skeleton.vertices[vertex]
-        return [axis_of(arm, centre, radius, self.room, self._far_radius_m(arm)) for arm in self.arms(vertex)]
+        """Return the axes of a junction's arms, each by itself; kept as long as its lines are what they were."""
+        place, arms, lines = self.skeleton.vertices[vertex], self.arms(vertex), self.lines_at(vertex)
+        far = [self._far_radius_m(arm) for arm in arms]
+        kept = self._kept.get(vertex)
+        if kept is not None and kept.place is place and kept.far_m == far and _same(kept.lines, lines):
+            return list(kept.axes)
+        axes = [axis_of(arm, *place, self.room, far_m) for arm, far_m in zip(arms, far, strict=True)]
+        self._kept[vertex] = _Kept(place, lines, far, axes)
+        return list(axes)
 
     def _middle(self, vertex: int) -> FloatArray:
         return meeting_m(self._own_axes(vertex), *self.skeleton.vertices[vertex])
@@ -146,6 +163,10 @@ class Graph:
             if sign * float(axis.along @ chord) > COLLINEAR and axis.fitted_m > 0.0:
                 parts.append(fitted_part(one, *self.skeleton.vertices[one.start], self._far_radius_m(one)))
         return axis_of_parts(own[number], chord, parts, self.room) if len(parts) > 1 else own[number]
+
+
+def _same(some: list[Line], others: list[Line]) -> bool:
+    return len(some) == len(others) and all(a is b for a, b in zip(some, others, strict=True))
 
 
 def whole_graph(sheet: Sheet, driven_m: FloatArray, scale: Scale, cuts: Sequence[FloatArray] = ()) -> Graph:
