@@ -28,7 +28,7 @@ from lhdmap.odometry.rear_view import RearView
 from lhdmap.odometry.start import ScanInput
 from lhdmap.odometry.steps import WheelStep
 from lhdmap.pipeline.mounts import Mounts, level_sensor
-from lhdmap.pipeline.rear import RearScans
+from lhdmap.pipeline.rear import AT_ONCE_NS, RearScans
 from lhdmap.pipeline.sweep_times import SweepTimes
 from lhdmap.proprioception.attitude import AttitudeFilter
 from lhdmap.proprioception.wheels import WheelOdometry
@@ -146,9 +146,9 @@ class FrontEnd:
         for message in self._early:
             self.attitude.update(message)
 
-    def behind_at(self, time_ns: int) -> RearView | None:
-        """Return what the rear scanner saw at `time_ns`, None where it saw nothing or the joint is not known."""
-        return self.rear.near(time_ns, *self.attitude_at(time_ns))
+    def behind_at(self, time_ns: int, within_ns: int = AT_ONCE_NS) -> RearView | None:
+        """Return what the rear scanner saw at `time_ns`, None where it saw nothing `within_ns` or the joint is not known."""
+        return self.rear.near(time_ns, *self.attitude_at(time_ns), within_ns)
 
     def _wheel_step(self, before_ns: int, time_ns: int) -> WheelStep | None:
         """Return the wheels' motion since the scan before, as far as the sensors tell."""

@@ -39,7 +39,7 @@ from lhdmap.topology.views import Views
 
 _PATIENCE_SCANS = 3  # after a pause of the whole log, wheels may come within as many scans before they count as silent
 _MOMENT_NS = 5_000_000
-_VIEW_BEAMS = 400
+_VIEW_BEAMS, _VIEW_NS = 400, 120_000_000
 _PLANAR = [3, 4, 2]  # of a twist (rotation before translation): x, y, heading
 _NOT_KNOWN = np.full(3, math.nan)
 
@@ -194,7 +194,7 @@ class MappingPipeline:
             return
         front = odometry.points - [0.0, 0.0, height_m]
         fans = [(self.front_end.placement(scan, time_ns)[:2, 3], front)]
-        rear = self.front_end.behind_at(time_ns)
+        rear = self.front_end.behind_at(time_ns, _VIEW_NS)
         if rear is not None:
             floor_m = self.settings.odometry.min_height_m
             fans.append((rear.T_level_sensor[:2, 3], behind(rear, step.velocity, 0.0, floor_m, _VIEW_BEAMS).points))

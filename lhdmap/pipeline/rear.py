@@ -17,7 +17,8 @@ from lhdmap.proprioception.wheels import WheelOdometry
 from lhdmap.scan_matching.scan_points import half_sweep_ns
 
 _KEPT = 64  # scans: more than the inclinometer's delay at 50 Hz
-_FARTHEST_NS = 30_000_000
+AT_ONCE_NS = 30_000_000
+"""How far from a moment a scan may be taken for one of that moment, where motion is measured."""
 # The joint's encoder is noisy and its noise turns the whole scan: readings around the scan are averaged, as many before as after.
 _AVERAGED_NS = np.arange(-4, 5) * 20_000_000
 
@@ -33,13 +34,15 @@ class RearScans:
         """Keep a scan."""
         self._scans.append((scan.stamp_ns + half_sweep_ns(scan), scan))
 
-    def near(self, time_ns: int, roll_rad: float, pitch_rad: float) -> RearView | None:
-        """Return the scan nearest to `time_ns`, or None where there is none or the joint's angle is not known."""
+    def near(
+        self, time_ns: int, roll_rad: float, pitch_rad: float, within_ns: int = AT_ONCE_NS
+    ) -> RearView | None:
+        """Return the scan nearest to `time_ns`, or None where there is none `within_ns` or the joint's angle is not known."""
         if not self._scans:
             return None
         scan_ns, scan = self._nearest(time_ns)
         angle_rad = self._articulation(scan_ns)
-        if abs(scan_ns - time_ns) > _FARTHEST_NS or angle_rad is None:
+        if abs(scan_ns - time_ns) > within_ns or angle_rad is None:
             return None
         mount = self._mounts.of(scan.frame_id, "rear")
         if mount.parent_frame != "rear_link":
