@@ -34,9 +34,7 @@ class RearScans:
         """Keep a scan."""
         self._scans.append((scan.stamp_ns + half_sweep_ns(scan), scan))
 
-    def near(
-        self, time_ns: int, roll_rad: float, pitch_rad: float, within_ns: int = AT_ONCE_NS
-    ) -> RearView | None:
+    def near(self, time_ns: int, roll_rad: float, pitch_rad: float, within_ns: int = AT_ONCE_NS) -> RearView | None:
         """Return the scan nearest to `time_ns`, or None where there is none `within_ns` or the joint's angle is not known."""
         if not self._scans:
             return None

@@ -153,3 +153,45 @@ def _same(a: FloatArray, b: FloatArray, centre: FloatArray) -> bool:
 def _moved(pose: FloatArray, point: FloatArray) -> FloatArray:
     c, s = math.cos(pose[2]), math.sin(pose[2])
     return np.array([pose[0] + c * point[0] - s * point[1], pose[1] + s * point[0] + c * point[1]])
+
+
+class Candidate(NamedTuple):
+    """A place `T_map_drive` (3,) and its score."""
+
+    T_map_drive: FloatArray
+    score: float
+
+
+class WallSearch:
+    """One sheet of a map that is searched often: its field is made once."""
+
+    def __init__(self, sheet: Sheet) -> None:
+        self.sheet, self._map_field = sheet, _field(sheet)
+        self._spectra: dict[int, tuple[tuple[int, ...], npt.NDArray[np.complex64]]] = {}
+
+    def best(self, walls: FloatArray, count: int, step_rad: float = _STEP_RAD) -> list[Candidate]:
+        """Return the best places of walls (N, 2), at most `count`, each at one of its own."""
+        centre = walls.mean(axis=0)
+        radius = float(np.linalg.norm(walls - centre, axis=1).max())
+        size = 32 * (int((2 * radius / _CELL_M) / 32) + 1) + 3
+        shape, spectrum = self._spectrum(size)
+        found: list[Candidate] = []
+        for heading in np.arange(0.0, 2.0 * math.pi, step_rad):
+            scores = _scores(spectrum, shape, walls - centre, heading, size)
+            for row, column in _peaks(scores, 2):
+                places = zip((row, column), shape, self._map_field.shape, strict=True)
+                first = [at - extent * (at >= wide) for at, extent, wide in places]
+                middle = self.sheet.origin_m + _CELL_M * (np.array(first[::-1]) + size // 2 + 0.5)
+                found.append(Candidate(_pose(middle, centre, heading), float(scores[row, column])))
+        found.sort(key=lambda one: -one.score)
+        kept: list[Candidate] = []
+        for one in found:
+            if len(kept) < count and not any(_same(one.T_map_drive, other.T_map_drive, centre) for other in kept):
+                kept.append(one)
+        return kept
+
+    def _spectrum(self, size: int) -> tuple[tuple[int, ...], npt.NDArray[np.complex64]]:
+        if size not in self._spectra:
+            shape = tuple(next_fast_len(extent + size, real=True) for extent in self._map_field.shape)
+            self._spectra = {size: (shape, rfft2(self._map_field, shape))}
+        return self._spectra[size]

@@ -1,0 +1,1 @@
+"""Where a machine is on a map: tracking against its walls, global search, loss and recovery."""
