@@ -155,14 +155,16 @@ def _to_the_wall(graph: Graph, line: Line) -> FloatArray:
     """Return the points of a line, dead ends prolonged to the wall: the core ends its radius before it."""
     points = line.points_m
     for vertex, at_end in ((line.start, False), (line.end, True)):
-        if graph.skeleton.degree(vertex) != 1 or graph.goes_on(vertex):
+        if graph.skeleton.degree(vertex) != 1:
             continue
         arm = line if at_end else line.reversed()
         end, direction, length = end_of(arm, graph.scale)
         outward = points if at_end else points[::-1]
         more = min(float(graph.room.to_wall_m(end[None], direction[None])[0]), 3.0 * graph.scale.tunnel_m)
         kept = len(outward) - np.count_nonzero(arc_m(arm.points_m) > length)
-        outward = np.vstack([outward[:kept], end + more * direction])
+        outward = outward[:kept]
+        if not graph.goes_on(vertex):  # else it goes on in another sheet, and is joined there
+            outward = np.vstack([outward, end + more * direction])
         points = outward if at_end else outward[::-1]
     return points
 
