@@ -146,9 +146,17 @@ _Ends = tuple[list[Cut], dict[tuple[int, bool], Mouth]]
 def _arc(graph: Graph, sheet: int, line: Line, heights: Heights, known: _Ends, *, driven: bool) -> Arc:
     points = _to_the_wall(graph, line)
     middle, room = centred(points, graph.room)
-    z = gaussian_filter1d(heights.at(middle), _SMOOTH_HEIGHT, mode="nearest")
+    z = _smoothed(heights.at(middle))
     ends = _end(graph, sheet, line, known, at_start=True), _end(graph, sheet, line, known, at_start=False)
     return Arc(ends, np.column_stack([middle, z]), room, sheet, driven)
+
+
+def _smoothed(heights_m: FloatArray) -> FloatArray:
+    """Return heights (N,) smoothed along a line; grades go on beyond its ends, where other arcs are joined."""
+    more = min(round(4.0 * _SMOOTH_HEIGHT), len(heights_m) - 1)
+    padded = np.pad(heights_m, more, mode="reflect", reflect_type="odd")
+    smooth: FloatArray = gaussian_filter1d(padded, _SMOOTH_HEIGHT, mode="nearest")
+    return smooth[more : len(padded) - more]
 
 
 def _to_the_wall(graph: Graph, line: Line) -> FloatArray:
