@@ -146,23 +146,33 @@ _Ends = tuple[list[Cut], dict[tuple[int, bool], Mouth]]
 def _arc(graph: Graph, sheet: int, line: Line, heights: Heights, known: _Ends, *, driven: bool) -> Arc:
     points = _to_the_wall(graph, line)
     middle, room = centred(points, graph.room)
-    z = gaussian_filter1d(heights.at(middle), _SMOOTH_HEIGHT, mode="nearest")
+    z = _smoothed(heights.at(middle))
     ends = _end(graph, sheet, line, known, at_start=True), _end(graph, sheet, line, known, at_start=False)
     return Arc(ends, np.column_stack([middle, z]), room, sheet, driven)
+
+
+def _smoothed(heights_m: FloatArray) -> FloatArray:
+    """Return heights (N,) smoothed along a line; grades go on beyond its ends, where other arcs are joined."""
+    more = min(round(4.0 * _SMOOTH_HEIGHT), len(heights_m) - 1)
+    padded = np.pad(heights_m, more, mode="reflect", reflect_type="odd")
+    smooth: FloatArray = gaussian_filter1d(padded, _SMOOTH_HEIGHT, mode="nearest")
+    return smooth[more : len(padded) - more]
 
 
 def _to_the_wall(graph: Graph, line: Line) -> FloatArray:
     """Return the points of a line, dead ends prolonged to the wall: the core ends its radius before it."""
     points = line.points_m
     for vertex, at_end in ((line.start, False), (line.end, True)):
-        if graph.skeleton.degree(vertex) != 1 or graph.goes_on(vertex):
+        if graph.skeleton.degree(vertex) != 1:
             continue
         arm = line if at_end else line.reversed()
         end, direction, length = end_of(arm, graph.scale)
         outward = points if at_end else points[::-1]
         more = min(float(graph.room.to_wall_m(end[None], direction[None])[0]), 3.0 * graph.scale.tunnel_m)
         kept = len(outward) - np.count_nonzero(arc_m(arm.points_m) > length)
-        outward = np.vstack([outward[:kept], end + more * direction])
+        outward = outward[:kept]
+        if not graph.goes_on(vertex):  # else it goes on in another sheet, and is joined there
+            outward = np.vstack([outward, end + more * direction])
         points = outward if at_end else outward[::-1]
     return points
 

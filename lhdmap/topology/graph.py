@@ -18,8 +18,8 @@ from lhdmap.topology.driven import DrivenShare, arc_m, driven_shares
 from lhdmap.topology.free_space import filled
 from lhdmap.topology.room import Room
 from lhdmap.topology.settings import TopologySettings
-from lhdmap.topology.sheet import OCCUPIED, Sheet
-from lhdmap.topology.skeleton import Line, Skeleton, Vertex, core_of, skeleton_of
+from lhdmap.topology.sheet import OCCUPIED, UNKNOWN, Sheet
+from lhdmap.topology.skeleton import Line, Skeleton, Vertex, band_of, core_of, skeleton_of
 
 PAPER_WIDTH_M = 2.45
 _BUILDING_OBSTACLE_M = 1.0
@@ -171,7 +171,8 @@ def _same(some: list[Line], others: list[Line]) -> bool:
 
 def whole_graph(sheet: Sheet, driven_m: FloatArray, scale: Scale, cuts: Sequence[FloatArray] = ()) -> Graph:
     """Return the skeleton of a sheet along a drive at `driven_m` (N, 2), with all its spurs; `cuts`: poses (4,) of cuts."""
-    room = Room(filled(sheet.cells, sheet.cell_m, scale.obstacle_m), sheet)
+    was_there = band_of(sheet, driven_m, scale.machine_m)  # far ahead in a drift beams do not come back
+    room = Room(filled(sheet.cells, sheet.cell_m, scale.obstacle_m) | (was_there & (sheet.cells == UNKNOWN)), sheet)
     core, distance_m = core_of(room.free, sheet, driven_m, scale.core_m, [barrier_m(room, cut) for cut in cuts])
     cuts_m = np.array([cut[:2] for cut in cuts]).reshape(-1, 2)
     return Graph(sheet, room, scale, skeleton_of(core, distance_m, sheet), driven_m, cuts_m)

@@ -103,14 +103,10 @@ def core_of(
 
     `driven_m` (N, 2): the way driven; `barriers_m`: lines (2, 2) that end the sheet.
     """
-    band = np.zeros(free.shape, np.uint8)
-    pixels = sheet.at(driven_m)[:, ::-1].astype(np.int32)
-    for start, end in pairwise(pixels):
-        if np.abs(end - start).max() * sheet.cell_m < 3.0:  # else the machine was elsewhere in between
-            cv2.line(band, start.tolist(), end.tolist(), 1, max(int(2.0 * _BAND_M / sheet.cell_m), 1))
-    known = free | (band > 0)
+    band, pixels = band_of(sheet, driven_m, 2.0 * _BAND_M), sheet.at(driven_m)[:, ::-1]
+    known = free | band
     distance_m = cv2.distanceTransform(known.astype(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_PRECISE) * sheet.cell_m
-    core = ((distance_m > radius_m) | (band > 0)).astype(np.uint8)
+    core = ((distance_m > radius_m) | band).astype(np.uint8)
     for barrier in barriers_m:
         start, end = sheet.at(barrier)[:, ::-1].tolist()
         cv2.line(core, start, end, 0, 2)
@@ -119,6 +115,16 @@ def core_of(
     driven[0] = 0
     kept = np.flatnonzero(driven >= min(_FEWEST_DRIVEN, driven.max(initial=1)))
     return np.isin(labels, kept), distance_m
+
+
+def band_of(sheet: Sheet, driven_m: FloatArray, width_m: float) -> Flags:
+    """Return the cells of a sheet within a band of this width along a way (N, 2)."""
+    band = np.zeros(sheet.cells.shape, np.uint8)
+    pixels = sheet.at(driven_m)[:, ::-1].astype(np.int32)
+    for start, end in pairwise(pixels):
+        if np.abs(end - start).max() * sheet.cell_m < 3.0:  # else the machine was elsewhere in between
+            cv2.line(band, start.tolist(), end.tolist(), 1, max(int(width_m / sheet.cell_m), 1))
+    return band > 0
 
 
 def skeleton_of(core: Flags, distance_m: npt.NDArray[np.float32], sheet: Sheet) -> Skeleton:

@@ -39,6 +39,7 @@ Written by `python -m tools.evaluate.topology`; not edited by hand. Teaching dri
 `tests/topology/plans`, 5 worlds each: other walls, roughness 0.12, 0.15, 0.15, 0.20, 0.30 m (`narrow`, which has no
 intersection, keeps its own); two scanners at 12.5 Hz, inclinometer, tachometer, joint encoder. Exact poses:
 the true ones; own poses: odometry and loop closure, the truth fitted onto the driven path. One setting for all, the default.
+Constants were chosen with the worlds 1, 2, 3 and 5 in sight; world 4 (0.20 m) was not looked at before the last of these changes.
 
 Access points: distance from the true one in the map, and with the node's own error taken out ("in node"); median / worst.
 `tunnels`: those that join the right intersections or ends, as a multigraph.
@@ -50,10 +51,12 @@ HEAD = """\
 REAL_HEAD = """\
 ## Real logs
 
-Against what a person drew, own poses; doors and rooms that the drawing marks as optional do not count.
+Against what a person drew, own poses; doors and rooms that the drawing marks as optional do not count. The drawing is fitted
+onto the map by its core intersections, as its README says. Intel has two of them, so that its fit is loose: in the column
+"extra, all" the optional ones take part in the fit.
 
-| log | intersections | degrees | extra | distance, m |
-| --- | --- | --- | --- | --- |
+| log | intersections | degrees | extra | extra, all | distance, m |
+| --- | --- | --- | --- | --- | --- |
 """
 
 
@@ -115,7 +118,7 @@ def table(found: list[Result], poses: str) -> str:
 def real_table(found: list[RealScore]) -> str:
     """Return the table of the real logs."""
     lines = [
-        f"| {one.name} | {one.found} / {one.core} | {one.degrees} | {one.extra} | {pair(one.apart_m)} |\n"
+        f"| {one.name} | {one.found} / {one.core} | {one.degrees} | {one.extra} | {one.extra_all} | {pair(one.apart_m)} |\n"
         for one in found
     ]
     return REAL_HEAD + "".join(lines)
