@@ -12,6 +12,7 @@ from typing import Any
 from lhdmap.errors import ConfigError
 from lhdmap.integration.integrator import IntegrationSettings
 from lhdmap.landmarks.settings import LandmarkSettings
+from lhdmap.localization.settings import LocalizationSettings
 from lhdmap.movement.settings import MovementSettings
 from lhdmap.odometry.cloud_settings import CloudOdometrySettings
 from lhdmap.odometry.settings import AnchorSettings, OdometrySettings, RangeFlowSettings, SearchSettings
@@ -50,6 +51,7 @@ class Settings:
     smoothing: SmoothingSettings = field(default_factory=SmoothingSettings)
     topology: TopologySettings = field(default_factory=TopologySettings)
     landmarks: LandmarkSettings = field(default_factory=LandmarkSettings)
+    localization: LocalizationSettings = field(default_factory=LocalizationSettings)
     pile: PileSettings = field(default_factory=PileSettings)
     figure9: Figure9Constants = field(default_factory=Figure9Constants)
     figure9_repaired: RepairedConstants = field(default_factory=RepairedConstants)

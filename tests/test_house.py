@@ -41,6 +41,7 @@ FLOORS = [
     {"exports"},
     {"smoothing", "simulation", "evaluation"},
     {"update"},
+    {"localization"},
     {"report"},
     {"config"},
     {"pipeline"},

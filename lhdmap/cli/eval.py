@@ -13,6 +13,7 @@ from lhdmap.cli.console import Console
 from lhdmap.cli.options import add_common
 
 SUBJECTS = {
+    "localization": "where a machine was on a map, against the truth of the drive and of the teaching drive",
     "pile": "width, inclination and status of piles, as in Table 6 of the autonomous loading paper",
     "rockbreaker": "durations of rockbreaker trajectories, as in Table 3 of the rockbreaker paper",
     "trajectory": "absolute, relative and segment errors of a trajectory, and relations",

@@ -49,7 +49,7 @@ def run(arguments: argparse.Namespace, console: Console) -> int:
             load_machine(arguments.machine) if arguments.machine else None,
             progress_of(console),
             arguments.edits,
-            _start(arguments.start, arguments.map) if arguments.start else None,
+            start_of(arguments.start, arguments.map) if arguments.start else None,
             arguments.force,
         )
     )
@@ -66,7 +66,12 @@ def _stem(name: str) -> str:
     return stem if separator and number.isdigit() else name
 
 
-def _start(text: str, map_folder: Path) -> Any:
+def start_of(text: str, map_folder: Path) -> Any:
+    """Return x, y, yaw (rad) and, of a waypoint, height (m) of a start that is given as `X,Y,DEG` or by a name.
+
+    Raises:
+        UsageError: it is neither.
+    """
     import numpy as np
 
     from lhdmap.settings import nearest
@@ -84,7 +89,7 @@ def _start(text: str, map_folder: Path) -> Any:
     if point is None:
         names = [one.name for one in topology.waypoints]
         raise UsageError(f"--start {text}: no waypoint of that name in the map{nearest(text, names)}")
-    return point.pose[[0, 1, 3]]
+    return point.pose[[0, 1, 3, 2]]
 
 
 def _text(folder: Path, version: int, table: dict[str, Any]) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -33,6 +34,11 @@ class Row(NamedTuple):
     latency_ms: float
 
 
+_NAN = math.nan
+NOWHERE = Row(
+    0, UNKNOWN, "", _NAN, _NAN, _NAN, _NAN, _NAN, _NAN, _NAN, _NAN, _NAN, _NAN, _NAN, 0.0, "", "", _NAN, _NAN
+)  # fmt: skip
+"""A row of which nothing is known."""
 TEXTS = ("status", "node", "source", "next_point")
 
 

@@ -9,7 +9,7 @@ integrated once a later pose is known, so that its motion is interpolated and no
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from concurrent.futures import Executor
 from types import TracebackType
 from typing import Literal, Self
@@ -44,12 +44,16 @@ _PLANAR = [3, 4, 2]  # of a twist (rotation before translation): x, y, heading
 _NOT_KNOWN = np.full(3, math.nan)
 
 
+StepSink = Callable[[int, OdometryStep, PlanarOdometry], None]
+"""Takes each front scan's stamp, what the odometry says of it, and the odometry with the hits of the last processed one."""
+
+
 class MappingPipeline:
     """Takes messages by role in time order; `finish` ends the stream. Trajectory and cloud are there at any time.
 
     `primary`: the sensor that the odometry runs on, the front scanner or a 3D scanner; `cloud`: whether sweeps are integrated;
     `pile`: what looks for the pile, if not the stage of the settings here; `worker`: integrates sweeps, a thread of its own by
-    default. A context manager: left by an error, it lets go of what it holds.
+    default; `on_step`: is told of each front scan. A context manager: left by an error, it lets go of what it holds.
     """
 
     def __init__(
@@ -62,6 +66,7 @@ class MappingPipeline:
         cloud: bool = True,
         pile: PileSink | None = None,
         worker: Executor | None = None,
+        on_step: StepSink | None = None,
     ) -> None:
         self.settings, self.machine, self._primary, self._cloud = settings, machine, primary, cloud
         self.front_end = front = FrontEnd(settings, machine)
@@ -77,6 +82,7 @@ class MappingPipeline:
         self.views = Views()  # of the drift, for the free space that the topology is found in
         looked_for = primary == "front" and settings.pile.method != "off"
         self.pile: PileSink | None = (pile or PileWatch(settings)) if looked_for else None
+        self._on_step = on_step
         self.records, self.slip = ScanRecords(), SkidFactor(settings.slip)
         self._time_ns = self._before_ns = LONG_AGO_NS
         self._newest = Newest(np.zeros((3, 3)), np.zeros(3), None)
@@ -173,6 +179,8 @@ class MappingPipeline:
         self._hold("front", stamp_ns, scan)
         if step.processed:
             self._take(scan, time_ns, step, odometry)
+        if self._on_step is not None:
+            self._on_step(scan.stamp_ns, step, odometry)
 
     def _take(self, scan: LaserScan, time_ns: int, step: OdometryStep, odometry: PlanarOdometry) -> None:
         """Hand a processed scan on to all that live by its pose."""

@@ -1,0 +1,109 @@
+"""`localize` as a function: a log and a map in, the folder of the run out."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from lhdmap.config import Settings, settings_table
+from lhdmap.errors import InputError
+from lhdmap.geometry import se3
+from lhdmap.localization.rows import TRACKING, Row, columns
+from lhdmap.logs.source import LogSource
+from lhdmap.machine import Machine
+from lhdmap.messages import FloatArray
+from lhdmap.outputs import free_folder
+from lhdmap.pipeline.build import Progress
+from lhdmap.pipeline.localize import KnownMap, Localizer
+from lhdmap.pipeline.mounts import machine_of
+from lhdmap.pipeline.outcome import ROLES_READ
+from lhdmap.report.localization_page import write_localization_report
+from lhdmap.runfolder import RunFolderWriter, RunInfo
+from lhdmap.trajectory import Trajectory, write_tum
+
+KIND = "localization"
+
+
+@dataclass(frozen=True, slots=True)
+class LocalizeRequest:
+    """What is asked for: logs, map folder, the folder to make, settings, about where the drive starts (4,: x, y, yaw, z)."""
+
+    logs: Sequence[Path]
+    map: Path
+    target: Path
+    settings: Settings = field(default_factory=Settings)
+    topics: Mapping[str, str] = field(default_factory=dict)
+    machine: Machine | None = None
+    start: FloatArray | None = None
+    progress: Progress | None = None
+    force: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class LocalizeResult:
+    """What came of it: the folder, the figures of `localize --json`, a row for each front scan."""
+
+    folder: Path
+    summary: dict[str, Any]
+    rows: list[Row]
+
+
+def localize(request: LocalizeRequest) -> LocalizeResult:
+    """Localize a drive on a map and write the run's folder.
+
+    Raises:
+        UsageError: the folder is there already.
+        InputError: map or log cannot be used, or the log holds no scan.
+    """
+    inputs = [request.map, *request.logs]
+    free_folder(request.target, force=request.force, inputs=inputs)
+    known = KnownMap.read(request.map)
+    with LogSource(list(request.logs), request.topics, force=request.force) as source:
+        with Localizer(known, request.settings, machine_of(source, request.machine), request.start) as localizer:
+            messages = source.messages([role for role in ROLES_READ if role in source.roles])
+            for role, message in request.progress(messages, source.duration_s) if request.progress else messages:
+                localizer.update(role, message)
+            localizer.finish()
+        told = [*source.warnings, *source.damage, *localizer.pipeline.warnings]
+    if not localizer.rows:
+        raise InputError(f"{request.logs[0]}: no usable scan in it; lhdmap doctor tells what is wrong")
+    summary = summary_of(localizer)
+    with RunFolderWriter(KIND, request.target, force=request.force, inputs=inputs) as folder:
+        folder.write_table("localization.parquet", columns(localizer.rows))
+        write_tum(folder.path / "localization.tum", trajectory_of(localizer.rows))
+        folder.finished(folder.path / "localization.tum")
+        drawn = request.target.name, known.topology, known.sheets
+        write_localization_report(folder.path / "report.html", drawn, localizer.rows, summary, told)
+        folder.finished(folder.path / "report.html")
+        options = {**settings_table(request.settings), "request": {"map": str(request.map)}}
+        path = folder.complete(RunInfo(request.logs, options, summary, told))
+    return LocalizeResult(path, summary | {"warnings": told}, localizer.rows)
+
+
+def summary_of(localizer: Localizer) -> dict[str, Any]:
+    """Return the figures of a run."""
+    rows, first = localizer.rows, localizer.first_fix
+    latencies = np.array([row.latency_ms for row in rows])
+    return {
+        "scans": len(rows),
+        "tracking_share": sum(row.status == TRACKING for row in rows) / len(rows),
+        "first_fix_s": None if first is None else first[0],
+        "first_fix_m": None if first is None else first[1],
+        "lost_stretches": localizer.lost_stretches,
+        "false_fix_guard": localizer.withheld,
+        "latency_ms": {"median": float(np.median(latencies)), "p99": float(np.quantile(latencies, 0.99))},
+    }
+
+
+def trajectory_of(rows: Sequence[Row]) -> Trajectory:
+    """Return the poses of the rows that track."""
+    kept = [row for row in rows if row.status == TRACKING and math.isfinite(row.x_m)]
+    stamps = np.array([row.stamp_ns for row in kept], dtype=np.int64)
+    positions = np.array([[row.x_m, row.y_m, row.z_m] for row in kept]).reshape(-1, 3)
+    yaw = np.array([row.yaw_rad for row in kept])
+    return Trajectory(stamps, positions, se3.quaternions_from_rpy(np.zeros(len(kept)), np.zeros(len(kept)), yaw))
