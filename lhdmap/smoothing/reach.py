@@ -34,7 +34,8 @@ class Drift:
             turn * ends[:, 1],
             turn * (ends**2).sum(axis=1),
         )
-        self._sums = np.array([np.concatenate([[0.0], np.cumsum(part)]) for part in parts])
+        pulled = np.array([np.hypot(*key.error.pull[:2]) for key in keys[1:]])
+        self._sums = np.array([np.concatenate([[0.0], np.cumsum(part)]) for part in (*parts, pulled)])
 
     @property
     def most_m(self) -> float:
@@ -43,8 +44,8 @@ class Drift:
 
     def radius_m(self, earlier: npt.NDArray[np.int64], current: int) -> FloatArray:
         """Return how far the odometry may have come off between earlier keys (K,) and the current one, m."""
-        place, turn, turn_x, turn_y, turn_r2 = self._sums[:, current, None] - self._sums[:, earlier]
+        place, turn, turn_x, turn_y, turn_r2, pulled_m = self._sums[:, current, None] - self._sums[:, earlier]
         x, y = self._at[current]
         variance = place + (x * x + y * y) * turn - 2.0 * (x * turn_x + y * turn_y) + turn_r2
-        radius: FloatArray = np.minimum(_SIGMAS * np.sqrt(np.maximum(variance, 0.0)), _MOST_M)
+        radius: FloatArray = np.minimum(_SIGMAS * np.sqrt(np.maximum(variance, 0.0)) + 2.0 * pulled_m, _MOST_M)
         return radius

@@ -42,10 +42,10 @@ class Drive(NamedTuple):
     turn: int
 
 
-def decline(seed: int, rough_m: float, apart_m: float = 14.0, *, stacked: bool = False) -> Decline:
+def decline(seed: int, rough_m: float, apart_m: float = 14.0, *, stacked: bool = False, legs: int = LEGS) -> Decline:
     """Return a decline whose legs are `apart_m` from each other; `stacked`: every second one lies under the first."""
     rng = np.random.default_rng(seed)
-    line, parts, sides = _unrolled(apart_m, stacked=stacked)
+    line, parts, sides = _unrolled(apart_m, legs, stacked=stacked)
     walls = [_rough(wall, rng, rough_m) for wall in sides]
     worlds = []
     for part in range(parts[-1] + 1):
@@ -55,11 +55,11 @@ def decline(seed: int, rough_m: float, apart_m: float = 14.0, *, stacked: bool =
     return Decline(line, -_GRADE * np.arange(len(line)), parts, worlds)
 
 
-def _unrolled(apart_m: float, *, stacked: bool) -> tuple[FloatArray, list[int], list[FloatArray]]:
+def _unrolled(apart_m: float, legs: int, *, stacked: bool) -> tuple[FloatArray, list[int], list[FloatArray]]:
     """Return the centre line each metre, the part (leg, bend, leg, ...) of each, and both walls (M, 3: x, y, metre)."""
     pose, line, parts, sides = np.zeros(3), [np.zeros(3)], [0], ([], [])  # type: ignore[var-annotated]
     bend_m = 0.5 * math.pi * apart_m
-    for leg in range(LEGS):
+    for leg in range(legs):
         way = len(line) - 1.0
         for wall, side in zip(sides, (1.0, -1.0), strict=True):
             wall += [(*se2.transform(pose, np.array([[x, y]]))[0], way + x) for x, y in _leg(side)]
@@ -67,7 +67,7 @@ def _unrolled(apart_m: float, *, stacked: bool) -> tuple[FloatArray, list[int], 
             line.append(se2.compose(line[-1], np.array([1.0, 0.0, 0.0])))
             parts.append(2 * leg)
         pose = line[-1]
-        if leg == LEGS - 1:
+        if leg == legs - 1:
             break
         turn = 1.0 if stacked or leg % 2 == 0 else -1.0
         centre, steps = se2.compose(pose, np.array([0.0, turn * apart_m / 2, 0.0])), round(bend_m)
@@ -110,10 +110,10 @@ def _rough(wall: FloatArray, rng: np.random.Generator, rms_m: float) -> FloatArr
     return points
 
 
-def driven(mine: Decline, seed: int, back: Return, *, drift: float = 1.0, heights: bool = True) -> Drive:
+def driven(mine: Decline, seed: int, back: Return, *, scale: float = 0.0, heights: bool = True) -> Drive:
     """Drive down, then half of it up again, turned round or in reverse gear, a key scan each metre.
 
-    `drift`: of the odometry, so many times that of a good one; its keys know.
+    The odometry wanders, and reads `scale` of the way too much; its keys say how far both may go.
     """
     rng = np.random.default_rng(1000 + seed)
     down, up = np.arange(len(mine.line)), np.arange(len(mine.line) - 2, len(mine.line) // 2, -1)
@@ -123,11 +123,11 @@ def driven(mine: Decline, seed: int, back: Return, *, drift: float = 1.0, height
         true[len(down) :, 2] += math.pi
     aside = rng.normal(0.0, 0.15, len(rows))
     true = np.array([se2.compose(pose, np.array([0.0, off, 0.0])) for pose, off in zip(true, aside, strict=True)])
-    sigmas = drift * _SIGMAS
     poses = [true[0]]
     for before, after in pairwise(true):
-        poses.append(se2.compose(poses[-1], se2.between(before, after) + rng.normal(0.0, sigmas)))
-    walk, keys = StepError(np.diag(sigmas**2), np.zeros(3), np.zeros((3, 3))), []
+        step = se2.between(before, after) * [1.0 + scale, 1.0, 1.0]
+        poses.append(se2.compose(poses[-1], step + rng.normal(0.0, _SIGMAS)))
+    walk, keys = StepError(np.diag(_SIGMAS**2), np.array([scale, 0.0, 0.0]), np.zeros((3, 3))), []
     for k, (row, pose) in enumerate(zip(rows.tolist(), poses, strict=True)):
         world = mine.worlds[mine.part[row]]
         scan = simulate_scans(world, true[k : k + 1].repeat(2, axis=0), _SCANNER, 1.0, seed * 10_000 + k)[0]

@@ -71,8 +71,10 @@ def _lies(rng: np.random.Generator, kind: Falsehood, count: int, poses: int) -> 
         ends = [sorted(rng.choice(poses, 2, replace=False).tolist()) for _ in range(count)]
         return [Tie(i, j, rng.normal(0.0, [1.0, 1.0, 0.3]), covariance) for i, j in ends]
     first, second = int(rng.integers(0, poses // 5)), int(rng.integers(poses // 2, 3 * poses // 4))
-    second += 0 if abs(second - first - poses // 2) > 25 else 40  # not by chance where the laps do meet
-    return [Tie(first + k % 60, second + k % 60, rng.normal(0.0, TIE_SIGMAS), covariance) for k in range(count)]
+    # not by chance where the laps do meet
+    second += 0 if abs(second - first - poses // 2) > poses // 20 else 2 * poses // 25
+    width = min(60, poses // 8)
+    return [Tie(first + k % width, second + k % width, rng.normal(0.0, TIE_SIGMAS), covariance) for k in range(count)]
 
 
 def least_squares(loops: Loops, used: npt.NDArray[np.bool_]) -> FloatArray:
