@@ -46,10 +46,10 @@ from lhdmap.topology.views_file import read_views, write_views
 from lhdmap.trajectory import Trajectory
 from lhdmap.update import fit, merge
 from lhdmap.update.difference import Walls, difference
-from lhdmap.update.place import placed
+from lhdmap.update.place import placings
 
 _NEWER_WEIGHT = 4  # of what was seen later
-_LEAST_MARGIN = 0.08
+_ALIKE = 0.7  # of the share of scans that fit where it is best
 _NAMED_WITHIN_M = 3.0
 
 
@@ -139,18 +139,21 @@ def update_map(request: UpdateRequest) -> UpdateResult:
 
 def _in_the_map(known: _Map, drive: _Map, request: UpdateRequest) -> Correction:
     """Return how the drive is to be moved into the map's frame."""
-    log = request.logs[0]
-    place = placed(known.sheets, drive.sheets[0], request.start)
-    if place is None:
+    log, smoothing = request.logs[0], request.settings.smoothing
+    places = placings(known.sheets, drive.sheets[0], request.start)
+    if not places:
         raise InputError(
             f"{log}: its walls are nowhere in {request.map}; say where it begins with --start, or build it apart"
         )
-    if place.margin < _LEAST_MARGIN and request.start is None:
+    shares = [fit.share_that_fits(known.seen, drive.seen, one.T_map_drive, smoothing) for one in places]
+    best, *others = sorted(shares, reverse=True)
+    if others and best > 0.0 and others[0] >= _ALIKE * best:
         raise InputError(
-            f"{log}: two places of {request.map} look alike to it (the second {100 * place.margin:.0f} % worse); "
-            "say where it begins with --start X,Y,HEADING_DEG"
+            f"{log}: two places of {request.map} look alike to it ({100 * best:.0f} and {100 * others[0]:.0f} % of its "
+            "scans fit); say where it begins with --start X,Y,HEADING_DEG"
         )
-    found = fit.fitted(known.seen, drive.seen, place.T_map_drive, request.settings.smoothing)
+    place = places[shares.index(best)]
+    found = fit.fitted(known.seen, drive.seen, place.T_map_drive, smoothing)
     if found is None:
         raise InputError(f"{log}: its scans do not fit the walls of {request.map}; build it apart")
     if found.tied < 0.2 * found.keys:

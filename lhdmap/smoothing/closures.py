@@ -31,7 +31,10 @@ _CELL_M, _WINDOW_CELLS = 0.04, 512
 # One start for each heading: with more, niches that look alike cost a closure here and there (Intel: 396, not 397).
 _GRID, _TURN_RAD = SearchGrid(0.15, math.radians(2.5), apart_m=math.inf), math.radians(25.0)
 _PLACE_M, _MOST_PLACES = 8.0, 8  # of the places that are tried
-_AHEAD, _SAME_M = 0.08, 2.0  # share of hits by which the best is ahead of others; as the odometry has two ways to one place
+_AHEAD, _SAME_M = (
+    0.08,
+    2.0,
+)  # share of hits by which the best is ahead of others; as the odometry has two ways to one place
 UNLIKE, SMOOTH, ALIKE, ALONE = (
     "the walls are not alike",
     "the walls do not tell one direction",
@@ -159,7 +162,10 @@ class _Search:
         predicted = se2.between(self._places[candidate, :3], self._places[current, :3])
         reach_m = float(self._reach_m(self._travelled[current] - self._travelled[candidate]))
         if math.hypot(predicted[0], predicted[1]) > reach_m:
-            predicted[:2], reach_m = 0.0, min(reach_m, 0.5 * _PLACE_M)  # the odometry may be off by more: the place as it is
+            predicted[:2], reach_m = (
+                0.0,
+                min(reach_m, 0.5 * _PLACE_M),
+            )  # the odometry may be off by more: the place as it is
         hits = Hits(points, len(points), layered=False)
         return next(iter(submap.locate(hits, unsure(predicted), np.array([reach_m, _TURN_RAD]))), None)
 
