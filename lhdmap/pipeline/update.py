@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from lhdmap.config import Settings, settings_table
+from lhdmap.config import Settings, settings_table, settings_toml
 from lhdmap.errors import InputError, LhdmapWarning, UsageError
 from lhdmap.integration.cloud import Cloud
 from lhdmap.integration.cloud_io import read_cloud, write_cloud
@@ -24,14 +24,20 @@ from lhdmap.landmarks.store import write_landmarks
 from lhdmap.machine import Machine
 from lhdmap.mapfolder import Diagnostics, MapFolder, MapFolderWriter
 from lhdmap.messages import FloatArray
+from lhdmap.names import name_of
 from lhdmap.outputs import free_folder
 from lhdmap.pipeline.build import BuildRequest, Progress, build_map
 from lhdmap.pipeline.landmarks import landmarks_for, with_stretches
 from lhdmap.pipeline.topology import each_step
 from lhdmap.pipeline.track import Rows
 from lhdmap.provenance import file_entry
-from lhdmap.report.data import ReportData, Summary
+from lhdmap.report import charts
+from lhdmap.report.bounded import bounded
+from lhdmap.report.data import Difference, Picture, ReportData, Summary
+from lhdmap.report.difference_chart import difference_figures
 from lhdmap.report.page import write_report
+from lhdmap.report.recording import RecordingWriter
+from lhdmap.report.run_recording import record_run
 from lhdmap.runfolder import RunInfo
 from lhdmap.smoothing.smoother import Correction
 from lhdmap.topology.build import Seen, Topology, topology_of
@@ -185,7 +191,7 @@ def _written(
     _write_files(folder, known, drive, final, views, (newer, topology), cloud, table)
     write_landmarks(folder.path / "landmarks.npz", landmarks)
     folder.finished(folder.path / "landmarks.npz")
-    distance_m = float(np.linalg.norm(np.diff(final.positions_m, axis=0), axis=1).sum())
+    distance_m = sum(_length_m(one.trajectory) for one in (known, drive))
     earlier, added = known.folder.info.get("counts", {}), drive.folder.info.get("counts", {})
     counts = {
         **earlier,
@@ -197,7 +203,7 @@ def _written(
         "tunnels": len(newer.tunnels),
         "intersections": len(newer.intersections),
     }
-    _write_pictures(folder, request, newer, topology, walls, cloud, final, counts, remarks)
+    _write_pictures(folder, request, newer, topology, walls, cloud, final, counts, table, remarks)
     info = RunInfo(
         request.logs,
         {**settings_table(request.settings), "request": {"update_of": _entry(known)}},
@@ -264,19 +270,57 @@ def _write_pictures(
     cloud: Cloud,
     final: Trajectory,
     counts: dict[str, Any],
+    table: dict[str, Any],
     remarks: list[str],
 ) -> None:
-    from lhdmap.report.difference_chart import difference_svg
-
-    path = folder.path / "difference.svg"
-    path.write_text(difference_svg(newer, topology.sheets, walls), encoding="utf-8")
-    folder.finished(path)
-    summary = Summary(counts["scans"], counts["scans_processed"], counts["duration_s"], counts["distance_m"])
-    report = ReportData(
-        request.target.name, summary, [], final, cloud=cloud, pile_reason="see pile.json", warnings=remarks
+    pictures = _pictures(folder, newer, topology, walls)
+    summary = Summary(
+        counts["scans"],
+        counts["scans_processed"],
+        counts["duration_s"],
+        counts["distance_m"],
+        lost_stretches=counts["lost_stretches"],
+        closures=counts.get("closures", 0),
     )
-    write_report(report, folder.path / "report.html")
+    data = ReportData(
+        request.target.name,
+        summary,
+        [],
+        final,
+        cloud=cloud,
+        has_inclinometer=bool(np.ptp(final.positions_m[:, 2]) > 0.0),
+        pile_reason="see pile.json" if (folder.path / "pile.json").is_file() else "",
+        topology=newer,
+        sheets=topology.sheets,
+        difference=Difference(table, pictures),
+        warnings=remarks,
+        settings_text=settings_toml(request.settings),
+        provenance={"map": name_of(request.map), "log": ", ".join(name_of(path) for path in request.logs)},
+    )
+    write_report(bounded(data), folder.path / "report.html")
     folder.finished(folder.path / "report.html")
+    with RecordingWriter(
+        folder.path / "recording.rrd", request.target.name, int(final.stamps_ns[0]), request.settings.recording
+    ) as recording:
+        record_run(recording, bounded(data), request.machine or Machine(bodies={}))
+    folder.finished(folder.path / "recording.rrd")
+
+
+def _pictures(folder: MapFolderWriter, newer: TopologicalMap, topology: Topology, walls: list[Walls]) -> list[Picture]:
+    """Write the picture of the first level, and return those of all for the page."""
+    found = []
+    with charts.styled():
+        for level, figure in enumerate(difference_figures(newer, topology.sheets, walls)):
+            name = "difference.svg" if level == 0 else f"difference_{level}.svg"
+            charts.write_figure(figure, folder.path / name, "svg")
+            folder.finished(folder.path / name)
+            caption = f"{f'Level {level}, ' if len(topology.sheets) > 1 else ''}walls that came and went, from above."
+            found.append(Picture(charts.svg_uri(figure), caption[0].upper() + caption[1:]))
+    return found
+
+
+def _length_m(trajectory: Trajectory) -> float:
+    return float(np.linalg.norm(np.diff(trajectory.positions_m, axis=0), axis=1).sum())
 
 
 def _both(first: Trajectory, second: Trajectory) -> Trajectory:

@@ -75,6 +75,13 @@ class Picture(NamedTuple):
     caption: str
 
 
+class Difference(NamedTuple):
+    """What is different from the version before: the values of `difference.json`, and a picture of each level."""
+
+    table: Mapping[str, Any]
+    pictures: Sequence[Picture] = ()
+
+
 @dataclass(frozen=True, slots=True)
 class Summary:
     """The headline figures; the names are those of `build-map --json`."""
@@ -99,7 +106,8 @@ class ReportData:
 
     `witness`: which sensors told of the motion beside the scans (empty: none); `poses`: where given poses came from (empty: the
     path is that of the odometry); `pile_reason`: why no pile was looked for. `sheets`: free space of the levels of `topology`;
-    `closures`: places recognised, also those refused; `landmark_pictures`: heat maps of the landmarks.
+    `closures`: places recognised, also those refused; `landmark_pictures`: heat maps of the landmarks; `difference`: from the
+    map's version before.
     """
 
     title: str
@@ -120,6 +128,7 @@ class ReportData:
     sheets: Sequence[Sheet] = ()
     closures: Sequence[ClosureRow] = ()
     landmark_pictures: Sequence[Picture] = ()
+    difference: Difference | None = None
     witness: str = ""
     poses: str = ""
     warnings: Sequence[str] = ()

@@ -10,6 +10,7 @@ from typing import Any
 from lhdmap.report import (
     charts,
     cloud_charts,
+    difference_page,
     glossary,
     markup,
     path_charts,
@@ -40,6 +41,7 @@ def render_report(data: ReportData) -> str:
         sections = [
             markup.section("What was found", _headline(data)),
             markup.section("Warnings", _warnings(data)),
+            difference_page.section(data),
             markup.section("Path", _path(data)),
             markup.section("Against the truth", _truth(data)),
             markup.section("Cloud", _cloud(data)),

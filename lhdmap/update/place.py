@@ -1,8 +1,8 @@
 """Where a drive lies in a map, from nothing: its walls are laid over the map's in all headings and shifts.
 
 For each heading one correlation (FFT) of the map's field (walls count for, free room against) with the drive's walls tells the
-score of all shifts. What lies best by this alone need not be right (a bend is like another bend, and a tunnel that the map does not
-have counts for nothing), so some places are returned; scans tell between them (`lhdmap.update.fit`).
+score of all shifts. What lies best by this alone need not be right (a bend is like another bend, and a tunnel that the map does
+not have counts for nothing), so some places are returned; scans tell between them (`lhdmap.update.fit`).
 """
 
 from __future__ import annotations
