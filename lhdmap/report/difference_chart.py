@@ -8,16 +8,17 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from lhdmap.report import charts
+from lhdmap.report.topology_drawing import draw_free_space
 from lhdmap.topology.model import TopologicalMap
-from lhdmap.topology.sheet import FREE, OCCUPIED, Sheet
+from lhdmap.topology.sheet import UNKNOWN, Sheet
 from lhdmap.update.difference import Walls
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-_CAME, _WENT, _FREE, _WALL = "#c62828", "#1565c0", "#c9ced3", "#6b747c"
-_MARK_PT, _WALL_PT = 2.2, 0.8
+_CAME, _WENT = "#d32f2f", "#1e88e5"
+_MARK_PT = 3.0
 _MARGIN_M = 2.0
 
 
@@ -30,12 +31,10 @@ def difference_figures(topology: TopologicalMap, sheets: Sequence[Sheet], walls:
 
 
 def _figure(topology: TopologicalMap, sheet: Sheet, walls: Walls | None, level: int, *, several: bool) -> Figure:
-    free, rock = (sheet.middles_m(np.argwhere(sheet.cells == value)) for value in (FREE, OCCUPIED))
-    drawn = np.vstack([np.zeros((0, 2)), free, rock])
+    drawn = sheet.middles_m(np.argwhere(sheet.cells != UNKNOWN))
     figure = charts.new_figure(charts.plan_height_in(drawn, most=8.0))
     axes = figure.add_subplot()
-    axes.plot(*free.T, "s", color=_FREE, markersize=_WALL_PT, markeredgewidth=0.0, rasterized=True)
-    axes.plot(*rock.T, "s", color=_WALL, markersize=_WALL_PT, markeredgewidth=0.0, rasterized=True)
+    draw_free_space(axes, sheet)
     if walls is not None:
         for points, colour, label in ((walls.came_m, _CAME, "wall came"), (walls.went_m, _WENT, "wall went")):
             if len(points):

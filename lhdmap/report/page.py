@@ -80,8 +80,8 @@ def _pile(data: ReportData) -> str:
 
 
 def _of_odometry(data: ReportData) -> list[str]:
-    """Return the sections of how the motion was found; where poses were given, it was not."""
-    if data.poses:
+    """Return the sections of how the motion was found; where poses were given, it was not; of two drives, each map has its own."""
+    if data.poses or data.difference is not None:
         return []
     return [
         markup.section("Speed and slip", _speed(data)),

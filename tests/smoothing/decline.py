@@ -52,7 +52,7 @@ def decline(seed: int, rough_m: float, apart_m: float = 14.0, *, stacked: bool =
         rows = np.flatnonzero(np.abs(np.array(parts) - part) <= 1)
         polylines = [wall[(wall[:, 2] >= rows[0]) & (wall[:, 2] <= rows[-1]), :2] for wall in walls]
         worlds.append(world_from_polylines(polylines, line[rows]))
-    return Decline(line, -_GRADE * np.arange(len(line)), parts, worlds)
+    return Decline(line, -_GRADE * np.arange(len(line), dtype=np.float64), parts, worlds)
 
 
 def _unrolled(apart_m: float, legs: int, *, stacked: bool) -> tuple[FloatArray, list[int], list[FloatArray]]:

@@ -10,7 +10,7 @@ import pytest
 from lhdmap.geometry import se2
 from lhdmap.scan_matching.key_scan import KeyScan
 from lhdmap.smoothing.closures import ALIKE, ALONE, SMOOTH, UNLIKE, Closure, Refusal
-from lhdmap.smoothing.evidence import CONTRADICTED, DOUBTFUL, evidence_of
+from lhdmap.smoothing.evidence import CONTRADICTED, DOUBTFUL, Evidence, evidence_of, open_loops
 from lhdmap.smoothing.robust import Judgement
 from lhdmap.smoothing.settings import SmoothingSettings
 from lhdmap.smoothing.smoother import Smoother
@@ -62,6 +62,16 @@ def test_a_smooth_drift_says_that_its_walls_do_not_tell() -> None:
     smoother.keys.keys = keys_of(world, way, way, reach_m=8.0)
     assert smoother.correction() is None
     assert {row.reason for row in smoother.evidence} == {SMOOTH}
+    (said,) = open_loops(smoother.evidence)
+    assert said.startswith(f"loop closure: {len(smoother.evidence)} places look like earlier ones")
+
+
+def test_nothing_is_said_where_loops_were_closed() -> None:
+    row = Evidence(0, 1, True, "", 0.9, 0.01, np.zeros(3), 1.0)
+    refused = row._replace(accepted=False, reason=SMOOTH)
+    assert open_loops([row] * 20 + [refused] * 15) == []
+    assert open_loops([refused] * 3) == []
+    assert len(open_loops([row] * 5 + [refused] * 15)) == 1
 
 
 def wrong_and_right(drive: Drive) -> tuple[int, int, set[str]]:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import math
 import shutil
 from pathlib import Path
 
@@ -12,7 +11,7 @@ import pytest
 from lhdmap.cli.main import main
 from lhdmap.errors import InputError, UsageError
 from lhdmap.mapfolder import MapFolder
-from lhdmap.pipeline import update
+from lhdmap.pipeline import update, update_files
 from lhdmap.pipeline.update import UpdateRequest, update_map
 from lhdmap.topology.files import read_topology
 from lhdmap.topology.views_file import read_views
@@ -131,7 +130,7 @@ def test_an_interrupted_update_leaves_the_old_map_whole(
         raise KeyboardInterrupt
 
     before = contents(drift_map)
-    monkeypatch.setattr(update, moment, interrupted)
+    monkeypatch.setattr(update_files if moment == "write_report" else update, moment, interrupted)
     with pytest.raises(KeyboardInterrupt):
         update_map(UpdateRequest(drift_map, [branch_log], tmp_path / "v2"))
     assert contents(drift_map) == before
@@ -164,7 +163,14 @@ def test_a_start_that_is_none_is_told(
     assert said in capsys.readouterr().err
 
 
-def test_headings_are_told_in_radians_of_the_map(updated: Updated) -> None:
-    """A second version can be updated again: all that the first one had is there."""
-    node = read_topology(updated.result.folder).intersections[0]
-    assert -math.pi <= node.T_map_node[3] <= math.pi
+def test_a_drive_with_the_times_of_the_map_is_put_behind_it(drift_map: Path, tmp_path: Path) -> None:
+    """Two simulated logs begin at the same time; each time has one pose all the same, and it can be updated again."""
+    log = write_drive(tmp_path / "again.mcap", mine(branch=True), second_way(), 1)
+    first = update_map(UpdateRequest(drift_map, [log], tmp_path / "v2"))
+    assert any("later" in text for text in first.warnings)
+    stamps = MapFolder.open(first.folder).trajectory().stamps_ns
+    assert (np.diff(stamps) > 0).all()
+    again = update_map(UpdateRequest(first.folder, [log], tmp_path / "v3"))
+    assert again.version == 3
+    assert again.difference["tunnels_new"] == again.difference["tunnels_gone"] == []
+    assert sum(one["came_m2"] + one["went_m2"] for one in again.difference["walls"]) < 0.3

@@ -148,7 +148,7 @@ def declines(seeds: range, roughs: tuple[float, ...]) -> Iterator[str]:
     for apart_m, scale, stacked in layouts:
         for rough_m in roughs:
             for back in ("turned", "reverse"):
-                yield alike(apart_m, scale, rough_m, back, seeds, stacked=stacked)  # type: ignore[arg-type]
+                yield alike(apart_m, scale, rough_m, back, seeds, stacked=stacked)
 
 
 def _table(head: tuple[str, ...], lines: Iterable[str]) -> Iterator[str]:
