@@ -6,9 +6,11 @@ drive -> its own map -> placed in the map (all headings and shifts) -> fitted sc
 
 from __future__ import annotations
 
+import contextlib
+import shutil
 import tempfile
 import warnings
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -17,9 +19,10 @@ import numpy as np
 import numpy.typing as npt
 
 from lhdmap.config import Settings, settings_table
-from lhdmap.errors import InputError, LhdmapWarning, UsageError
+from lhdmap.errors import InputError, LhdmapWarning, UsageError, unmark_kept
 from lhdmap.integration.cloud import Cloud
 from lhdmap.integration.cloud_io import read_cloud
+from lhdmap.interrupts import before_interrupt
 from lhdmap.machine import Machine
 from lhdmap.mapfolder import MapFolder, MapFolderWriter
 from lhdmap.messages import FloatArray
@@ -140,8 +143,8 @@ def update_map(request: UpdateRequest) -> UpdateResult:
         raise UsageError(f"{request.target}: a new version is a folder of its own; name another one with -o")
     free_folder(request.target, force=request.force, inputs=inputs)
     known = _Map.read(request.map)
-    with tempfile.TemporaryDirectory(prefix="lhdmap_drive_") as scratch:
-        drive_folder = Path(scratch) / "drive"
+    with _scratch() as scratch:
+        drive_folder = scratch / "drive"
         built = build_map(
             BuildRequest(
                 request.logs, drive_folder, request.settings, request.topics, request.machine, request.progress
@@ -153,6 +156,19 @@ def update_map(request: UpdateRequest) -> UpdateResult:
         correction = _in_the_map(known, drive, request)
         with MapFolderWriter(request.target, force=request.force, inputs=inputs) as folder:
             return _written(folder, request, known, drive, correction, built.warnings)
+
+
+@contextlib.contextmanager
+def _scratch() -> Iterator[Path]:
+    """Give a folder that is gone afterwards, whatever happens; nothing in it counts as kept."""
+    with tempfile.TemporaryDirectory(prefix="lhdmap_drive_") as name:
+        folder = Path(name)
+        try:
+            with before_interrupt(lambda: shutil.rmtree(folder, ignore_errors=True)):
+                yield folder
+        except BaseException as error:
+            unmark_kept(error, folder)
+            raise
 
 
 def _in_the_map(known: _Map, drive: _Map, request: UpdateRequest) -> Correction:

@@ -137,6 +137,24 @@ def test_an_interrupted_update_leaves_the_old_map_whole(
     assert not (tmp_path / "v2").exists()
 
 
+def test_what_the_drive_alone_came_to_is_not_kept(
+    drift_map: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A log that ends in an error within its own map: the scratch folder is gone, and nobody is sent there."""
+    monkeypatch.setenv("TMPDIR", str(tmp_path / "scratch"))
+    monkeypatch.setattr("tempfile.tempdir", None)
+    (tmp_path / "scratch").mkdir()
+
+    def interrupted(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("lhdmap.pipeline.build.write_cloud", interrupted)
+    log = write_drive(tmp_path / "second.mcap", mine(branch=True), second_way(), 2)
+    assert main(["update-map", str(drift_map), str(log), "-o", str(tmp_path / "v2")]) == 4
+    assert "kept" not in capsys.readouterr().err
+    assert not list((tmp_path / "scratch").iterdir())
+
+
 @pytest.mark.parametrize("harm", ["gone", "damaged"])
 @pytest.mark.parametrize("name", ["views.npz", "free_space.npz", "topology.geojson", "cloud.ply"])
 def test_a_map_that_lacks_something_says_what_to_do(
