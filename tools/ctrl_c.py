@@ -17,10 +17,12 @@ import tempfile
 import time
 from pathlib import Path
 
+from lhdmap.pipeline.build import BuildRequest, build_map
 from lhdmap.topology.geojson import to_geojson
 from tests.cli.logs import write_room_log
 from tests.exports.folders import map_folder
 from tests.topology.maps import ladder
+from tests.update.drives import first_way, mine, second_way, write_drive
 
 EXIT_DONE, EXIT_INTERRUPTED = 0, 4
 BAD = ("Traceback", "fault in lhdmap", "Error:", "Exception ignored")
@@ -52,11 +54,19 @@ def commands(work: Path) -> dict[str, list[str]]:
         "eval-pile": ["eval", "pile", "--truth", str(work / "t.csv")],
         "view": ["view", str(log), "--web", "--port", "9191"],
         "screenshot": ["view", str(log), "--screenshot", "{out}.png"],
+        "update-map": ["update-map", str(_built(work)), str(work / "later.mcap"), "-o", "{out}", "--start", "0,0,0"],
         "route": ["route", str(work / "t.geojson"), "DP1", "T2"],
         "check-map": ["check-map", str(work / "t.geojson")],
         "export": ["export", str(map_folder(work / "map")), "--format", "dxf", "-o", "{out}.dxf"],
         "demo": ["demo", "-o", "{out}"],
     }
+
+
+def _built(work: Path) -> Path:
+    """Make a map, and the log of a later drive through it."""
+    write_drive(work / "later.mcap", mine(branch=True), second_way(), 2)
+    first = write_drive(work / "first.mcap", mine(branch=False), first_way(), 1)
+    return build_map(BuildRequest([first], work / "first_map")).folder
 
 
 def life_s(words: list[str], out: Path) -> float:

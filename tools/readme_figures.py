@@ -37,7 +37,7 @@ PILE = (
 TOPOLOGY = (
     "55 simulated teaching drives through 11 mines, walls rough by 0.12 to 0.30 m, own odometry; three office buildings",
     (
-        "intersections, their degrees and tunnels **all right, none too many**; in the buildings 12 of 12 core nodes, none too many; "
+        "intersections, degrees and tunnels **all right, none too many**; in the buildings 12 of 12 core nodes, none too many; "
         "access points 0.30 m off in the median, at walls of 0.15 m 1.6 m at worst; headings 3.8° at worst"
     ),
 )
