@@ -60,7 +60,7 @@ def waypoints_of(
 
 
 def _named_apart(waypoints: list[Waypoint]) -> list[Waypoint]:
-    """Return the waypoints with a free name in place of a generated one that another has: names of before stay when a map grows."""
+    """Return the waypoints, generated names numbered past those that are taken: names of before stay when a map grows."""
     said = {one.name for one in waypoints if one.name != one.id.upper()}
     free = (f"W{number}" for number in itertools.count(1) if f"W{number}" not in said)
     return [replace(one, name=next(free)) if one.name == one.id.upper() else one for one in waypoints]

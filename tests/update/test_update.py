@@ -40,7 +40,7 @@ def test_names_stay_and_are_not_given_twice(updated: Updated) -> None:
     (old,) = before.waypoints
     (same,) = (one for one in now.waypoints if one.name == old.name)
     assert np.hypot(*(same.pose - old.pose)[:2]) < 1.0
-    names = [one.name for one in (*now.waypoints, *now.tunnels, *now.intersections)]
+    names = [one.name for one in now.waypoints] + [one.name for one in now.nodes.values()]
     assert len(set(names)) == len(names)
 
 
