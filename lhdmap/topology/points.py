@@ -56,7 +56,14 @@ def waypoints_of(
         for place in places:
             at_m = _stood_at(tunnel, place, path, path_ns)
             found.append(_waypoint(len(found) + 1, place.name, tunnel, at_m, settings))
-    return found
+    return _named_apart(found)
+
+
+def _named_apart(waypoints: list[Waypoint]) -> list[Waypoint]:
+    """Return the waypoints, generated names numbered past those that are taken: names of before stay when a map grows."""
+    said = {one.name for one in waypoints if one.name != one.id.upper()}
+    free = (f"W{number}" for number in itertools.count(1) if f"W{number}" not in said)
+    return [replace(one, name=next(free)) if one.name == one.id.upper() else one for one in waypoints]
 
 
 def _dead_end(

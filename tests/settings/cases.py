@@ -139,6 +139,7 @@ _SETTINGS = {
     "smoothing.lag_s": Case("tilted", 1.0),
     "smoothing.key_deg": Case("lap", 100.0, {"smoothing.key_m": 3.0}),
     "smoothing.apart_m": Case("lap", 70.0),
+    "smoothing.drift": Case("lap", 0.0),
     "smoothing.reach_limit_m": Case("lap", 0.5),
     "smoothing.max_sigma_m": Case("lap", 0.001),
     "smoothing.agree_m": Case("lap", 0.01),

@@ -100,7 +100,7 @@ def test_equal_legs_are_not_taken_for_each_other(rough_m: float, least: float) -
 def test_where_the_odometry_may_be_a_leg_off_equal_legs_are_left_open() -> None:
     """8 % of scale, and the keys say so: the leg above is as likely, and its walls are the same."""
     drive = driven(decline(2, 0.0, 12.0, legs=3), 2, "reverse", scale=0.08, heights=False)
-    drive = drive._replace(keys=drive.keys[: drive.turn + 50])
+    drive = drive._replace(keys=drive.keys[: drive.turn + 34])
     wrong, _, reasons = wrong_and_right(drive)
     assert wrong == 0
     assert ALIKE in reasons

@@ -35,6 +35,15 @@ def test_the_new_tunnel_is_there_and_where_it_is(updated: Updated) -> None:
     assert np.median(np.abs(new.line_m[:, 0] - BRANCH_M + 0.5)) < 0.3
 
 
+def test_names_stay_and_are_not_given_twice(updated: Updated) -> None:
+    before, now = (read_topology(path) for path in (updated.before, updated.result.folder))
+    (old,) = before.waypoints
+    (same,) = (one for one in now.waypoints if one.name == old.name)
+    assert np.hypot(*(same.pose - old.pose)[:2]) < 1.0
+    names = [one.name for one in now.waypoints] + [one.name for one in now.nodes.values()]
+    assert len(set(names)) == len(names)
+
+
 def test_the_walls_that_went_are_told(updated: Updated) -> None:
     (level,) = updated.result.difference["walls"]
     assert level["went_m2"] > 0.3
