@@ -9,7 +9,7 @@ import numpy as np
 from lhdmap.landmarks.build import landmarks_of
 from lhdmap.landmarks.scans import NodeScan
 from lhdmap.landmarks.settings import LandmarkSettings
-from lhdmap.messages import FloatArray, LaserScan, Mount
+from lhdmap.messages import FloatArray, LaserScan, Message, Mount
 from lhdmap.pipeline.localize import KnownMap
 from lhdmap.simulation.planar import (
     PlanarScanner,
@@ -101,7 +101,7 @@ def drive(from_m: float, way_m: float, seed: int = 3, *, jump_m: float = 0.0) ->
     told = poses_at(way)
     poses = poses_at(way + jump_m * (way > from_m + 0.5 * way_m))
     scans = simulate_scans(world(), poses, _SCANNER, RATE_HZ, seed)
-    messages = [("front", scan) for scan in scans]
+    messages: list[tuple[str, Message]] = [("front", scan) for scan in scans]
     messages += wheels_of("articulated", told, [scan.stamp_ns for scan in scans])
     messages.sort(key=lambda one: one[1].stamp_ns)
     return (("tf_static", Mount(0, "base_link", "laser", np.eye(4))), *messages), poses

@@ -57,8 +57,10 @@ def test_in_an_intersection_it_is_the_nodes_frame() -> None:
 
 def test_the_next_point_in_a_tunnel_is_that_in_the_direction_of_motion() -> None:
     ahead, reverse = PLACER.at(at(26.0, 0.0, 5.0), 0.0, 2.0), PLACER.at(at(26.0, 0.0, 5.0), 0.0, -2.0)
-    assert (ahead.next_point, ahead.next_m) == ("t1.end", pytest.approx(28.0))
-    assert (reverse.next_point, reverse.next_m) == ("t1.start", pytest.approx(20.0))
+    assert ahead.next_point == "t1.end"
+    assert ahead.next_m == pytest.approx(28.0)
+    assert reverse.next_point == "t1.start"
+    assert reverse.next_m == pytest.approx(20.0)
     turned = PLACER.at(at(26.0, 0.0, 175.0), 0.0, 2.0)
     assert turned.next_point == "t1.start"
     standing = PLACER.at(at(26.0, 0.0, 0.0), 0.0, math.nan)
@@ -74,7 +76,8 @@ def test_the_next_point_is_told_along_a_bend() -> None:
 
 def test_waypoints_count_and_none_is_beyond_the_last() -> None:
     before, beyond = PLACER.at(at(0.0, -20.0, -90.0), 0.0, 1.0), PLACER.at(at(0.0, -28.0, -90.0), 0.0, 1.0)
-    assert (before.next_point, before.next_m) == ("w1", pytest.approx(6.0))
+    assert before.next_point == "w1"
+    assert before.next_m == pytest.approx(6.0)
     assert beyond.next_point == ""
     assert math.isnan(beyond.next_m)
 
