@@ -182,6 +182,8 @@ def test_nodes_are_compared_by_the_names_of_the_plan(tmp_path: Path) -> None:
     rows = [f"{stamp},{name},1.0" for stamp, name in zip(stamps.tolist(), names, strict=True)]
     csv.write_text("\n".join(["stamp_ns,node,at_m", *rows]) + "\n")
     assert figures(drive, placed(drive), nodes=read_nodes(csv))["node_accuracy"] == pytest.approx(300 / len(drive))
+    places = read_nodes(csv, {"T2"})  # a place in a node, as mine plans name them, says nothing of the node
+    assert figures(drive, placed(drive), nodes=places)["node_accuracy"] == 1.0
 
 
 @pytest.mark.parametrize("text", ["stamp_ns,node,at_m\nnow,T1,2\n", "stamp_ns,node,at_m\n12\n"])
