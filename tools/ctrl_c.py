@@ -17,6 +17,7 @@ import tempfile
 import time
 from pathlib import Path
 
+from lhdmap.pipeline.build import BuildRequest, build_map
 from lhdmap.topology.geojson import to_geojson
 from tests.cli.logs import write_room_log
 from tests.exports.folders import map_folder
@@ -55,8 +56,13 @@ def commands(work: Path) -> dict[str, list[str]]:
         "route": ["route", str(work / "t.geojson"), "DP1", "T2"],
         "check-map": ["check-map", str(work / "t.geojson")],
         "export": ["export", str(map_folder(work / "map")), "--format", "dxf", "-o", "{out}.dxf"],
+        "localize": ["localize", str(long_log), "--map", str(_room_map(log, work / "room_map")), "-o", "{out}"],
         "demo": ["demo", "-o", "{out}"],
     }
+
+
+def _room_map(log: Path, target: Path) -> Path:
+    return build_map(BuildRequest([log], target)).folder
 
 
 def life_s(words: list[str], out: Path) -> float:
