@@ -51,6 +51,12 @@ def mark_kept(error: BaseException, path: Path) -> None:
     error.__dict__.setdefault("kept", []).append(path)
 
 
+def unmark_kept(error: BaseException, folder: Path) -> None:
+    """Take back what was noted of places in a folder that will be gone."""
+    if "kept" in error.__dict__:
+        error.__dict__["kept"] = [path for path in kept_with(error) if folder not in path.parents]
+
+
 def kept_with(error: BaseException) -> list[Path]:
     """Return where what was finished before the error is kept; nowhere, if nothing was."""
     return list(error.__dict__.get("kept", []))

@@ -32,13 +32,13 @@ def before_interrupt(action: Action) -> Iterator[None]:
 
 
 def put_in_order() -> list[Path]:
-    """Call all actions, the latest first; return what is kept."""
+    """Call all actions, the latest first; return what is kept, and not removed by a later one."""
     kept = []
     while _actions:
         with contextlib.suppress(Exception):  # nothing may keep the program from ending
             path = _actions.pop()()
             kept += [] if path is None else [path]
-    return kept
+    return [path for path in kept if path.exists()]
 
 
 @contextlib.contextmanager

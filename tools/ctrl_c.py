@@ -22,6 +22,7 @@ from lhdmap.topology.geojson import to_geojson
 from tests.cli.logs import write_room_log
 from tests.exports.folders import map_folder
 from tests.topology.maps import ladder
+from tests.update.drives import first_way, mine, second_way, write_drive
 
 EXIT_DONE, EXIT_INTERRUPTED = 0, 4
 BAD = ("Traceback", "fault in lhdmap", "Error:", "Exception ignored")
@@ -37,6 +38,7 @@ def commands(work: Path) -> dict[str, list[str]]:
     (work / "t.csv").write_text("attempt,log,gt_width_m,gt_inclination_deg\nA,room.mcap,3,-30\nB,room.mcap,3,-30\n")
     (work / "s.toml").write_text('[[scenes]]\nvariant = "wall"\ncount = 2\n', encoding="utf-8")
     (work / "t.geojson").write_text(json.dumps(to_geojson(ladder())), encoding="utf-8")
+    first_map = str(_built(work))
     return {
         "help": ["--help"],
         "config": ["config", "pile"],
@@ -53,16 +55,20 @@ def commands(work: Path) -> dict[str, list[str]]:
         "eval-pile": ["eval", "pile", "--truth", str(work / "t.csv")],
         "view": ["view", str(log), "--web", "--port", "9191"],
         "screenshot": ["view", str(log), "--screenshot", "{out}.png"],
+        "update-map": ["update-map", first_map, str(work / "later.mcap"), "-o", "{out}", "--start", "0,0,0"],
         "route": ["route", str(work / "t.geojson"), "DP1", "T2"],
         "check-map": ["check-map", str(work / "t.geojson")],
         "export": ["export", str(map_folder(work / "map")), "--format", "dxf", "-o", "{out}.dxf"],
-        "localize": ["localize", str(long_log), "--map", str(_room_map(log, work / "room_map")), "-o", "{out}"],
+        "localize": ["localize", str(work / "later.mcap"), "--map", first_map, "-o", "{out}"],
         "demo": ["demo", "-o", "{out}"],
     }
 
 
-def _room_map(log: Path, target: Path) -> Path:
-    return build_map(BuildRequest([log], target)).folder
+def _built(work: Path) -> Path:
+    """Make a map, and the log of a later drive through it."""
+    write_drive(work / "later.mcap", mine(branch=True), second_way(), 2)
+    first = write_drive(work / "first.mcap", mine(branch=False), first_way(), 1)
+    return build_map(BuildRequest([first], work / "first_map")).folder
 
 
 def life_s(words: list[str], out: Path) -> float:

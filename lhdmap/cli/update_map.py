@@ -102,6 +102,7 @@ def _text(folder: Path, version: int, table: dict[str, Any]) -> str:
         lines.append(
             f"changed      {one['name']}: length {length[0]} -> {length[1]} m, width {width[0]} -> {width[1]} m"
         )
+    lines += [f"new nodes    {', '.join(table['nodes_new'])}"] if table["nodes_new"] else []
     lines += [f"moved        {one['name']} by {one['by_m']:.2f} m" for one in table["nodes_moved"]]
     for one in table["walls"]:
         if one["came_m2"] or one["went_m2"]:

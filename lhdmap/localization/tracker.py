@@ -1,7 +1,8 @@
 """The tracker: a pose on the map, carried on by the odometry and corrected by the map's walls.
 
-The information of a match is divided by the node's κ: neighbouring hits share the map's errors. Where the walls say little of one
-direction the prediction holds there, by the information alone; residuals say nothing of it.
+The information of a match is divided by the node's κ: neighbouring hits share the map's errors. So do neighbouring scans: over a
+metre of travel they say no more than one, and a machine that stands learns nothing from one scan after the other. Where the walls
+say little of one direction the prediction holds there, by the information alone; residuals say nothing of it.
 """
 
 from __future__ import annotations
@@ -20,7 +21,9 @@ from lhdmap.scan_matching.information import body_information, marginal_informat
 from lhdmap.scan_matching.matching import Hits, Prior, match
 from lhdmap.scan_matching.submap import OTHER_VISIT
 
-_MAP_HEADING_RAD = math.radians(0.03)
+_MAP_HEADING_RAD, _MAP_ACROSS_M = math.radians(0.03), 0.003
+_SHARED_M = 1.0  # travel over which scans share the map's errors
+_LEAST_SHARE = 0.02
 _AHEAD_M = 3.0  # mean distance of the hits ahead: what a wrong scale moves a scan by
 _LEAST_STD = np.array([1e-3, 1e-3, 1e-5])
 _PER_METRE = np.array([0.004, 0.003, math.radians(0.03)])  # of the odometry's step at least, per square root of a metre
@@ -41,10 +44,12 @@ class Tracker:
     ) -> None:
         self._walls, self._settings = walls, settings
         self.pose, self.P, self.height_m = pose.copy(), P.copy(), height_m
+        self._moved_m = _SHARED_M  # since the last correction; the first scan counts in full
 
     def predict(self, step: FloatArray, covariance: FloatArray) -> None:
         """Carry the pose on by a step (3,) of the odometry with its covariance (3, 3), in the axes of its end."""
         way = math.hypot(step[0], step[1])
+        self._moved_m += way
         noise = covariance + np.diag((_PER_METRE * math.sqrt(way)) ** 2)
         before = self.pose
         self.pose = se2.compose(before, step)
@@ -57,7 +62,9 @@ class Tracker:
         """Match hits (N, 2) in the machine's frame, the first `front` of the front scanner, and take over what they say."""
         walls, origin = self._walls.around(np.array([self.pose[0], self.pose[1], self.height_m]))
         hits = Hits(np.column_stack([points, np.zeros(len(points))]), front, layered=False)
-        kappa = quality.kappa if math.isfinite(quality.kappa) else 10.0
+        share = min(max(self._moved_m / _SHARED_M, _LEAST_SHARE), 1.0)
+        kappa = (quality.kappa if math.isfinite(quality.kappa) else 10.0) / share
+        self._moved_m = 0.0
         local = self.pose - np.array([origin[0], origin[1], 0.0])
         information: FloatArray = np.asarray(np.linalg.inv(self.P + np.diag(_LEAST_STD**2)), dtype=float)
         found = match(walls, hits, Prior(local, np.asarray(kappa * information, dtype=float)), local, OTHER_VISIT)
@@ -68,7 +75,7 @@ class Tracker:
         posterior = np.linalg.inv(information + found.information / kappa)
         scale = abs(quality.scale) if math.isfinite(quality.scale) else 0.003
         R = _turned(self.pose[2])
-        map_error = R @ np.diag([(scale * _AHEAD_M) ** 2, 0.0, _MAP_HEADING_RAD**2]) @ R.T
+        map_error = R @ np.diag([(scale * _AHEAD_M) ** 2, _MAP_ACROSS_M**2, _MAP_HEADING_RAD**2]) @ R.T
         self.P = np.asarray(posterior + 0.5 * (map_error + map_error.T), dtype=float)
         return Corrected(float(found.support), along)
 

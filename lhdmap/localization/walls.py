@@ -17,7 +17,7 @@ from lhdmap.topology.model import TopologicalMap
 
 _REACH_M, _STAYS_M = 45.0, 15.0
 _LEVEL_M = 4.0  # nodes farther above or below are another level
-_NO_CELLS = np.zeros((0, 2), np.float32)
+_MOST_HITS = 4  # of a cell that are put in: more make a line no surer, and loading slower
 
 
 class MapWalls:
@@ -63,7 +63,7 @@ class MapWalls:
                 continue
             near = (np.abs(points - place[:2]) < _REACH_M).all(axis=1)
             parts.append(points[near] - place[:2])
-            counts.append(self._landmarks.surfaces[node].cells.counts[near])
+            counts.append(np.minimum(self._landmarks.surfaces[node].cells.counts[near], _MOST_HITS))
         cell_m = next((surface.cells.cell_m for surface in self._landmarks.surfaces.values()), 0.05)
         cells = Cells(np.concatenate(parts).astype(np.float32), np.concatenate(counts), cell_m)
         return walls_of(cells, np.zeros(2), _REACH_M)

@@ -39,6 +39,7 @@ from lhdmap.proprioception.wheels import WheelOdometry
 from lhdmap.report.bounded import bounded
 from lhdmap.report.data import ReportData, Summary, TopicRow
 from lhdmap.roles import BUILD_MAP, GIVEN_POSES, read_by
+from lhdmap.smoothing.evidence import open_loops
 from lhdmap.smoothing.smoother import Correction, corrected
 from lhdmap.smoothing.trust import expected_error
 from lhdmap.topology.build import Topology, topology_of
@@ -326,6 +327,7 @@ def _remarks(pipeline: MappingPipeline) -> list[str]:
             f"odometry: in {100 * share:.0f} % of the scans a direction is weakly observed (smooth walls, or too far away?)"
         )
     remarks += key_scans_remark(pipeline.records)
+    remarks += open_loops(pipeline.smoother.evidence)
     gap_s = float(np.diff(pipeline.records.times_ns).max(initial=0.0)) * 1e-9
     if gap_s > _GAP_S:
         remarks.append(

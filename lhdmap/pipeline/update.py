@@ -6,9 +6,11 @@ drive -> its own map -> placed in the map (all headings and shifts) -> fitted sc
 
 from __future__ import annotations
 
+import contextlib
+import shutil
 import tempfile
 import warnings
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -17,40 +19,41 @@ import numpy as np
 import numpy.typing as npt
 
 from lhdmap.config import Settings, settings_table
-from lhdmap.errors import InputError, LhdmapWarning, UsageError
+from lhdmap.errors import InputError, LhdmapWarning, UsageError, unmark_kept
 from lhdmap.integration.cloud import Cloud
-from lhdmap.integration.cloud_io import read_cloud, write_cloud
-from lhdmap.landmarks.store import write_landmarks
+from lhdmap.integration.cloud_io import read_cloud
+from lhdmap.interrupts import before_interrupt
 from lhdmap.machine import Machine
-from lhdmap.mapfolder import Diagnostics, MapFolder, MapFolderWriter
+from lhdmap.mapfolder import MapFolder, MapFolderWriter
 from lhdmap.messages import FloatArray
+from lhdmap.names import name_of
 from lhdmap.outputs import free_folder
 from lhdmap.pipeline.build import BuildRequest, Progress, build_map
 from lhdmap.pipeline.landmarks import landmarks_for, with_stretches
 from lhdmap.pipeline.topology import each_step
 from lhdmap.pipeline.track import Rows
+from lhdmap.pipeline.update_files import Made, joined, later, write_version
 from lhdmap.provenance import file_entry
-from lhdmap.report.data import ReportData, Summary
-from lhdmap.report.page import write_report
 from lhdmap.runfolder import RunInfo
 from lhdmap.smoothing.smoother import Correction
-from lhdmap.topology.build import Seen, Topology, topology_of
+from lhdmap.topology.build import Seen, topology_of
 from lhdmap.topology.edits import load_edits
 from lhdmap.topology.files import read_topology
-from lhdmap.topology.geojson import to_geojson
 from lhdmap.topology.lookup import Lookup
 from lhdmap.topology.model import TopologicalMap
-from lhdmap.topology.sheet import Sheet, read_sheets, write_sheets
+from lhdmap.topology.sheet import Sheet, read_sheets
 from lhdmap.topology.views import View
-from lhdmap.topology.views_file import read_views, write_views
+from lhdmap.topology.views_file import read_views
 from lhdmap.trajectory import Trajectory
 from lhdmap.update import fit, merge
-from lhdmap.update.difference import Walls, difference
-from lhdmap.update.place import placed
+from lhdmap.update.difference import difference
+from lhdmap.update.place import placings
 
 _NEWER_WEIGHT = 4  # of what was seen later
-_LEAST_MARGIN = 0.08
+_ALIKE = 0.7  # of the share of scans that fit where it is best
 _NAMED_WITHIN_M = 3.0
+_PAUSE_NS = 1_000_000_000
+_OVERLAP = "{}: its times are those of the map's drives, too; in the new version they are {:.0f} s later"
 
 
 @dataclass(frozen=True, slots=True)
@@ -92,6 +95,7 @@ class _Map:
     sheets: list[Sheet]
     topology: TopologicalMap
     cloud: Cloud
+    later_ns: int = 0
 
     @classmethod
     def read(cls, path: Path) -> _Map:
@@ -104,6 +108,21 @@ class _Map:
             read_sheets(folder.file("free_space.npz")),
             read_topology(path),
             read_cloud(folder.file("cloud.ply")),
+        )
+
+    def after(self, other: _Map) -> _Map:
+        """Return this map with its times moved behind those of another one, where both overlap: each time has one pose."""
+        first, last = (int(self.trajectory.stamps_ns[row]) for row in (0, -1))
+        if first > int(other.trajectory.stamps_ns[-1]) or last < int(other.trajectory.stamps_ns[0]):
+            return self
+        by_ns = int(other.trajectory.stamps_ns[-1]) + _PAUSE_NS - first
+        stamps = None if self.cloud.stamps_ns is None else self.cloud.stamps_ns + by_ns
+        return replace(
+            self,
+            trajectory=later(self.trajectory, by_ns),
+            views=[view._replace(time_ns=view.time_ns + by_ns) for view in self.views],
+            cloud=replace(self.cloud, stamps_ns=stamps),
+            later_ns=by_ns,
         )
 
     @property
@@ -124,33 +143,51 @@ def update_map(request: UpdateRequest) -> UpdateResult:
         raise UsageError(f"{request.target}: a new version is a folder of its own; name another one with -o")
     free_folder(request.target, force=request.force, inputs=inputs)
     known = _Map.read(request.map)
-    with tempfile.TemporaryDirectory(prefix="lhdmap_drive_") as scratch:
-        drive_folder = Path(scratch) / "drive"
+    with _scratch() as scratch:
+        drive_folder = scratch / "drive"
         built = build_map(
             BuildRequest(
                 request.logs, drive_folder, request.settings, request.topics, request.machine, request.progress
             )
         )
-        drive = _Map.read(drive_folder)
+        drive = _Map.read(drive_folder).after(known)
+        if drive.later_ns:
+            built.warnings.append(_OVERLAP.format(name_of(request.logs[0]), drive.later_ns * 1e-9))
         correction = _in_the_map(known, drive, request)
         with MapFolderWriter(request.target, force=request.force, inputs=inputs) as folder:
             return _written(folder, request, known, drive, correction, built.warnings)
 
 
+@contextlib.contextmanager
+def _scratch() -> Iterator[Path]:
+    """Give a folder that is gone afterwards, whatever happens; nothing in it counts as kept."""
+    with tempfile.TemporaryDirectory(prefix="lhdmap_drive_") as name:
+        folder = Path(name)
+        try:
+            with before_interrupt(lambda: shutil.rmtree(folder, ignore_errors=True)):
+                yield folder
+        except BaseException as error:
+            unmark_kept(error, folder)
+            raise
+
+
 def _in_the_map(known: _Map, drive: _Map, request: UpdateRequest) -> Correction:
     """Return how the drive is to be moved into the map's frame."""
-    log = request.logs[0]
-    place = placed(known.sheets, drive.sheets[0], request.start)
-    if place is None:
+    log, smoothing = request.logs[0], request.settings.smoothing
+    places = placings(known.sheets, drive.sheets[0], request.start)
+    if not places:
         raise InputError(
             f"{log}: its walls are nowhere in {request.map}; say where it begins with --start, or build it apart"
         )
-    if place.margin < _LEAST_MARGIN and request.start is None:
+    shares = [fit.share_that_fits(known.seen, drive.seen, one.T_map_drive, smoothing) for one in places]
+    best, *others = sorted(shares, reverse=True)
+    if others and best > 0.0 and others[0] >= _ALIKE * best:
         raise InputError(
-            f"{log}: two places of {request.map} look alike to it (the second {100 * place.margin:.0f} % worse); "
-            "say where it begins with --start X,Y,HEADING_DEG"
+            f"{log}: two places of {request.map} look alike to it ({100 * best:.0f} and {100 * others[0]:.0f} % of its "
+            "scans fit); say where it begins with --start X,Y,HEADING_DEG"
         )
-    found = fit.fitted(known.seen, drive.seen, place.T_map_drive, request.settings.smoothing)
+    place = places[shares.index(best)]
+    found = fit.fitted(known.seen, drive.seen, place.T_map_drive, smoothing)
     if found is None:
         raise InputError(f"{log}: its scans do not fit the walls of {request.map}; build it apart")
     if found.tied < 0.2 * found.keys:
@@ -169,7 +206,7 @@ def _written(
 ) -> UpdateResult:
     """Write the new version from both."""
     moved = merge.moved_trajectory(drive.trajectory, correction)
-    final = _both(known.trajectory, moved)
+    final = joined(known.trajectory, moved)
     views, seen = _seen(known, drive, moved, request)
     topology = topology_of(seen, request.settings.topology, load_edits(request.edits))
     landmarks = landmarks_for(topology.map, seen, request.settings.landmarks)
@@ -179,26 +216,30 @@ def _written(
     table, walls = difference(known.topology, newer, (known.sheets, topology.sheets))
     went = np.concatenate([np.zeros((0, 2)), *(one.went_m for one in walls)])
     cloud = merge.joined_clouds(known.cloud, merge.moved_cloud(drive.cloud, correction), went, seen.path)
-    _write_files(folder, known, drive, final, views, (newer, topology), cloud, table)
-    write_landmarks(folder.path / "landmarks.npz", landmarks)
-    folder.finished(folder.path / "landmarks.npz")
-    distance_m = float(np.linalg.norm(np.diff(final.positions_m, axis=0), axis=1).sum())
-    earlier, added = known.folder.info.get("counts", {}), drive.folder.info.get("counts", {})
-    counts = {
-        **earlier,
-        **{key: earlier.get(key, 0) + added.get(key, 0) for key in ("scans_processed", "duration_s", "lost_stretches")},
-        "map_version": version,
-        "scans": len(final.stamps_ns),
-        "distance_m": distance_m,
-        "tied": correction.closures,
-        "tunnels": len(newer.tunnels),
-        "intersections": len(newer.intersections),
-    }
-    _write_pictures(folder, request, newer, topology, walls, cloud, final, counts, remarks)
+    made = Made(
+        request.target.name,
+        request.map,
+        request.logs,
+        request.settings,
+        request.machine or Machine(bodies={}),
+        (known.folder, drive.folder),
+        drive.later_ns,
+        final,
+        views,
+        newer,
+        topology.sheets,
+        landmarks,
+        cloud,
+        table,
+        walls,
+        _counts(known, drive, newer, correction),
+        remarks,
+    )
+    write_version(folder, made)
     info = RunInfo(
         request.logs,
         {**settings_table(request.settings), "request": {"update_of": _entry(known)}},
-        counts,
+        made.counts,
         remarks,
         {},
         {"version": version, "previous": _entry(known), "earlier_sources": known.folder.info.get("sources", [])},
@@ -226,71 +267,25 @@ def _path(trajectory: Trajectory) -> tuple[FloatArray, npt.NDArray[np.int64]]:
     return rows.poses[chosen][:, merge.PLANAR_AND_HEIGHT], rows.times_ns[chosen]
 
 
-def _write_files(
-    folder: MapFolderWriter,
-    known: _Map,
-    drive: _Map,
-    final: Trajectory,
-    views: list[View],
-    found: tuple[TopologicalMap, Topology],
-    cloud: Cloud,
-    table: dict[str, Any],
-) -> None:
-    newer, topology = found
-    folder.write_trajectory(final)
-    folder.write_odometry(_both(known.folder.odometry(), drive.folder.odometry()))
-    folder.write_diagnostics(_diagnostics(known.folder.diagnostics(), drive.folder.diagnostics()))
-    write_cloud(folder.path / "cloud.ply", cloud)
-    folder.finished(folder.path / "cloud.ply")
-    folder.write_json("topology.geojson", to_geojson(newer))
-    folder.finished(write_sheets(folder.path / "free_space.npz", topology.sheets))
-    folder.finished(write_views(folder.path / "views.npz", views))
-    folder.write_json("difference.json", table)
-    for one in (drive.folder, known.folder):  # the newer drive's pile, where it looked for one
-        if (one.path / "pile.json").is_file():
-            folder.write_json("pile.json", one.json("pile.json"))
-            break
+def _counts(known: _Map, drive: _Map, newer: TopologicalMap, correction: Correction) -> dict[str, Any]:
+    """Return the figures of both drives together; places where the map's walls hold the drive count as closed loops."""
+    earlier, added = known.folder.info.get("counts", {}), drive.folder.info.get("counts", {})
+    summed = ("scans_processed", "duration_s", "lost_stretches", "closures")
+    return {
+        **earlier,
+        **{key: earlier.get(key, 0) + added.get(key, 0) for key in summed},
+        "closures": earlier.get("closures", 0) + added.get("closures", 0) + correction.closures,
+        "map_version": known.topology.version + 1,
+        "scans": len(known.trajectory.stamps_ns) + len(drive.trajectory.stamps_ns),
+        "distance_m": earlier.get("distance_m", _length_m(known.trajectory)) + _length_m(drive.trajectory),
+        "tied": correction.closures,
+        "tunnels": len(newer.tunnels),
+        "intersections": len(newer.intersections),
+    }
 
 
-def _write_pictures(
-    folder: MapFolderWriter,
-    request: UpdateRequest,
-    newer: TopologicalMap,
-    topology: Topology,
-    walls: list[Walls],
-    cloud: Cloud,
-    final: Trajectory,
-    counts: dict[str, Any],
-    remarks: list[str],
-) -> None:
-    from lhdmap.report.difference_chart import difference_svg
-
-    path = folder.path / "difference.svg"
-    path.write_text(difference_svg(newer, topology.sheets, walls), encoding="utf-8")
-    folder.finished(path)
-    summary = Summary(counts["scans"], counts["scans_processed"], counts["duration_s"], counts["distance_m"])
-    report = ReportData(
-        request.target.name, summary, [], final, cloud=cloud, pile_reason="see pile.json", warnings=remarks
-    )
-    write_report(report, folder.path / "report.html")
-    folder.finished(folder.path / "report.html")
-
-
-def _both(first: Trajectory, second: Trajectory) -> Trajectory:
-    """Return both trajectories in the order of time."""
-    stamps = np.concatenate([first.stamps_ns, second.stamps_ns])
-    order = np.argsort(stamps, kind="stable")
-    positions = np.vstack([first.positions_m, second.positions_m])
-    return Trajectory(
-        stamps[order], positions[order], np.vstack([first.quaternions_xyzw, second.quaternions_xyzw])[order]
-    )
-
-
-def _diagnostics(first: Diagnostics, second: Diagnostics) -> Diagnostics:
-    columns: dict[str, Any] = {}
-    for name, a, b in zip(Diagnostics._fields, first, second, strict=True):
-        columns[name] = None if a is None or b is None else np.concatenate([np.asarray(a), np.asarray(b)])
-    return Diagnostics(**columns)
+def _length_m(trajectory: Trajectory) -> float:
+    return float(np.linalg.norm(np.diff(trajectory.positions_m, axis=0), axis=1).sum())
 
 
 def _entry(known: _Map) -> dict[str, Any]:

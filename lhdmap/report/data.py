@@ -70,6 +70,20 @@ class ClosureRow(NamedTuple):
     reason: str = ""
 
 
+class Picture(NamedTuple):
+    """A picture that is drawn already: a data URI (`charts.svg_uri`) and its caption."""
+
+    uri: str
+    caption: str
+
+
+class Difference(NamedTuple):
+    """What is different from the version before: the values of `difference.json`, and a picture of each level."""
+
+    table: Mapping[str, Any]
+    pictures: Sequence[Picture] = ()
+
+
 @dataclass(frozen=True, slots=True)
 class Summary:
     """The headline figures; the names are those of `build-map --json`."""
@@ -94,7 +108,7 @@ class ReportData:
 
     `witness`: which sensors told of the motion beside the scans (empty: none); `poses`: where given poses came from (empty: the
     path is that of the odometry); `pile_reason`: why no pile was looked for. `sheets`: free space of the levels of `topology`;
-    `closures`: places recognised, also those refused; `landmarks` of its nodes.
+    `closures`: places recognised, also those refused; `landmarks` of its nodes; `difference`: from the map's version before.
     """
 
     title: str
@@ -116,6 +130,7 @@ class ReportData:
     closures: Sequence[ClosureRow] = ()
     landmarks: Landmarks | None = None
     landmark_settings: LandmarkSettings = field(default_factory=LandmarkSettings)
+    difference: Difference | None = None
     witness: str = ""
     poses: str = ""
     warnings: Sequence[str] = ()

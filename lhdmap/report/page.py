@@ -10,6 +10,7 @@ from typing import Any
 from lhdmap.report import (
     charts,
     cloud_charts,
+    difference_page,
     glossary,
     markup,
     path_charts,
@@ -40,6 +41,7 @@ def render_report(data: ReportData) -> str:
         sections = [
             markup.section("What was found", _headline(data)),
             markup.section("Warnings", _warnings(data)),
+            difference_page.section(data),
             markup.section("Path", _path(data)),
             markup.section("Against the truth", _truth(data)),
             markup.section("Cloud", _cloud(data)),
@@ -78,8 +80,8 @@ def _pile(data: ReportData) -> str:
 
 
 def _of_odometry(data: ReportData) -> list[str]:
-    """Return the sections of how the motion was found; where poses were given, it was not."""
-    if data.poses:
+    """Return the sections of how the motion was found; where poses were given, it was not; of two drives, each map has its own."""
+    if data.poses or data.difference is not None:
         return []
     return [
         markup.section("Speed and slip", _speed(data)),

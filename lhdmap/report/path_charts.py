@@ -17,6 +17,8 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
+_LEAP_M = 5.0
+
 
 def plan_chart(data: ReportData) -> Figure:
     """Draw final trajectory, odometry and truth in map from above, equal scales."""
@@ -24,12 +26,22 @@ def plan_chart(data: ReportData) -> Figure:
     axes = figure.add_subplot()
     lines = _lines(data)
     for label, points, colour, style in lines:
-        rows = charts.thinned(len(points))
-        axes.plot(points[rows, 0], points[rows, 1], style, color=colour, label=label)
+        drawn = _broken(points[charts.thinned(len(points))], points)
+        axes.plot(drawn[:, 0], drawn[:, 1], style, color=colour, label=label)
     _ends(axes, lines[-1][1])
     plan_axes(axes)
     charts.legend_above(axes, columns=5)
     return figure
+
+
+def _broken(thinned_m: FloatArray, points_m: FloatArray) -> FloatArray:
+    """Return points (M, 3) with a gap where a path of several drives leaps from the end of one to the start of the next."""
+    steps = np.hypot(*np.diff(thinned_m[:, :2], axis=0).T)
+    whole = np.hypot(*np.diff(points_m[:, :2], axis=0).T)
+    leaps = np.flatnonzero(steps > max(_LEAP_M, 20.0 * float(np.median(steps)))) if len(steps) else steps
+    if not len(whole) or whole.max() <= _LEAP_M or not len(leaps):
+        return thinned_m
+    return np.insert(thinned_m, leaps.astype(int) + 1, np.nan, axis=0)
 
 
 def profile_chart(data: ReportData) -> Figure:

@@ -36,6 +36,8 @@ LOOPBACK, _LIVE_MEMORY = "127.0.0.1", "64MB"
 Stamps = npt.NDArray[np.int64]
 _VIRIDIS = np.array([[59, 82, 139], [33, 145, 140], [94, 201, 98], [253, 231, 37]], dtype=float)
 
+_LEAP_M = 5.0  # from scan to scan: the end of one drive and the start of the next
+
 
 class PathStyle(NamedTuple):
     """How a path is drawn: its name, its colour (in a word, and as 0xRRGGBBAA), and at which share of it the name stands."""
@@ -160,7 +162,9 @@ class RecordingWriter:
         """Record a whole trajectory as a line that carries its name."""
         positions = trajectory.positions_m
         step = max(1, len(positions) // 5000)
-        line = self._rr.LineStrips3D([positions[::step]], colors=drawn.rgba, radii=self._points_px(1.4))
+        drawn_m = positions[::step]
+        leaps = np.flatnonzero(np.linalg.norm(np.diff(drawn_m, axis=0), axis=1) > max(_LEAP_M, 0.5 * step)) + 1
+        line = self._rr.LineStrips3D(np.split(drawn_m, leaps), colors=drawn.rgba, radii=self._points_px(1.4))
         self._stream.log(f"map/path/{name}", line, static=True)
         at = positions[int(drawn.label_at * (len(positions) - 1))]
         label = self._rr.Points3D([at], colors=drawn.rgba, radii=self._points_px(3.0), labels=[drawn.label])

@@ -127,7 +127,7 @@ def duration(seconds: float) -> str:
 
 def missing_parts(data: ReportData) -> list[str]:
     """Return a sentence for each part that the log or the run did not have; what a warning says already is left out."""
-    sentences = [] if data.poses else _missing_of_odometry(data)
+    sentences = [] if data.poses or data.difference is not None else _missing_of_odometry(data)
     if data.cloud is None or not len(data.cloud.points_m):
         sentences.append("No cloud was integrated.")
     if data.poses:

@@ -1,8 +1,8 @@
 """Loop closures: is a key scan at a place that was seen before, and where exactly?
 
 A candidate is searched widely against the hits of the earlier place, then matched like any scan. It counts when most hits agree
-to the scanner's noise, every direction is fixed by the walls (a smooth drift looks the same everywhere), and the next closures
-say the same.
+to the scanner's noise, every direction is fixed by the walls (a smooth drift looks the same everywhere), no other place that the
+odometry allows is as much like it, and the next closures say the same.
 """
 
 from __future__ import annotations
@@ -21,6 +21,7 @@ from lhdmap.scan_matching.places import Nearby
 from lhdmap.scan_matching.scan_points import flattened
 from lhdmap.scan_matching.search import SearchGrid
 from lhdmap.scan_matching.submap import Submap, unsure
+from lhdmap.smoothing.reach import Drift
 from lhdmap.smoothing.settings import SmoothingSettings
 
 _SUBMAP_KEYS = 5  # keys on either side of the earlier one that make up its surroundings
@@ -29,9 +30,15 @@ _LEVEL_M, _CLIMB_DRIFT = 1.0, 0.02  # a degree of bias in pitch: levels of a min
 _CELL_M, _WINDOW_CELLS = 0.04, 512
 # One start for each heading: with more, niches that look alike cost a closure here and there (Intel: 396, not 397).
 _GRID, _TURN_RAD = SearchGrid(0.15, math.radians(2.5), apart_m=math.inf), math.radians(25.0)
-UNLIKE, SMOOTH, ALONE = (
+_PLACE_M, _MOST_PLACES = 8.0, 8  # of the places that are tried
+_AHEAD, _SAME_M = (
+    0.08,
+    2.0,
+)  # share of hits by which the best is ahead of others; as the odometry has two ways to one place
+UNLIKE, SMOOTH, ALIKE, ALONE = (
     "the walls are not alike",
     "the walls do not tell one direction",
+    "another place is as much like it",
     "no neighbour says the same",
 )
 """Why a place is no closure."""
@@ -74,12 +81,10 @@ def find_closures(
     The cost grows with the keys, not with their square.
     """
     refused = [] if refused is None else refused
-    places = np.array([(*key.pose, float(key.points[:, 2].mean())) for key in keys]).reshape(-1, 4)
-    travelled = np.array([key.travelled_m for key in keys])
+    search = _Search(keys, settings)
     found: list[Closure] = []
-    nearby = Nearby(places[:, :2], settings.reach_limit_m)
     for current in range(len(keys)):
-        closure = _close(keys, places, travelled, nearby, current, settings)
+        closure = search.close(current)
         if isinstance(closure, Closure):
             found.append(closure)
         elif closure is not None:
@@ -91,40 +96,85 @@ def find_closures(
     return kept
 
 
-def _close(
-    keys: list[KeyScan],
-    places: FloatArray,
-    travelled: FloatArray,
-    nearby: Nearby,
-    current: int,
-    settings: SmoothingSettings,
-) -> Closure | Refusal | None:
-    """Try the earlier key nearest to this one on its level; `places` (N, 4): poses and heights of the keys' hits."""
-    early = int(np.searchsorted(travelled, travelled[current] - settings.apart_m))
-    nearby.add_until(early)
-    near = nearby.around(current)
-    if not len(near):
-        return None
-    distances = np.hypot(*(places[near, :2] - places[current, :2]).T)
-    above_m = np.abs(places[near, 3] - places[current, 3])
-    distances[above_m > _LEVEL_M + _CLIMB_DRIFT * (travelled[current] - travelled[near])] = np.inf
-    nearest = int(distances.argmin())
-    candidate = int(near[nearest])
-    reach_m = min(
-        settings.reach_m + settings.drift * (travelled[current] - travelled[candidate]), settings.reach_limit_m
-    )
-    if distances[nearest] > reach_m:
-        return None
-    predicted = se2.between(places[candidate, :3], places[current, :3])
-    result = _found(keys[current], _surroundings(keys, candidate, early), predicted, reach_m)
-    if result is None or result.support < settings.min_support:
-        return Refusal(candidate, current, UNLIKE, 0.0 if result is None else result.support)
-    sigma = 1.0 / np.sqrt(np.maximum(marginal_information(result.information), 1e-12))
-    if sigma[:2].max() > min(settings.max_sigma_m, _MOST_UNEVEN * sigma[:2].min()):
-        return Refusal(candidate, current, SMOOTH, result.support, float(sigma[:2].max()))
-    covariance: FloatArray = np.linalg.inv(result.information).astype(np.float64)
-    covariance += np.diag([0.01**2, 0.01**2, math.radians(0.05) ** 2])
-    return Closure(candidate, current, result.pose, covariance, result.support)
+class _Tried(NamedTuple):
+    """An earlier key (index) and where the current one is most like the walls around it: None where it is nowhere."""
+
+    earlier: int
+    match: Match | None
+
+    @property
+    def support(self) -> float:
+        """Share of hits that agree."""
+        return 0.0 if self.match is None else self.match.support
+
+
+class _Search:
+    """Looks for the earlier place of one key after the other."""
+
+    def __init__(self, keys: list[KeyScan], settings: SmoothingSettings) -> None:
+        self._keys, self._settings = keys, settings
+        self._places = np.array([(*key.pose, float(key.points[:, 2].mean())) for key in keys]).reshape(-1, 4)
+        self._travelled = np.array([key.travelled_m for key in keys])
+        self._drift = Drift(keys, settings)
+        self._nearby = Nearby(self._places[:, :2], max(settings.reach_limit_m, self._drift.most_m))
+
+    def close(self, current: int) -> Closure | Refusal | None:
+        """Try the earlier keys on this one's level: the nearest, and one of each other place that the odometry allows."""
+        early = int(np.searchsorted(self._travelled, self._travelled[current] - self._settings.apart_m))
+        self._nearby.add_until(early)
+        tried = [_Tried(one, self._found(current, one, early)) for one in self._candidates(current)]
+        if not tried:
+            return None
+        best = max(tried, key=lambda one: one.support)
+        if best.match is None or best.support < self._settings.min_support:
+            return Refusal(best.earlier, current, UNLIKE, best.support)
+        sigma = 1.0 / np.sqrt(np.maximum(marginal_information(best.match.information), 1e-12))
+        if sigma[:2].max() > min(self._settings.max_sigma_m, _MOST_UNEVEN * sigma[:2].min()):
+            return Refusal(best.earlier, current, SMOOTH, best.support, float(sigma[:2].max()))
+        if any(self._rivals(best, other) for other in tried):
+            return Refusal(best.earlier, current, ALIKE, best.support, float(sigma[:2].max()))
+        covariance: FloatArray = np.linalg.inv(best.match.information).astype(np.float64)
+        covariance += np.diag([0.01**2, 0.01**2, math.radians(0.05) ** 2])
+        return Closure(best.earlier, current, best.match.pose, covariance, best.support)
+
+    def _candidates(self, current: int) -> list[int]:
+        """Return the earlier keys to try, the nearest first; none where no place is within reach."""
+        near = self._nearby.around(current)
+        distances = np.hypot(*(self._places[near, :2] - self._places[current, :2]).T)
+        way_m = self._travelled[current] - self._travelled[near]
+        level = np.abs(self._places[near, 3] - self._places[current, 3]) <= _LEVEL_M + _CLIMB_DRIFT * way_m
+        within = level & (distances <= np.maximum(self._reach_m(way_m), self._drift.radius_m(near, current)))
+        order = near[within][np.argsort(distances[within], kind="stable")]
+        chosen: list[int] = []
+        while len(order) and len(chosen) < _MOST_PLACES:
+            chosen.append(int(order[0]))
+            order = order[np.hypot(*(self._places[order, :2] - self._places[chosen[-1], :2]).T) > _PLACE_M]
+        return chosen
+
+    def _reach_m(self, way_m: FloatArray) -> FloatArray:
+        s = self._settings
+        return np.minimum(s.reach_m + s.drift * way_m, s.reach_limit_m)
+
+    def _found(self, current: int, candidate: int, early: int) -> Match | None:
+        """Return where the key is most like the walls around an earlier one, None where it is nowhere."""
+        submap = _surroundings(self._keys, candidate, early)
+        points = flattened(self._keys[current].points)
+        predicted = se2.between(self._places[candidate, :3], self._places[current, :3])
+        reach_m = float(self._reach_m(self._travelled[current] - self._travelled[candidate]))
+        if math.hypot(predicted[0], predicted[1]) > reach_m:
+            predicted[:2], reach_m = (
+                0.0,
+                min(reach_m, 0.5 * _PLACE_M),
+            )  # the odometry may be off by more: the place as it is
+        hits = Hits(points, len(points), layered=False)
+        return next(iter(submap.locate(hits, unsure(predicted), np.array([reach_m, _TURN_RAD]))), None)
+
+    def _rivals(self, best: _Tried, other: _Tried) -> bool:
+        """Return whether another place is about as much like the key."""
+        if best.match is None or other.match is None or other.support <= best.support - _AHEAD:
+            return False
+        here, there = (se2.compose(self._places[one.earlier, :3], one.match.pose) for one in (best, other) if one.match)
+        return math.hypot(*(here - there)[:2]) > _SAME_M
 
 
 def _surroundings(keys: list[KeyScan], centre: int, before: int) -> Submap:
@@ -135,13 +185,6 @@ def _surroundings(keys: list[KeyScan], centre: int, before: int) -> Submap:
         if abs(key.travelled_m - keys[centre].travelled_m) <= _SUBMAP_M:
             submap.insert(flattened(key.points), se2.between(keys[centre].pose, key.pose))
     return submap
-
-
-def _found(key: KeyScan, submap: Submap, predicted: FloatArray, reach_m: float) -> Match | None:
-    """Return where the key is most like the submap, None where it is nowhere."""
-    points = flattened(key.points)
-    hits = Hits(points, len(points), layered=False)
-    return next(iter(submap.locate(hits, unsure(predicted), np.array([reach_m, _TURN_RAD]))), None)
 
 
 def _confirmed(found: list[Closure], keys: list[KeyScan], settings: SmoothingSettings) -> list[Closure]:

@@ -9,11 +9,12 @@ import numpy as np
 
 from lhdmap.messages import FloatArray
 from lhdmap.scan_matching.key_scan import KeyScan
-from lhdmap.smoothing.closures import Closure, Refusal
+from lhdmap.smoothing.closures import ALIKE, SMOOTH, Closure, Refusal
 from lhdmap.smoothing.robust import Judgement
 
 CONTRADICTED, DOUBTFUL = "contradicts the odometry and the other closures", "two ways to solve the graph disagree on it"
 _MOST_REFUSED = 2000
+_FEWEST_OPEN = 10  # a few places alone are met on any drive
 
 
 class Evidence(NamedTuple):
@@ -69,3 +70,14 @@ def evidence_of(
         for one in refused[:_MOST_REFUSED]
     ]
     return sorted(rows, key=lambda row: row.current_ns)
+
+
+def open_loops(evidence: Sequence[Evidence]) -> list[str]:
+    """Return a remark where more places are left open than closed, because the walls do not tell which place it is."""
+    left_open = sum(row.reason in (ALIKE, SMOOTH) for row in evidence)
+    accepted = sum(row.accepted for row in evidence)
+    if left_open < _FEWEST_OPEN or left_open <= accepted:
+        return []
+    return [
+        f"loop closure: {left_open} places look like earlier ones, but the walls do not tell which; no loop was closed there"
+    ]

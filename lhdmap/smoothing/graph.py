@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from itertools import pairwise
 from typing import NamedTuple
 
@@ -14,11 +13,9 @@ from lhdmap.scan_matching.key_scan import KeyScan
 from lhdmap.scan_matching.step_error import NO_ERROR, StepError
 from lhdmap.smoothing.closures import Closure
 from lhdmap.smoothing.settings import SmoothingSettings
+from lhdmap.smoothing.steps import step_covariance
 
 _CAUCHY = 1.0
-_SHORTEST_M, _PER_TURN = 0.1, 0.002
-# Deviations of a step beyond which it ties nothing: a heading of more turns round, and marginals would have no digits left.
-_LOOSEST = np.array([3.0, 3.0, 0.5])
 
 
 class Smoothed(NamedTuple):
@@ -45,7 +42,7 @@ def smoothed(keys: list[KeyScan], closures: list[Closure], settings: SmoothingSe
         values.insert(index, gtsam.Pose2(*pose))
     for index in range(len(keys) - 1):
         step = se2.between(poses[index], poses[index + 1])
-        noise = gtsam.noiseModel.Gaussian.Covariance(_step_covariance(keys[index], keys[index + 1], settings))
+        noise = gtsam.noiseModel.Gaussian.Covariance(step_covariance(keys[index], keys[index + 1], settings))
         graph.add(gtsam.BetweenFactorPose2(index, index + 1, gtsam.Pose2(*step), noise))
     for closure in closures:
         gaussian = gtsam.noiseModel.Gaussian.Covariance(closure.covariance)
@@ -59,23 +56,6 @@ def smoothed(keys: list[KeyScan], closures: list[Closure], settings: SmoothingSe
     except RuntimeError:  # numbers too far apart: what the odometry alone would say is never too sure
         end = chained(keys).covariance
     return Smoothed(np.array([[pose.x(), pose.y(), pose.theta()] for pose in found]), end)
-
-
-def step_covariances(keys: list[KeyScan], settings: SmoothingSettings) -> list[FloatArray]:
-    """Return the covariances (3, 3) of the steps from key to key, each in the axes of its end."""
-    return [_step_covariance(before, after, settings) for before, after in pairwise(keys)]
-
-
-def _step_covariance(before: KeyScan, after: KeyScan, settings: SmoothingSettings) -> FloatArray:
-    """Return the covariance (3, 3) of a step: what was measured, and what no drive is better than."""
-    travel_m = max(after.travelled_m - before.travelled_m, _SHORTEST_M)
-    turn = abs(float(se2.wrap(after.pose[2] - before.pose[2])))
-    position = settings.along_sigma * math.sqrt(travel_m)
-    heading = math.radians(settings.heading_sigma_deg) * math.sqrt(travel_m) + _PER_TURN * turn
-    covariance = after.error.covariance + np.diag([position**2, position**2, heading**2])
-    share = np.minimum(1.0, _LOOSEST / np.sqrt(np.diag(covariance)))
-    bounded: FloatArray = covariance * np.outer(share, share)
-    return bounded
 
 
 def chained(keys: list[KeyScan]) -> StepError:

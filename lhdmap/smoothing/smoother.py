@@ -13,11 +13,12 @@ from lhdmap.messages import FloatArray
 from lhdmap.scan_matching.key_scan import KeyScan
 from lhdmap.smoothing.closures import Closure, Refusal, find_closures
 from lhdmap.smoothing.evidence import Evidence, evidence_of
-from lhdmap.smoothing.graph import smoothed, step_covariances
+from lhdmap.smoothing.graph import smoothed
 from lhdmap.smoothing.heights import closed_heights
 from lhdmap.smoothing.keys import KeyScans
 from lhdmap.smoothing.robust import Tie, judged
 from lhdmap.smoothing.settings import SmoothingSettings
+from lhdmap.smoothing.steps import step_covariances
 
 _PLANAR = [0, 1, 5]  # of a pose: x, y, heading
 _BLOCK = 50_000  # poses moved at a time: what is needed on the way is ten times the poses

@@ -10,6 +10,7 @@ from lhdmap.topology.model import TopologicalMap
 
 _HEIGHT = 2.0  # a metre of height is as far as so many in plan: levels
 _ARMS = 12
+_STEP_M = 1.0
 _AT_WAYPOINT_M = 2.0
 
 
@@ -20,8 +21,8 @@ class Lookup:
         self._topology = topology
         points, owner = [], []
         for tunnel in topology.tunnels:
-            points.append(tunnel.line_m)
-            owner += [tunnel.id] * len(tunnel.line_m)
+            points.append(_each_metre(tunnel.line_m))
+            owner += [tunnel.id] * len(points[-1])
         for node in topology.intersections:
             middle = node.T_map_node[:3]
             inner = [middle[None]]
@@ -31,8 +32,7 @@ class Lookup:
             points += inner
             owner += [node.id] * sum(map(len, inner))
         self._owner = owner
-        places = np.vstack(points) if points else np.zeros((1, 3))
-        self._tree = KDTree(places * [1.0, 1.0, _HEIGHT])
+        self._tree = KDTree(np.vstack([np.zeros((0, 3)), *points]) * [1.0, 1.0, _HEIGHT])
 
     def nodes_at(self, points_m: FloatArray, within_m: float = np.inf) -> list[str]:
         """Return the ids of the nodes that points (N, 3) are in; empty where none is nearer than `within_m`."""
@@ -51,3 +51,10 @@ class Lookup:
                 if names[row]:
                     names[row] = waypoint.name
         return names
+
+
+def _each_metre(line_m: FloatArray) -> FloatArray:
+    """Return points (M, 3) at most a metre apart on a line (N, 3)."""
+    way = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(line_m, axis=0), axis=1))])
+    at = np.unique(np.concatenate([way, np.arange(0.0, way[-1], _STEP_M)]))
+    return np.column_stack([np.interp(at, way, column) for column in line_m.T])

@@ -6,8 +6,11 @@ views' times.
 
 from __future__ import annotations
 
+import zlib
 from collections.abc import Sequence
+from itertools import pairwise
 from pathlib import Path
+from zipfile import BadZipFile
 
 import numpy as np
 
@@ -45,15 +48,16 @@ def read_views(path: Path) -> list[View]:
     try:
         with np.load(path, allow_pickle=False) as table:
             points = table["points_mm"].astype(np.float32) / np.float32(_MM)
-            ends = np.cumsum(table["hits"])[:-1]
-            fans = [Fan(origin, hits) for origin, hits in zip(table["origin_m"], np.split(points, ends), strict=True)]
+            ends = np.concatenate([[0], np.cumsum(table["hits"])]).tolist()
+            parts = [points[a:b] for a, b in pairwise(ends)]
+            fans = [Fan(origin, hits) for origin, hits in zip(table["origin_m"], parts, strict=True)]
             first = np.concatenate([[0], np.cumsum(table["fans"])]).tolist()
             rows = zip(table["time_ns"].tolist(), table["travelled_m"].tolist(), strict=True)
             return [
                 View(int(time_ns), float(travelled_m), tuple(fans[first[k] : first[k + 1]]))
                 for k, (time_ns, travelled_m) in enumerate(rows)
             ]
-    except (OSError, ValueError, KeyError, EOFError) as error:
+    except (OSError, ValueError, KeyError, EOFError, BadZipFile, zlib.error) as error:
         raise InputError(f"{path}: not the views of a map ({error}); build the map again") from error
 
 

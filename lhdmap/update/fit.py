@@ -25,6 +25,7 @@ from lhdmap.smoothing.smoother import Correction
 from lhdmap.topology.views import View
 
 _KEY_M = 2.0
+_MOST_TRIED = 24
 _AROUND_M, _FEWEST_VIEWS = 12.0, 6
 _CELL_M, _WINDOW_CELLS = 0.04, 512
 _GRID = SearchGrid(0.15, math.radians(2.5), apart_m=math.inf)
@@ -71,6 +72,20 @@ def fitted(known: Seen, drive: Seen, T_map_drive: FloatArray, settings: Smoothin
     if len(ties) < 2:
         return None
     return _solved(drive, keys, planar, T_map_drive, ties, raised, settings)
+
+
+def share_that_fits(known: Seen, drive: Seen, T_map_drive: FloatArray, settings: SmoothingSettings) -> float:
+    """Return which share of a drive's keys, some of them tried, the map's walls hold where the drive is at `T_map_drive` (3,)."""
+    keys = _keys(drive.poses)
+    tried = keys[:: max(len(keys) // _MOST_TRIED, 1)]
+    tree = KDTree(known.poses[:, :2])
+    held = 0
+    for row in tried:
+        predicted = se2.compose(T_map_drive, drive.poses[row, [0, 1, 3]])
+        near = np.array(tree.query_ball_point(predicted[:2], _AROUND_M), dtype=np.int64)
+        if len(near) >= _FEWEST_VIEWS:
+            held += _tie(known, near, drive.views[row], predicted, _FIRST_REACH, settings) is not None
+    return held / max(len(tried), 1)
 
 
 def _keys(poses: FloatArray) -> npt.NDArray[np.int64]:

@@ -1,8 +1,8 @@
 """Where a drive lies in a map, from nothing: its walls are laid over the map's in all headings and shifts.
 
 For each heading one correlation (FFT) of the map's field (walls count for, free room against) with the drive's walls tells the
-score of all shifts. The best place has to be better than the second best elsewhere by a margin; it is then refined scan by scan
-(`lhdmap.update.fit`).
+score of all shifts. What lies best by this alone need not be right (a bend is like another bend, and a tunnel that the map does
+not have counts for nothing), so some places are returned; scans tell between them (`lhdmap.update.fit`).
 """
 
 from __future__ import annotations
@@ -21,47 +21,50 @@ from lhdmap.topology.sheet import FREE, OCCUPIED, Sheet
 _CELL_M = 0.4
 _STEP_RAD = math.radians(2.0)
 _FREE_COSTS = 0.6
+_FEWEST_WALLS = 50
 _APART_M, _APART_RAD = 5.0, math.radians(20.0)
 _LEAST_SCORE = 0.25  # of the drive's walls: less is chance
+_MOST_PLACES, _LEAST_OF_BEST = 6, 0.4
 
 
 class Placed(NamedTuple):
     """A place of a drive in a map: `T_map_drive` (3,) and the number of the map's sheet.
 
-    `score`: share of the drive's walls that are the map's, less what contradicts; `margin`: by what share of the score the next
-    best place is worse.
+    `score`: share of the drive's walls that are the map's, less what contradicts.
     """
 
     T_map_drive: FloatArray
     score: float
-    margin: float
     sheet: int
 
 
-def placed(sheets: list[Sheet], drive: Sheet, start: FloatArray | None = None) -> Placed | None:
-    """Return where a drive's sheet lies best in a map's sheets, None where it is nowhere.
+def placings(sheets: list[Sheet], drive: Sheet, start: FloatArray | None = None) -> list[Placed]:
+    """Return where a drive's sheet may lie in a map's sheets, best first, each at a place of its own; none where nowhere.
 
     `start` (3,): about where its first pose is, where somebody knows; then only places within 10 m and 20° are looked at.
     """
     walls = drive.middles_m(np.argwhere(drive.cells == OCCUPIED))
-    if len(walls) < 50:
-        return None
-    found = [_best(sheet, walls, start, number) for number, sheet in enumerate(sheets)]
-    best = max(found, key=lambda one: one.score)
-    others = [one.score for one in found if one is not best]
-    margin = min([best.margin, *(1.0 - other / max(best.score, 1e-9) for other in others)])
-    return None if best.score < _LEAST_SCORE else best._replace(margin=margin)
-
-
-def _best(sheet: Sheet, walls: FloatArray, start: FloatArray | None, number: int) -> Placed:
-    """Return the best place of walls (N, 2) in one sheet of the map."""
-    field = _field(sheet)
+    if len(walls) < _FEWEST_WALLS:
+        return []
     centre = walls.mean(axis=0)
+    found = [one for number, sheet in enumerate(sheets) for one in _scored(sheet, walls, centre, start, number)]
+    kept: list[Placed] = []
+    for one in sorted(found, key=lambda one: -one.score):
+        if one.score < max(_LEAST_SCORE, _LEAST_OF_BEST * kept[0].score if kept else 0.0) or len(kept) == _MOST_PLACES:
+            break
+        if not any(one.sheet == better.sheet and _same(one.T_map_drive, better.T_map_drive, centre) for better in kept):
+            kept.append(one)
+    return kept
+
+
+def _scored(sheet: Sheet, walls: FloatArray, centre: FloatArray, start: FloatArray | None, number: int) -> list[Placed]:
+    """Return the best places of walls (N, 2) in one sheet of the map for each heading."""
+    field = _field(sheet)
     radius = float(np.linalg.norm(walls - centre, axis=1).max())
     size = int(2 * radius / _CELL_M) + 3
     shape = tuple(next_fast_len(extent + size) for extent in field.shape)
     spectrum = rfft2(field, shape)
-    scored: list[tuple[float, FloatArray]] = []
+    scored: list[Placed] = []
     for heading in _headings(start):
         scores = _scores(spectrum, shape, walls - centre, heading, size)
         for row, column in _peaks(scores, 3):
@@ -72,13 +75,8 @@ def _best(sheet: Sheet, walls: FloatArray, start: FloatArray | None, number: int
             shift = sheet.origin_m + _CELL_M * (np.array(first[::-1]) + size // 2 + 0.5)
             pose = _pose(shift, centre, heading)
             if start is None or _is_near(pose, start):
-                scored.append((float(scores[row, column]), pose))
-    if not scored:
-        return Placed(np.zeros(3), 0.0, 0.0, number)
-    scored.sort(key=lambda one: -one[0])
-    score, pose = scored[0]
-    second = next((s for s, other in scored if not _same(other, pose, centre)), 0.0)
-    return Placed(pose, score, 1.0 - max(second, 0.0) / max(score, 1e-9), number)
+                scored.append(Placed(pose, float(scores[row, column]), number))
+    return scored
 
 
 def _field(sheet: Sheet) -> npt.NDArray[np.float32]:

@@ -12,8 +12,10 @@ from lhdmap.scan_matching.key_scan import KeyScan
 from lhdmap.smoothing.closures import Closure, _confirmed, find_closures
 from lhdmap.smoothing.graph import chained, smoothed
 from lhdmap.smoothing.keys import KeyScans
+from lhdmap.smoothing.reach import Drift
 from lhdmap.smoothing.settings import SmoothingSettings
 from lhdmap.smoothing.smoother import Smoother
+from lhdmap.smoothing.steps import step_covariances
 
 from tests.smoothing.places import SIGMA_M, SIGMA_RAD, WALK, drifted, keys_of, lap, square, straight
 
@@ -144,3 +146,19 @@ def test_a_step_that_is_hardly_known_leaves_the_graph_solvable() -> None:
     assert np.isfinite(found.poses).all()
     assert np.isfinite(found.end_covariance).all()
     assert found.end_covariance[0, 0] < 25.0 + chained(keys).covariance[0, 0]
+
+
+def test_the_radius_is_that_of_the_chained_steps() -> None:
+    """Sums along the drive against the covariances put together step by step, on a way with bends."""
+    true = lap(70)
+    way = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(true[:, :2], axis=0).T))])
+    keys = [KeyScan(k, pose, float(way[k]), NO_POINTS, WALK) for k, pose in enumerate(true)]
+    drift = Drift(keys, SETTINGS)
+    steps = step_covariances(keys, SETTINGS)
+    for earlier, current in ((0, 69), (10, 50), (40, 41)):
+        covariance = steps[earlier]
+        for row in range(earlier + 1, current):
+            step = se2.between(keys[row].pose, keys[row + 1].pose)
+            covariance = se2.composed_covariance(covariance, step, steps[row])
+        expected = 2.5 * math.sqrt(float(np.trace(covariance[:2, :2])))
+        assert drift.radius_m(np.array([earlier]), current)[0] == pytest.approx(expected, rel=1e-6)

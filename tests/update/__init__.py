@@ -1,0 +1,1 @@
+"""Tests of a map that a new drive is added to."""
