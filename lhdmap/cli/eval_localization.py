@@ -79,7 +79,10 @@ def _text(found: dict[str, Any]) -> str:
     inside = found["within_2_sigma"]
     if inside["along"] is not None:
         lines.append("within 2 σ   " + ", ".join(f"{name} {100 * value:.0f} %" for name, value in inside.items()))
-    lines.append(f"first fix    {found['first_fix_s']} s, {found['first_fix_m']} m; false fixes {found['false_fixes']}")
+    first = "none"
+    if found["first_fix_s"] is not None:
+        first = f"after {found['first_fix_s']:.1f} s and {found['first_fix_m']:.1f} m"
+    lines.append(f"first fix    {first}; false fixes {found['false_fixes']}")
     if found["node_accuracy"] is not None:
         lines.append(f"node right   {100 * found['node_accuracy']:.2f} %")
     return "\n".join(lines)

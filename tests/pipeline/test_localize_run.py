@@ -30,7 +30,7 @@ from tests.exports.folders import map_folder
 from tests.mine.plans import lines, network_of
 
 SETTINGS = settings_from({"pile.method": "off", "recording.scan_interval_s": 5.0})
-PLAN = lines(("A", [[0, 0, 0], [60, 0, 0]]), ("B", [[30, 0, 0], [30, 24, 0]]))
+PLAN = lines(("A", [[0, 0, 0], [50, 0, 0]]), ("B", [[28, 0, 0], [28, 22, 0]]))
 PARK = {"drift": "A", "at_m": 5.0, "kind": "park", "name": "Park"}
 
 
@@ -73,9 +73,11 @@ def test_a_start_that_is_not_told_is_found(found: LocalizeResult) -> None:
 
 def test_it_is_right_against_the_truth(found: LocalizeResult, mine: Mine, capsys: pytest.CaptureFixture[str]) -> None:
     words = ["--truth", str(mine.second.truth_file), "--map-truth", str(mine.teaching.truth_file)]
-    words += ["--nodes", str(mine.second.nodes_file), "--json"]
+    words += ["--nodes", str(mine.second.nodes_file)]
     capsys.readouterr()
     assert main(["eval", "localization", str(found.folder), *words]) == 0
+    assert f"first fix    after {found.summary['first_fix_s']:.1f} s and " in capsys.readouterr().out
+    assert main(["eval", "localization", str(found.folder), *words, "--json"]) == 0
     figures = json.loads(capsys.readouterr().out)
     assert figures["scans"] == len(found.rows)
     assert figures["false_fixes"] == 0
