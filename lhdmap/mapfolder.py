@@ -12,6 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from lhdmap.descriptions import MAP
+from lhdmap.errors import InputError
 from lhdmap.messages import FloatArray
 from lhdmap.runfolder import RunFolder, RunFolderWriter, RunInfo
 from lhdmap.trajectory import Trajectory, read_tum, write_tum
@@ -53,6 +54,9 @@ _COLUMNS = (
     [name for name in Diagnostics._fields if name not in Diagnostics._field_defaults],
     list(Diagnostics._field_defaults),
 )
+
+
+_OF_EVERY_MAP = ("topology.geojson", "free_space.npz", "landmarks.npz")  # but of those of before, and without topology
 
 
 class MapFolderWriter:
@@ -154,6 +158,10 @@ class MapFolder:
         Raises:
             InputError: the folder has no such file.
         """
+        if name in _OF_EVERY_MAP and not (self.path / name).is_file():
+            raise InputError(
+                f"{self.path}: the map has no {name}; build it again with lhdmap build-map (topology.method)"
+            )
         return self._run.file(name)
 
     def json(self, name: str) -> dict[str, Any]:

@@ -38,6 +38,7 @@ def commands(work: Path) -> dict[str, list[str]]:
     (work / "t.csv").write_text("attempt,log,gt_width_m,gt_inclination_deg\nA,room.mcap,3,-30\nB,room.mcap,3,-30\n")
     (work / "s.toml").write_text('[[scenes]]\nvariant = "wall"\ncount = 2\n', encoding="utf-8")
     (work / "t.geojson").write_text(json.dumps(to_geojson(ladder())), encoding="utf-8")
+    first_map = str(_built(work))
     return {
         "help": ["--help"],
         "config": ["config", "pile"],
@@ -54,10 +55,11 @@ def commands(work: Path) -> dict[str, list[str]]:
         "eval-pile": ["eval", "pile", "--truth", str(work / "t.csv")],
         "view": ["view", str(log), "--web", "--port", "9191"],
         "screenshot": ["view", str(log), "--screenshot", "{out}.png"],
-        "update-map": ["update-map", str(_built(work)), str(work / "later.mcap"), "-o", "{out}", "--start", "0,0,0"],
+        "update-map": ["update-map", first_map, str(work / "later.mcap"), "-o", "{out}", "--start", "0,0,0"],
         "route": ["route", str(work / "t.geojson"), "DP1", "T2"],
         "check-map": ["check-map", str(work / "t.geojson")],
         "export": ["export", str(map_folder(work / "map")), "--format", "dxf", "-o", "{out}.dxf"],
+        "localize": ["localize", str(work / "later.mcap"), "--map", first_map, "-o", "{out}"],
         "demo": ["demo", "-o", "{out}"],
     }
 

@@ -38,7 +38,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace, console: Console) -> int:
     """Evaluate and print the figures."""
-    from lhdmap.evaluation.localization import LocalizationTable, MapTruth, evaluated, names_of_nodes, read_nodes
+    from lhdmap.evaluation.localization import LocalizationTable, MapTruth, evaluated, names_of, read_nodes
     from lhdmap.localization.rows import Row
     from lhdmap.mapfolder import MapFolder
     from lhdmap.runfolder import RunFolder
@@ -47,10 +47,11 @@ def run(arguments: argparse.Namespace, console: Console) -> int:
     folder = RunFolder.open(arguments.run_folder, ["localization"])
     map_folder = MapFolder.open(arguments.map or Path(folder.info["options"]["request"]["map"]))
     columns = folder.table("localization.parquet", Row._fields)
-    names = names_of_nodes(map_folder.file("topology.geojson"))
-    columns["node"] = _named(columns["node"], names)
+    topology = map_folder.file("topology.geojson")
+    columns["node"] = _named(columns["node"], names_of(topology, "tunnel", "intersection"))
     teaching = MapTruth(read_tum(arguments.map_truth), map_folder.trajectory(), globally=arguments.globally)
-    nodes = read_nodes(arguments.nodes) if arguments.nodes else None
+    places = set(names_of(topology, "waypoint").values())
+    nodes = read_nodes(arguments.nodes, places) if arguments.nodes else None
     found = evaluated(LocalizationTable.of(columns), read_tum(arguments.truth), teaching, nodes)
     console.result(found, _text(found))
     return 0
@@ -78,7 +79,10 @@ def _text(found: dict[str, Any]) -> str:
     inside = found["within_2_sigma"]
     if inside["along"] is not None:
         lines.append("within 2 σ   " + ", ".join(f"{name} {100 * value:.0f} %" for name, value in inside.items()))
-    lines.append(f"first fix    {found['first_fix_s']} s, {found['first_fix_m']} m; false fixes {found['false_fixes']}")
+    first = "none"
+    if found["first_fix_s"] is not None:
+        first = f"after {found['first_fix_s']:.1f} s and {found['first_fix_m']:.1f} m"
+    lines.append(f"first fix    {first}; false fixes {found['false_fixes']}")
     if found["node_accuracy"] is not None:
         lines.append(f"node right   {100 * found['node_accuracy']:.2f} %")
     return "\n".join(lines)

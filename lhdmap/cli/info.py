@@ -16,6 +16,7 @@ _WHAT = {
     "workspace": "rockbreaker's workspace",
     "suite": "suite of scenes",
     "replay": "replay",
+    "localization": "localization",
 }
 
 
@@ -82,6 +83,7 @@ def folder_lines(values: Mapping[str, Any]) -> list[str]:
         more = f" and {len(values['sources']) - 1} more" if len(values["sources"]) > 1 else ""
         lines.append(f"made from    {source['path']}{'' if source['there'] else ' (not found from here)'}{more}")
     lines += _drive_lines(values["counts"])
+    lines += _tracked_lines(values["counts"])
     lines += _result_lines(Path(values["path"]))
     settings = [f"{name} = {value}" for name, value in values["settings"].items()]
     more = " …" if len(settings) > _SETTINGS_SHOWN else ""
@@ -111,6 +113,15 @@ def _drive_lines(counts: Mapping[str, Any]) -> list[str]:
     )
     trust = trust_line(counts)
     return [*([] if trust is None else [f"may be off   {trust}"]), drive, scans]
+
+
+def _tracked_lines(counts: Mapping[str, Any]) -> list[str]:
+    if "tracking_share" not in counts:
+        return []
+    at_m = counts.get("first_fix_m")
+    first = "no fix" if at_m is None else f"first fix after {at_m:.1f} m"
+    share = f"{100.0 * counts['tracking_share']:.1f} % of {counts['scans']} scans"
+    return [f"tracked      {share}, {first}, lost {counts.get('lost_stretches', 0)} time(s)"]
 
 
 def _result_lines(folder: Path) -> list[str]:

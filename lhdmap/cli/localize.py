@@ -54,7 +54,7 @@ def run(arguments: argparse.Namespace, console: Console) -> int:
 
 
 def _text(folder: Path, summary: dict[str, Any]) -> str:
-    first = "none: the machine was nowhere on the map"
+    first = "none: no place on the map was sure enough"
     if summary["first_fix_s"] is not None:
         first = f"after {summary['first_fix_s']:.1f} s and {summary['first_fix_m']:.1f} m"
     return "\n".join(

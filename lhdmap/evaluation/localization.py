@@ -9,6 +9,7 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Mapping
+from collections.abc import Set as AbstractSet
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -135,36 +136,39 @@ def evaluated(
     }
 
 
-def read_nodes(path: Path) -> dict[int, str]:
-    """Return the true nodes by stamp of a `.nodes.csv` (contract: mine plans).
+def read_nodes(path: Path, places: AbstractSet[str] = frozenset()) -> dict[int, str]:
+    """Return the true nodes by stamp of a `.nodes.csv` (contract: mine plans); empty where it tells one of the `places` in a node.
 
     Raises:
         InputError: it cannot be read.
     """
     try:
         rows = [line.split(",") for line in path.read_text(encoding="utf-8").splitlines()[1:] if line]
-        return {int(stamp): node for stamp, node, *_ in rows}
+        return {int(stamp): "" if node in places else node for stamp, node, *_ in rows}
     except (OSError, ValueError) as error:
         raise InputError(f"{path}: stamp_ns,node,at_m was wanted ({error})") from error
 
 
-def names_of_nodes(geojson: Path) -> dict[str, str]:
-    """Return the names of a map's nodes by id."""
+def names_of(geojson: Path, *kinds: str) -> dict[str, str]:
+    """Return the names of a map's nodes (kinds `tunnel`, `intersection`) or places (`waypoint`) by id."""
     features = json.loads(geojson.read_text(encoding="utf-8"))["features"]
-    kinds = ("tunnel", "intersection")
     return {f["properties"]["id"]: f["properties"]["name"] for f in features if f["properties"]["kind"] in kinds}
 
 
 def _node_accuracy(
     table: LocalizationTable, tracking: npt.NDArray[np.bool_], nodes: Mapping[int, str] | None
 ) -> float | None:
-    """Return the share of tracked scans whose node's name is the true one's (numbers after a dot are the map's own)."""
+    """Return the share of tracked scans whose node's name is the true one's (numbers after a dot are the map's own).
+
+    Scans whose true node is not told (an empty name) are left out.
+    """
     if not nodes:
         return None
     stamps = np.array(sorted(nodes))
     true = [nodes[int(stamp)] for stamp in stamps[_nearest(stamps, table.stamp_ns)]]
     right = [said.split(".")[0] == name.split(".")[0] for said, name in zip(table.node, true, strict=True)]
-    return float(np.mean(np.array(right)[tracking])) if tracking.any() else None
+    judged = tracking & np.array([name != "" for name in true])
+    return float(np.mean(np.array(right)[judged])) if judged.any() else None
 
 
 def _covered(stamps_ns: npt.NDArray[np.int64], at_ns: npt.NDArray[np.int64]) -> npt.NDArray[np.bool_]:

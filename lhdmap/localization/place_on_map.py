@@ -14,11 +14,16 @@ from lhdmap.topology.driven import arc_m
 from lhdmap.topology.lookup import Lookup
 from lhdmap.topology.model import TopologicalMap, Tunnel
 
+_HEIGHT = 2.0  # a metre of height is as far as so many in plan: levels
+_STANDS_MPS = 0.05
+_ONE_DIRECTION_RAD = math.radians(20.0)
+
 
 class Place(NamedTuple):
     """In node `node` (id) at `rho_m`, `lateral_m`, `heading_rad`: along a tunnel's line, in an intersection x and y in its frame.
 
-    `next_point`: the next access or waypoint in the direction of motion, empty where there is none; `next_m` to it.
+    `next_point`: the next access or waypoint in the direction of motion, empty where there is none; `next_m` to it:
+    along a tunnel's line, in an intersection straight.
     """
 
     node: str
@@ -37,14 +42,19 @@ class Placer:
         self._topology, self._lookup = topology, Lookup(topology)
         self._along = {tunnel.id: arc_m(tunnel.line_m) for tunnel in topology.tunnels}
         self._points = {node: topology.points_of(node) for node in topology.nodes}
+        self._rho_m = {
+            point.id: self._in_tunnel(tunnel, point.pose[[0, 1, 3]], point.pose[2])[0]
+            for tunnel in topology.tunnels
+            for point in self._points[tunnel.id]
+        }
         lines = [tunnel.line_m for tunnel in topology.tunnels]
         lines += [node.T_map_node[None, :3] for node in topology.intersections]
         self._heights = np.vstack(lines) if lines else np.zeros((1, 3))
-        self._tree = KDTree(self._heights * [1.0, 1.0, 2.0])
+        self._tree = KDTree(self._heights * [1.0, 1.0, _HEIGHT])
 
     def height_m(self, x: float, y: float, about_m: float) -> float:
         """Return the floor's height near a place that is about at this height."""
-        apart, near = self._tree.query([x, y, 2.0 * about_m], k=min(3, len(self._heights)))
+        apart, near = self._tree.query([x, y, _HEIGHT * about_m], k=min(3, len(self._heights)))
         weights = 1.0 / (np.atleast_1d(apart) + 0.5)
         return float((weights * self._heights[np.atleast_1d(near), 2]).sum() / weights.sum())
 
@@ -54,34 +64,45 @@ class Placer:
         found = self._topology.nodes.get(node)
         if found is None:
             return Place("", math.nan, math.nan, math.nan, height_m, "", math.nan)
+        backward = speed_mps < -_STANDS_MPS  # standing, it is taken to face where it goes
         if isinstance(found, Tunnel):
-            rho, lateral, heading = self._in_tunnel(found, pose)
+            rho, lateral, heading = self._in_tunnel(found, pose, height_m)
+            name, far = self._next_along(node, rho, math.copysign(1.0, math.cos(heading)) * (-1.0 if backward else 1.0))
         else:
             rho, lateral, heading = se2.between(found.T_map_node[[0, 1, 3]], pose).tolist()
-        name, far = self._next(node, pose, speed_mps)
+            name, far = self._next_across(node, pose, pose[2] + (math.pi if backward else 0.0))
         return Place(node, rho, lateral, math.remainder(heading, 2.0 * math.pi), height_m, name, far)
 
-    def _in_tunnel(self, tunnel: Tunnel, pose: FloatArray) -> tuple[float, float, float]:
-        """Return distance along the line, to its left, and heading against it."""
+    def _in_tunnel(self, tunnel: Tunnel, pose: FloatArray, height_m: float) -> tuple[float, float, float]:
+        """Return distance along the line, to its left, and heading against it; the line may cross above or below itself."""
         line, along = tunnel.line_m[:, :2], self._along[tunnel.id]
         start, way = line[:-1], np.diff(line, axis=0)
         length = np.maximum(np.linalg.norm(way, axis=1), 1e-9)
         share = np.clip(((pose[:2] - start) * way).sum(axis=1) / length**2, 0.0, 1.0)
         apart = np.linalg.norm(start + share[:, None] * way - pose[:2], axis=1)
-        k = int(apart.argmin())
+        above = tunnel.line_m[:-1, 2] + share * np.diff(tunnel.line_m[:, 2]) - height_m
+        k = int(np.hypot(apart, _HEIGHT * above).argmin())
         unit = way[k] / length[k]
         off = pose[:2] - line[k]
-        rho = float(along[k] + off @ unit) if k in (0, len(way) - 1) else float(along[k] + share[k] * length[k])
+        ends = along[k + 1] - along[k]  # in space: a grade makes it longer than in plan
+        rho = float(along[k] + ends * (off @ unit / length[k] if k in (0, len(way) - 1) else share[k]))
         return rho, float(unit[0] * off[1] - unit[1] * off[0]), float(pose[2] - math.atan2(unit[1], unit[0]))
 
-    def _next(self, node: str, pose: FloatArray, speed_mps: float) -> tuple[str, float]:
-        """Return the nearest point of the node that lies ahead in the direction of motion."""
-        direction = math.copysign(1.0, speed_mps) if abs(speed_mps) > 0.05 else 1.0
-        ahead = direction * np.array([math.cos(pose[2]), math.sin(pose[2])])
-        best, far = "", math.inf
+    def _next_along(self, node: str, rho_m: float, sense: float) -> tuple[str, float]:
+        """Return the nearest point of a tunnel towards its end (sense 1) or start (-1)."""
+        ahead = {point.id: sense * (self._rho_m[point.id] - rho_m) for point in self._points[node]}
+        ahead = {name: far for name, far in ahead.items() if far > 0.0}
+        name = min(ahead, key=lambda one: ahead[one], default="")
+        return name, ahead.get(name, math.nan)
+
+    def _next_across(self, node: str, pose: FloatArray, course_rad: float) -> tuple[str, float]:
+        """Return the point of an intersection that lies ahead, least aside of the course; the nearer of two in one direction."""
+        best, best_rank = ("", math.nan), (math.inf, math.inf)
         for point in self._points[node]:
             off = point.pose[:2] - pose[:2]
             distance = float(np.linalg.norm(off))
-            if off @ ahead > 0.0 and distance < far:
-                best, far = point.id, distance
-        return best, far if best else math.nan
+            aside = abs(math.remainder(math.atan2(off[1], off[0]) - course_rad, 2.0 * math.pi))
+            rank = round(aside / _ONE_DIRECTION_RAD), distance
+            if aside < 0.5 * math.pi and rank < best_rank:
+                best, best_rank = (point.id, distance), rank
+        return best

@@ -10,8 +10,9 @@ import numpy as np
 
 from lhdmap.localization.rows import CANDIDATE, LOST, TRACKING, Row
 from lhdmap.report import charts, markup
+from lhdmap.report.topology_drawing import draw_free_space
 from lhdmap.topology.model import TopologicalMap
-from lhdmap.topology.sheet import FREE, Sheet
+from lhdmap.topology.sheet import Sheet
 
 _MOST = 3000
 
@@ -26,8 +27,7 @@ def write_localization_report(
     """Write one self-contained page; `drawn`: its title, and the map with its levels."""
     title, topology, sheets = drawn
     with charts.styled():
-        figures = [(key.replace("_", " "), _shown(value), "") for key, value in summary.items()]
-        body = markup.cards(figures)
+        body = markup.cards(_cards(summary))
         if warnings:
             body += markup.section("Warnings", markup.listed(warnings, "warnings"))
         every = max(len(rows) // _MOST, 1)
@@ -37,24 +37,33 @@ def write_localization_report(
         path.write_text(markup.document(title, body), encoding="utf-8")
 
 
-def _shown(value: Any) -> str:
-    if isinstance(value, Mapping):
-        return ", ".join(f"{key} {_shown(one)}" for key, one in value.items())
-    return f"{value:.3g}" if isinstance(value, float) else str(value)
+def _cards(summary: Mapping[str, Any]) -> list[tuple[str, str, str]]:
+    """Return the figures with their units and what they mean."""
+    fix, way = summary["first_fix_s"], summary["first_fix_m"]
+    latency = summary["latency_ms"]
+    return [
+        ("tracked", f"{100.0 * summary['tracking_share']:.1f} %", f"of {summary['scans']} scans"),
+        ("first fix", "none" if fix is None else f"{fix:.1f} s", "" if way is None else f"after {way:.1f} m"),
+        ("lost", str(summary["lost_stretches"]), "stretches"),
+        ("places withheld", str(summary["false_fix_guard"]), "found, and not sure enough or refused by the walls"),
+        ("a scan", f"{latency['median']:.1f} ms", f"median; 99 % take at most {latency['p99']:.1f} ms"),
+    ]
 
 
 def _map(topology: TopologicalMap, sheets: Sequence[Sheet], rows: Sequence[Row]) -> str:
     figure = charts.new_figure(5.0)
     axes = figure.add_subplot()
     for sheet in sheets:
-        cells = sheet.middles_m(np.argwhere(sheet.cells == FREE)[::7])
-        axes.plot(cells[:, 0], cells[:, 1], ",", color=charts.INK, alpha=0.15)
+        draw_free_space(axes, sheet)
     for status, colour in ((TRACKING, charts.FINAL), (CANDIDATE, charts.WHEELS), (LOST, charts.FLAGGED)):
         at = np.array([[row.x_m, row.y_m] for row in rows if row.status == status]).reshape(-1, 2)
         if len(at):
             axes.plot(at[:, 0], at[:, 1], ".", markersize=2.5, color=colour, label=status)
     for node in topology.intersections:
         axes.text(node.T_map_node[0], node.T_map_node[1], node.name, fontsize=7, ha="center")
+    for tunnel in topology.tunnels:
+        x, y = tunnel.line_m[len(tunnel.line_m) // 2, :2]
+        axes.text(x, y, tunnel.name, fontsize=7, ha="center")
     axes.set(xlabel="x, m", ylabel="y, m", aspect="equal")
     charts.legend_above(axes)
     return charts.svg_uri(figure)
@@ -67,6 +76,6 @@ def _sure(rows: Sequence[Row]) -> str:
     seconds = np.array([(row.stamp_ns - began) * 1e-9 for row in rows])
     for name, colour in (("std_along_m", charts.FINAL), ("std_across_m", charts.ODOMETRY)):
         axes.plot(seconds, [1e3 * getattr(row, name) for row in rows], color=colour, label=name[4:-2], linewidth=1.0)
-    axes.set(xlabel="time, s", ylabel="standard deviation, mm", ylim=(0.0, None))
+    axes.set(xlabel="time, s", ylabel="standard deviation, mm", yscale="log", xlim=(0.0, max(float(seconds[-1]), 1.0)))
     charts.legend_above(axes)
     return charts.svg_uri(figure)

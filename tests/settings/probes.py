@@ -31,6 +31,7 @@ from lhdmap.odometry.cloud_odometry import CloudStep
 from lhdmap.odometry.steps import OdometryStep
 from lhdmap.pile.stage import ScanHits
 from lhdmap.pipeline.inspection import Inspection
+from lhdmap.pipeline.localize import Localizer
 from lhdmap.pipeline.mapping import MappingPipeline
 from lhdmap.pipeline.pile import PileWatch, PlacedScan
 from lhdmap.rockbreaker.machine import Rockbreaker
@@ -40,6 +41,7 @@ from lhdmap.topology.build import Seen, topology_of
 from lhdmap.topology.geojson import to_geojson
 
 from tests.landmarks.worlds import MODERATE, TunnelWorld, drive, tunnel
+from tests.localization import known
 from tests.movement.mines import fast_ladder
 from tests.report.synthetic import START_NS, report_data
 from tests.report.test_recording import read
@@ -224,6 +226,17 @@ def topology(settings: Settings, seen: Callable[[], Seen]) -> str:
     return digest(json.dumps(to_geojson(found.map)), found.sheets, found.niches)
 
 
+def localized(settings: Settings, *, way_m: float, jump_m: float = 0.0, known_start: bool = False) -> str:
+    """Return the digest of what localization says of a drive, of which the start is known or not, and how often it withheld."""
+    stream, poses = known.drive(5.0, way_m, jump_m=jump_m)
+    localizer = Localizer(known.known_map(), settings, None, poses[0] if known_start else None)
+    for role, message in stream:
+        localizer.update(role, message)
+    localizer.finish()
+    rows = [row._replace(latency_ms=0.0) for row in localizer.rows]
+    return digest(rows, localizer.withheld, localizer.lost_stretches, localizer.first_fix)
+
+
 def _mapped(stream: Callable[[], Stream], primary: Literal["front", "points"] = "front", *, own: bool = False) -> Probe:
     return lambda settings: run(settings, stream(), primary, own=own)
 
@@ -250,4 +263,6 @@ PROBES: dict[str, Probe] = {
     "route": routes,
     "topology": partial(topology, seen=streams.side_chambers),
     "levels": partial(topology, seen=streams.two_levels),
+    "put_down": partial(localized, way_m=24.0),
+    "carried_off": partial(localized, way_m=20.0, jump_m=12.0, known_start=True),
 }

@@ -139,7 +139,7 @@ def planar(rms_m: float = 0.12, *, wheels: str = "articulated", jumps: bool = Fa
     scans = simulate_scans(world, poses, PlanarScanner(), RATE_HZ, 3)
     stamps = [scan.stamp_ns for scan in scans]
     messages: list[tuple[str, Message]] = [("front", scan) for scan in scans]
-    messages += _wheels(wheels, told, stamps)
+    messages += wheels_of(wheels, told, stamps)
     messages.sort(key=lambda one: one[1].stamp_ns)
     return (("tf_static", Mount(0, "base_link", "laser", np.eye(4))), *messages)
 
@@ -149,7 +149,7 @@ def _bend(rms_m: float) -> PlanarWorld:
     return drift_world(11, rms_m=rms_m, pieces=((9.0, 0.0), (4.0, math.pi / 6), (20.0, 0.0)), cross_drift_at_m=None)
 
 
-def _wheels(kind: str, poses: FloatArray, stamps: list[int]) -> list[tuple[str, Message]]:
+def wheels_of(kind: str, poses: FloatArray, stamps: list[int]) -> list[tuple[str, Message]]:
     """Return what wheels say of a drive: 1 % too fast; poses that jump by 2.5 m once, are absent for 1.2 s and end early."""
     steps = np.array([se2.between(one, other) for one, other in pairwise(poses)])
     speeds = RATE_HZ * np.append(steps[:, 0], steps[-1, 0])
