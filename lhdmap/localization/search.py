@@ -16,13 +16,17 @@ from lhdmap.geometry import se2
 from lhdmap.localization.settings import LocalizationSettings
 from lhdmap.localization.walls import MapWalls
 from lhdmap.messages import FloatArray
-from lhdmap.scan_matching.matching import Hits, Prior, match
+from lhdmap.scan_matching.matching import Hits, Match, Prior, match
 from lhdmap.scan_matching.submap import OTHER_VISIT
+from lhdmap.scan_matching.surface_map import SurfaceMap
 from lhdmap.topology.sheet import Sheet
 from lhdmap.update.place import Candidate, WallSearch
 
 _EVERY_M = 0.5
-_STARTS = [(x, y, math.radians(a)) for x in (-0.4, 0.0, 0.4) for y in (-0.4, 0.0, 0.4) for a in (-2.0, 0.0, 2.0)]
+# The overlay hardly tells where along a straight tunnel one is: its walls are as wide as its cells.
+_ALONG = [(x, 0.0, 0.0) for x in np.arange(-5.2, 5.3, 0.8).tolist()]
+_AROUND = [(0.0, y, math.radians(a)) for y in (-0.4, 0.0, 0.4) for a in (-2.0, 0.0, 2.0)]
+_FEW_HITS = 150
 _LOOSE = np.diag([1.0 / 1.0**2, 1.0 / 1.0**2, 1.0 / math.radians(5.0) ** 2])
 _HITS = 600
 
@@ -96,18 +100,28 @@ class GlobalSearch:
         local = se2.transform(se2.inverse(T_odom_base), points)
         near = local[np.hypot(local[:, 0], local[:, 1]) < 40.0]
         near = near[:: max(len(near) // _HITS, 1)]
+        few = near[:: max(len(near) // _FEW_HITS, 1)]
         pose = se2.compose(candidate.T_map_drive, T_odom_base)
         walls, origin = self._walls.around(np.array([pose[0], pose[1], sheet.height_m]))
-        hits = Hits(np.column_stack([near, np.zeros(len(near))]), len(near), layered=False)
-        best = None
-        for dx, dy, turn in _STARTS:
-            start = pose - np.array([origin[0], origin[1], 0.0]) + np.array([dx, dy, turn])
-            one = match(walls, hits, Prior(start, _LOOSE), start, OTHER_VISIT)
-            if best is None or one.support > best.support:
-                best = one
-        if best is None or best.support <= 0.0:
+        local_pose = pose - np.array([origin[0], origin[1], 0.0])
+        coarse = _matched(walls, few, local_pose, _ALONG)
+        best = _matched(walls, near, coarse.pose, _AROUND)
+        if best.support <= 0.0:
             return None
         return Found(best.pose + np.array([origin[0], origin[1], 0.0]), float(best.support), sheet.height_m, 0.0)
+
+
+def _matched(
+    walls: SurfaceMap, points: FloatArray, pose: FloatArray, starts: list[tuple[float, float, float]]
+) -> Match:
+    """Return the best of the matches of points (N, 2) from starts (x, y, turn in the machine's axes) about a pose (3,)."""
+    hits = Hits(np.column_stack([points, np.zeros(len(points))]), len(points), layered=False)
+    found = []
+    for offset in starts:
+        start = se2.compose(pose, np.array(offset))
+        found.append(match(walls, hits, Prior(start, _LOOSE), start, OTHER_VISIT))
+    best: Match = max(found, key=lambda one: one.support)
+    return best
 
 
 def _same(a: FloatArray, b: FloatArray) -> bool:

@@ -24,6 +24,7 @@ from lhdmap.scan_matching.submap import OTHER_VISIT
 _MAP_HEADING_RAD, _MAP_ACROSS_M = math.radians(0.03), 0.003
 _SHARED_M = 1.0  # travel over which scans share the map's errors
 _LEAST_SHARE = 0.02
+_CLEARLY = 0.15
 _AHEAD_M = 3.0  # mean distance of the hits ahead: what a wrong scale moves a scan by
 _LEAST_STD = np.array([1e-3, 1e-3, 1e-5])
 _PER_METRE = np.array([0.004, 0.003, math.radians(0.03)])  # of the odometry's step at least, per square root of a metre
@@ -78,6 +79,21 @@ class Tracker:
         map_error = R @ np.diag([(scale * _AHEAD_M) ** 2, _MAP_ACROSS_M**2, _MAP_HEADING_RAD**2]) @ R.T
         self.P = np.asarray(posterior + 0.5 * (map_error + map_error.T), dtype=float)
         return Corrected(float(found.support), along)
+
+    def turn_if_better(self, points: FloatArray) -> None:
+        """Turn round about where the machine is, where hits (N, 2) fit the walls clearly better so."""
+        walls, origin = self._walls.around(np.array([self.pose[0], self.pose[1], self.height_m]))
+        hits = Hits(np.column_stack([points, np.zeros(len(points))]), len(points), layered=False)
+        supports = []
+        for turn in (0.0, math.pi):
+            start = self.pose + np.array([-origin[0], -origin[1], turn])
+            supports.append(
+                match(
+                    walls, hits, Prior(start, np.asarray(np.linalg.inv(self.P), dtype=float)), start, OTHER_VISIT
+                ).support
+            )
+        if supports[1] > supports[0] + _CLEARLY:
+            self.pose[2] += math.pi
 
     @property
     def deviations(self) -> FloatArray:

@@ -87,6 +87,7 @@ class Localizer:
         self._search = GlobalSearch(known.sheets, self._walls, self._settings)
         self._way = RecentWay(self._settings.window_m)
         self._tracker = None if start is None else self._started(start)
+        self._turnable = start is not None  # a waypoint's heading is its node's: the machine may face the other way
         self._status = UNKNOWN if start is None else TRACKING
         self._trial: _Trial | None = None
         self._supports: deque[float] = deque(maxlen=self._settings.support_scans)
@@ -154,13 +155,16 @@ class Localizer:
         parts = []
         for points in (odometry.points, odometry.points_behind):
             near = points[np.hypot(points[:, 0], points[:, 1]) < self._settings.range_m, :2]
-            parts.append(near[:: max(2 * len(near) // self._settings.hits, 1)])
+            parts.append(near[:: max(-(-2 * len(near) // self._settings.hits), 1)])
         return np.concatenate(parts), len(parts[0])
 
     def _correct(self, points: FloatArray, front: int) -> str:
         tracker = self._tracker
         if tracker is None or self._status == LOST or len(points) < 10:
             return "odometry" if tracker is not None else ""
+        if self._turnable:
+            self._turnable = False
+            tracker.turn_if_better(points)
         place = self._placer.at(tracker.pose, tracker.height_m, 1.0)
         said = tracker.correct(points, front or len(points), self._walls.quality(place.node))
         tracker.height_m = self._placer.height_m(tracker.pose[0], tracker.pose[1], tracker.height_m)
@@ -196,10 +200,12 @@ class Localizer:
             return
         self.lost_stretches += 1
         self._status = LOST
+        self._way = RecentWay(self._settings.window_m)  # what was seen before may be of another place
 
     def _look_around(self, step: OdometryStep) -> None:
         """Search the whole map, where the place is not known and the machine has moved on since the last search."""
-        if self._status not in (UNKNOWN, LOST) or self._way.length_m < self._settings.search_m:
+        wanted_m = min(self._settings.search_m, self._settings.window_m - 1.0)
+        if self._status not in (UNKNOWN, LOST) or self._way.length_m < wanted_m:
             return
         if self._travelled_m - self._searched_m < self._settings.search_m:
             return

@@ -29,7 +29,7 @@ def direction_of(arm: Line, centre_m: FloatArray, radius_m: float) -> FloatArray
     """Return the unit vector (2,) in which an arm that leaves a junction at `centre_m` (2,) goes on the whole."""
     away = np.linalg.norm(arm.points_m - centre_m, axis=1)
     near = arm.points_m[away < 2.0 * FIT_M + radius_m]
-    return unit(near[-1] - centre_m)
+    return unit((near if len(near) else arm.points_m)[-1] - centre_m)
 
 
 def fitted_part(arm: Line, centre_m: FloatArray, radius_m: float, far_radius_m: float) -> FloatArray:

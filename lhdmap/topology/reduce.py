@@ -27,6 +27,7 @@ _THROAT_TOLERANCE = 0.85  # rough walls and cells make a throat look narrower
 _THROAT_QUANTILE = 0.3
 _LOOP_RADII = 3.0  # a loop within one junction is an obstacle
 _MERGED_M = 40.0
+_WIDTHS = 3.0  # of a tunnel: junctions farther apart are two, however wide the free space is
 _REACHED_M = 1.0  # poses mark a metre around them
 
 
@@ -53,7 +54,7 @@ def graph_of(
     graph = whole_graph(sheet, driven_m, scale, cuts)
     _take_small_loops_off(graph.skeleton)
     _take_spurs_off(graph, _SPUR * scale.opening_m)
-    _join_near_junctions(graph.skeleton, settings.merge, edits)
+    _join_near_junctions(graph, settings.merge, edits)
     _take_niches_off(graph, settings)
     _leave_out_what_was_not_reached(graph)
     _take_niches_off(graph, settings)
@@ -93,10 +94,11 @@ def _is_spur(graph: Graph, line: Line, depth_m: float) -> bool:
     return line.length_m + graph.scale.core_m - junction.radius_m < depth_m
 
 
-def _join_near_junctions(skeleton: Skeleton, share: float, edits: TopologyEdits) -> None:
-    """Make one of junctions nearer to each other than a share of the sum of their free radii."""
+def _join_near_junctions(graph: Graph, share: float, edits: TopologyEdits) -> None:
+    """Make one of junctions nearer to each other than a share of the sum of their free radii: of a tunnel's, not of a yard's."""
+    skeleton, most_m = graph.skeleton, _WIDTHS * graph.scale.tunnel_m
     while True:
-        near = [line for line in skeleton.lines if _is_inner(skeleton, line, share, edits)]
+        near = [line for line in skeleton.lines if _is_inner(skeleton, line, (share, most_m), edits)]
         if not near:
             break
         line = min(near, key=lambda one: one.length_m)
@@ -112,7 +114,7 @@ def _join_near_junctions(skeleton: Skeleton, share: float, edits: TopologyEdits)
     skeleton.straighten()
 
 
-def _is_inner(skeleton: Skeleton, line: Line, share: float, edits: TopologyEdits) -> bool:
+def _is_inner(skeleton: Skeleton, line: Line, near: tuple[float, float], edits: TopologyEdits) -> bool:
     if line.start == line.end or skeleton.degree(line.start) < 3 or skeleton.degree(line.end) < 3:
         return False
     a, b = skeleton.vertices[line.start], skeleton.vertices[line.end]
@@ -121,7 +123,8 @@ def _is_inner(skeleton: Skeleton, line: Line, share: float, edits: TopologyEdits
         return False
     if line.length_m < _MERGED_M and _is_near(edits.together_m, middle, line.length_m):
         return True
-    return line.length_m < share * (a.radius_m + b.radius_m)
+    share, most_m = near
+    return line.length_m < min(share * (a.radius_m + b.radius_m), most_m)
 
 
 def _is_near(places_m: FloatArray, point_m: FloatArray, reach_m: float) -> bool:

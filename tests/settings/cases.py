@@ -153,7 +153,7 @@ _SETTINGS = {
     "localization.hits": Case("carried_off", 100),
     "localization.support_drop": Case("carried_off", 0.8),
     "localization.support_scans": Case("carried_off"),
-    "localization.window_m": Case("put_down", 10.0),
+    "localization.window_m": Case("put_down", 5.0),
     "localization.margin": Case("put_down", 0.9),
     "localization.start_std_m": Case("carried_off"),
     "localization.start_std_deg": Case("carried_off"),
