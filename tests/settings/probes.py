@@ -147,11 +147,11 @@ def recording(settings: Settings) -> str:
 
 
 def _drawn(batches: list[Any]) -> list[Any]:
-    """Return the columns of an entity, less those that tell when the file was made; how rows were batched is chance."""
+    """Return the columns of an entity, less those that tell when the file was made; batches and their order are chance."""
     names = sorted({name for batch in batches for name in batch.schema.names})
     names = [name for name in names if not name.startswith(("rerun.", "log_t", "RecordingInfo"))]
     return [
-        [name, *(str(value) for batch in batches if name in batch.schema.names for value in _values(batch, name))]
+        [name, *sorted(str(value) for batch in batches if name in batch.schema.names for value in _values(batch, name))]
         for name in names
     ]
 
