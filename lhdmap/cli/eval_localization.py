@@ -42,6 +42,7 @@ def run(arguments: argparse.Namespace, console: Console) -> int:
     from lhdmap.localization.rows import Row
     from lhdmap.mapfolder import MapFolder
     from lhdmap.runfolder import RunFolder
+    from lhdmap.topology.files import read_topology
     from lhdmap.trajectory import read_tum
 
     folder = RunFolder.open(arguments.run_folder, ["localization"])
@@ -52,7 +53,9 @@ def run(arguments: argparse.Namespace, console: Console) -> int:
     teaching = MapTruth(read_tum(arguments.map_truth), map_folder.trajectory(), globally=arguments.globally)
     places = set(names_of(topology, "waypoint").values())
     nodes = read_nodes(arguments.nodes, places) if arguments.nodes else None
-    found = evaluated(LocalizationTable.of(columns), read_tum(arguments.truth), teaching, nodes)
+    found = evaluated(
+        LocalizationTable.of(columns), read_tum(arguments.truth), teaching, nodes, read_topology(map_folder.path)
+    )
     console.result(found, _text(found))
     return 0
 

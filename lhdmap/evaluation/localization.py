@@ -19,11 +19,14 @@ from scipy.spatial import KDTree
 
 from lhdmap.errors import InputError
 from lhdmap.messages import FloatArray
+from lhdmap.topology.lookup import Lookup
+from lhdmap.topology.model import TopologicalMap
 from lhdmap.trajectory import Trajectory
 
 _HEIGHT = 2.0
 _FALSE_M, _FALSE_DEG = 1.0, 10.0  # a fix farther off than that is of another place
 _APART_NS = 60_000_000
+_BOUNDARY_M = 2.0  # nearer to another node than this, either is right
 
 
 class LocalizationTable(NamedTuple):
@@ -88,9 +91,15 @@ class MapTruth:
 
 
 def evaluated(
-    table: LocalizationTable, truth: Trajectory, map_truth: MapTruth, nodes: Mapping[int, str] | None = None
+    table: LocalizationTable,
+    truth: Trajectory,
+    map_truth: MapTruth,
+    nodes: Mapping[int, str] | None = None,
+    topology: TopologicalMap | None = None,
 ) -> dict[str, Any]:
-    """Return the figures of `eval localization --json`; `nodes`: the true node's name by stamp, where it is known.
+    """Return the figures of `eval localization --json`.
+
+    `nodes`: the true node's name by stamp; without them the true node is the one of `topology` that the true pose is in.
 
     Raises:
         InputError: truth and localization have no time in common.
@@ -117,7 +126,7 @@ def evaluated(
         "across_m": _statistics(across[tracking]),
         "height_m": _statistics(error[tracking, 2]),
         "heading_deg": _statistics(np.degrees(heading[tracking])),
-        "node_accuracy": _node_accuracy(table, tracking, nodes),
+        "node_accuracy": _node_accuracy(table, tracking, nodes) if nodes else _on_map(table, tracking, true, topology),
         "first_fix_s": float((table.stamp_ns[first[0]] - table.stamp_ns[0]) * 1e-9) if len(first) else None,
         "first_fix_m": float(way[first[0]]) if len(first) else None,
         "false_fixes": int(np.count_nonzero(false & ~np.concatenate([[False], false[:-1]]))),
@@ -169,6 +178,23 @@ def _node_accuracy(
     right = [said.split(".")[0] == name.split(".")[0] for said, name in zip(table.node, true, strict=True)]
     judged = tracking & np.array([name != "" for name in true])
     return float(np.mean(np.array(right)[judged])) if judged.any() else None
+
+
+def _on_map(
+    table: LocalizationTable, tracking: npt.NDArray[np.bool_], true: FloatArray, topology: TopologicalMap | None
+) -> float | None:
+    """Return the share of tracked scans that are in the map's node of their true pose (N, 4), away from boundaries."""
+    if topology is None or not tracking.any():
+        return None
+    lookup, poses = Lookup(topology), true[tracking]
+    ahead = np.column_stack([np.cos(poses[:, 3]), np.sin(poses[:, 3]), np.zeros(len(poses))])
+    names = [
+        np.array([topology.nodes[one].name if one else "" for one in lookup.nodes_at(poses[:, :3] + off * ahead)])
+        for off in (-_BOUNDARY_M, 0.0, _BOUNDARY_M)
+    ]
+    inner = (names[0] == names[1]) & (names[1] == names[2])
+    right = np.asarray(table.node[tracking]).astype(str) == names[1]
+    return float(right[inner].mean()) if inner.any() else None
 
 
 def _covered(stamps_ns: npt.NDArray[np.int64], at_ns: npt.NDArray[np.int64]) -> npt.NDArray[np.bool_]:

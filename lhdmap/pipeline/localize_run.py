@@ -80,7 +80,7 @@ def localize(request: LocalizeRequest) -> LocalizeResult:
         drawn = request.target.name, known.topology, known.sheets
         write_localization_report(folder.path / "report.html", drawn, localizer.rows, summary, told)
         folder.finished(folder.path / "report.html")
-        options = {**settings_table(request.settings), "request": {"map": str(request.map)}}
+        options = {**settings_table(request.settings), "request": {"map": str(request.map.resolve())}}
         path = folder.complete(RunInfo(request.logs, options, summary, told))
     return LocalizeResult(path, summary | {"warnings": told}, localizer.rows)
 

@@ -14,6 +14,8 @@ from lhdmap.geometry import se3
 from lhdmap.messages import FloatArray
 from lhdmap.trajectory import Trajectory
 
+from tests.topology.maps import ladder
+
 RADIUS_M, HZ, SPEED_MPS = 30.0, 10.0, 3.0
 STD = np.array([0.02, 0.01, math.radians(0.1)])
 
@@ -208,3 +210,15 @@ def test_planar_takes_the_yaw_of_a_tilted_machine() -> None:
     poses = planar(Trajectory(np.arange(3), np.arange(9.0).reshape(3, 3), quaternions))
     assert poses[:, 3] == pytest.approx(yaw)
     assert poses[:, :3] == pytest.approx(np.arange(9.0).reshape(3, 3))
+
+
+def test_without_the_plan_s_nodes_the_map_tells_which_is_right() -> None:
+    """Along T1 of the ladder from I1: within 2 m of a boundary either node is right, a wrong name elsewhere is wrong."""
+    drive = np.column_stack([np.linspace(10.0, 50.0, 81), np.zeros(81), np.zeros(81), np.zeros(81)])
+    said = table(drive)
+    same = MapTruth(truth(drive), truth(drive))
+    found = [
+        evaluated(said._replace(node=np.full(81, name, dtype=object)), truth(drive), same, topology=ladder())
+        for name in ("T1", "T2")
+    ]
+    assert [one["node_accuracy"] for one in found] == [1.0, 0.0]
