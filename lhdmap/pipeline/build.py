@@ -97,6 +97,7 @@ def build_map(request: BuildRequest) -> BuildResult:
     """
     started, compiling = time.monotonic(), CompileClock()
     free_folder(request.target, force=request.force, inputs=request.logs)
+    inputs = request.inputs  # edits are read here: a mistake in them is told before the log is read
     given = given_rows(request.poses, request.logs, request.topics) if request.poses else None
     with (
         compiling,
@@ -125,7 +126,7 @@ def build_map(request: BuildRequest) -> BuildResult:
                 require_a_map(source.paths[0], pipeline.records, ways.rows)
             final = _stamped(ways.final, as_recorded)
             folder.write_trajectory(final)
-            outcome = Outcome(request.inputs, source, pipeline, ways)
+            outcome = Outcome(inputs, source, pipeline, ways)
             beside = _write(folder, request, source, outcome, inspector)
         known = {path: _entry(request, path, future) for path, future in hashes.items()}
         own = Spent(peak_memory_mib(), compiling.seconds)

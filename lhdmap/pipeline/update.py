@@ -37,7 +37,7 @@ from lhdmap.provenance import file_entry
 from lhdmap.runfolder import RunInfo
 from lhdmap.smoothing.smoother import Correction
 from lhdmap.topology.build import Seen, topology_of
-from lhdmap.topology.edits import load_edits
+from lhdmap.topology.edits import TopologyEdits, load_edits
 from lhdmap.topology.files import read_topology
 from lhdmap.topology.lookup import Lookup
 from lhdmap.topology.model import TopologicalMap
@@ -142,7 +142,7 @@ def update_map(request: UpdateRequest) -> UpdateResult:
     if request.target.resolve() == request.map.resolve():
         raise UsageError(f"{request.target}: a new version is a folder of its own; name another one with -o")
     free_folder(request.target, force=request.force, inputs=inputs)
-    known = _Map.read(request.map)
+    edits, known = load_edits(request.edits), _Map.read(request.map)
     with _scratch() as scratch:
         drive_folder = scratch / "drive"
         built = build_map(
@@ -155,7 +155,7 @@ def update_map(request: UpdateRequest) -> UpdateResult:
             built.warnings.append(_OVERLAP.format(name_of(request.logs[0]), drive.later_ns * 1e-9))
         correction = _in_the_map(known, drive, request)
         with MapFolderWriter(request.target, force=request.force, inputs=inputs) as folder:
-            return _written(folder, request, known, drive, correction, built.warnings)
+            return _written(folder, request, edits, known, drive, correction, built.warnings)
 
 
 @contextlib.contextmanager
@@ -199,6 +199,7 @@ def _in_the_map(known: _Map, drive: _Map, request: UpdateRequest) -> Correction:
 def _written(
     folder: MapFolderWriter,
     request: UpdateRequest,
+    edits: TopologyEdits,
     known: _Map,
     drive: _Map,
     correction: Correction,
@@ -208,7 +209,7 @@ def _written(
     moved = merge.moved_trajectory(drive.trajectory, correction)
     final = joined(known.trajectory, moved)
     views, seen = _seen(known, drive, moved, request)
-    topology = topology_of(seen, request.settings.topology, load_edits(request.edits))
+    topology = topology_of(seen, request.settings.topology, edits)
     landmarks = landmarks_for(topology.map, seen, request.settings.landmarks)
     version = known.topology.version + 1
     newer = with_stretches(topology.map, landmarks, request.settings.landmarks)

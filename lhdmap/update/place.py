@@ -47,7 +47,12 @@ def placings(sheets: list[Sheet], drive: Sheet, start: FloatArray | None = None)
     if len(walls) < _FEWEST_WALLS:
         return []
     centre = walls.mean(axis=0)
-    found = [one for number, sheet in enumerate(sheets) for one in _scored(sheet, walls, centre, start, number)]
+    found = [
+        Placed(one.T_map_drive, one.score, number)
+        for number, sheet in enumerate(sheets)
+        for one in WallSearch(sheet).scored(walls, _headings(start), 3)
+        if start is None or _is_near(one.T_map_drive, start)
+    ]
     kept: list[Placed] = []
     for one in sorted(found, key=lambda one: -one.score):
         if one.score < max(_LEAST_SCORE, _LEAST_OF_BEST * kept[0].score if kept else 0.0) or len(kept) == _MOST_PLACES:
@@ -55,28 +60,6 @@ def placings(sheets: list[Sheet], drive: Sheet, start: FloatArray | None = None)
         if not any(one.sheet == better.sheet and _same(one.T_map_drive, better.T_map_drive, centre) for better in kept):
             kept.append(one)
     return kept
-
-
-def _scored(sheet: Sheet, walls: FloatArray, centre: FloatArray, start: FloatArray | None, number: int) -> list[Placed]:
-    """Return the best places of walls (N, 2) in one sheet of the map for each heading."""
-    field = _field(sheet)
-    radius = float(np.linalg.norm(walls - centre, axis=1).max())
-    size = int(2 * radius / _CELL_M) + 3
-    shape = tuple(next_fast_len(extent + size) for extent in field.shape)
-    spectrum = rfft2(field, shape)
-    scored: list[Placed] = []
-    for heading in _headings(start):
-        scores = _scores(spectrum, shape, walls - centre, heading, size)
-        for row, column in _peaks(scores, 3):
-            # Shifts to before the field's first cell wrap around to the end.
-            first = [
-                at - extent * (at >= wide) for at, extent, wide in zip((row, column), shape, field.shape, strict=True)
-            ]
-            shift = sheet.origin_m + _CELL_M * (np.array(first[::-1]) + size // 2 + 0.5)
-            pose = _pose(shift, centre, heading)
-            if start is None or _is_near(pose, start):
-                scored.append(Placed(pose, float(scores[row, column]), number))
-    return scored
 
 
 def _field(sheet: Sheet) -> npt.NDArray[np.float32]:
@@ -169,24 +152,29 @@ class WallSearch:
 
     def best(self, walls: FloatArray, count: int, step_rad: float = _STEP_RAD) -> list[Candidate]:
         """Return the best places of walls (N, 2), at most `count`, each at one of its own."""
+        centre, kept = walls.mean(axis=0), list[Candidate]()
+        found = self.scored(walls, np.arange(0.0, 2.0 * math.pi, step_rad), 2)
+        for one in sorted(found, key=lambda one: -one.score):
+            if len(kept) < count and not any(_same(one.T_map_drive, other.T_map_drive, centre) for other in kept):
+                kept.append(one)
+        return kept
+
+    def scored(self, walls: FloatArray, headings: FloatArray, peaks: int) -> list[Candidate]:
+        """Return the best `peaks` places of walls (N, 2) in each of the headings (rad)."""
         centre = walls.mean(axis=0)
         radius = float(np.linalg.norm(walls - centre, axis=1).max())
         size = 32 * (int((2 * radius / _CELL_M) / 32) + 1) + 3
         shape, spectrum = self._spectrum(size)
         found: list[Candidate] = []
-        for heading in np.arange(0.0, 2.0 * math.pi, step_rad):
+        for heading in headings.tolist():
             scores = _scores(spectrum, shape, walls - centre, heading, size)
-            for row, column in _peaks(scores, 2):
+            for row, column in _peaks(scores, peaks):
+                # Shifts to before the field's first cell wrap around to the end.
                 places = zip((row, column), shape, self._map_field.shape, strict=True)
                 first = [at - extent * (at >= wide) for at, extent, wide in places]
                 middle = self.sheet.origin_m + _CELL_M * (np.array(first[::-1]) + size // 2 + 0.5)
                 found.append(Candidate(_pose(middle, centre, heading), float(scores[row, column])))
-        found.sort(key=lambda one: -one.score)
-        kept: list[Candidate] = []
-        for one in found:
-            if len(kept) < count and not any(_same(one.T_map_drive, other.T_map_drive, centre) for other in kept):
-                kept.append(one)
-        return kept
+        return found
 
     def _spectrum(self, size: int) -> tuple[tuple[int, ...], npt.NDArray[np.complex64]]:
         if size not in self._spectra:

@@ -43,5 +43,6 @@ def test_what_is_not_compared_or_hardly_there_is_drawn_too(rough: Taught) -> Non
     nothing = dataclasses.replace(few, similarity={})
     with charts.styled():
         for one in (few, part, nothing):
-            charts.svg_uri(similarity_chart(one, "t"))
-            charts.svg_uri(distinctness_chart(one, "t", SETTINGS))
+            for figure in (similarity_chart(one, "t"), distinctness_chart(one, "t", SETTINGS)):
+                assert len(figure.axes) >= 2
+                assert charts.svg_uri(figure).startswith("data:image/svg+xml")

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from lhdmap.config import settings_from
-from lhdmap.errors import ConfigError
+from lhdmap.errors import ConfigError, InputError
 from lhdmap.landmarks.store import read_landmarks
 from lhdmap.machine import Machine
 from lhdmap.movement.routes import route
@@ -104,3 +104,9 @@ def test_topology_is_left_out_where_it_is_not_wanted(drive: SimulatedMineDrive, 
     built = build_map(BuildRequest([drive.log], tmp_path / "off", off))
     assert not (built.folder / "topology.geojson").exists()
     assert built.summary["topology"] is None
+
+
+def test_edits_that_are_not_there_are_told_before_the_log_is_read(drive: SimulatedMineDrive, tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=r"none\.toml"):
+        build_map(BuildRequest([drive.log], tmp_path / "map", SETTINGS, edits=tmp_path / "none.toml"))
+    assert not list(tmp_path.iterdir())
