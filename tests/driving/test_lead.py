@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from lhdmap.driving.bodies import bodies_of
 from lhdmap.driving.kernel import stepped, trailing
@@ -44,6 +44,7 @@ def test_base_and_lead_are_inverse(heading: float, bend: float, gear: int) -> No
 
 
 @given(ANGLES, st.floats(-3.0, 3.0), st.floats(-0.26, 0.26))
+@settings(deadline=None)
 def test_a_small_step_of_either_lead_is_the_same_motion_of_the_machine(bend: float, speed: float, rate: float) -> None:
     """Eq. (1) of the front body against the rear body's own steps."""
     start, dt = motion(0.4, bend, speed, rate), 1e-4
