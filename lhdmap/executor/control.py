@@ -12,7 +12,7 @@ from lhdmap.driving.model import DriveModel
 from lhdmap.driving.motion import Motion, Setpoints
 from lhdmap.executor.executor import Executor
 from lhdmap.executor.guard import Guard, Swept
-from lhdmap.executor.modes import IDLE, MODES, Modes
+from lhdmap.executor.modes import IDLE, MODES, Modes, operator_setpoints
 from lhdmap.executor.notes import Note, Notes, Stop
 from lhdmap.executor.settings import ExecutorSettings
 from lhdmap.executor.watchdog import Watchdog
@@ -34,6 +34,7 @@ class Control:
         self.watchdog, self.modes = Watchdog(inputs, settings), Modes()
         self.guard = Guard(model, bodies, settings, period_s=_GUARD_NS * 1e-9)
         self.swept: Swept | None = None
+        self._settings = settings
         self._notes, self._blocked = Notes(), False
         self._points: dict[str, tuple[Motion, FloatArray]] = {}
         self._looked_ns: int | None = None
@@ -44,8 +45,15 @@ class Control:
 
     def plan(self, source: str, setpoints: Setpoints, made_ns: int, now_ns: int) -> bool:
         """Take setpoints of `guidance` or `operator`, made of data of `made_ns`; False where they do not count now."""
-        fits = self.watchdog.armed and self.modes.takes(source, made_ns)
+        fresh = now_ns - made_ns <= self._settings.age_s * 1e9
+        fits = self.watchdog.armed and fresh and self.modes.takes(source, made_ns)
         return fits and self.executor.insert(setpoints, now_ns)
+
+    def operate(self, speed_mps: float, steering_rate_rps: float, made_ns: int, now_ns: int) -> bool:
+        """Take an operator's command as a plan."""
+        settings = self._settings
+        plan = operator_setpoints(speed_mps, steering_rate_rps, now_ns, settings.hold_s, settings.age_s)
+        return self.plan("operator", plan, made_ns, now_ns)
 
     def mode(self, name: str, now_ns: int, cause: str = "") -> bool:
         """Change the mode; the queue is emptied, so that the machine brakes until a plan comes that was made for it."""
@@ -75,16 +83,18 @@ class Control:
             self.modes.renew(now_ns)
         return reasons
 
-    def step(self, now_ns: int, motion: Motion | None, pull_mps2: float = 0.0) -> Command:
-        """Return the command of now; the hardest stop of all layers wins."""
-        stop, cause = self.watchdog.check(now_ns, self.modes.mode.needs, standing=self.executor.standing)
+    def step(
+        self, now_ns: int, motion: Motion | None, asked: Stop = Stop.GO, cause: str = "", pull_mps2: float = 0.0
+    ) -> Command:
+        """Return the command of now; the hardest stop of all layers wins, and of `asked`, what navigation wants."""
+        told, why = self.watchdog.check(now_ns, self.modes.mode.needs, standing=self.executor.standing)
         if not self.watchdog.armed:
             self.executor.clear()
-        if motion is not None:
-            blocked = self._guarded(now_ns, motion, pull_mps2)
-            if blocked and stop < Stop.FULL:
-                stop, cause = Stop.FULL, "guard: contact on the braking path"
-        return self.executor.step(now_ns, motion, stop, cause, pull_mps2)
+        if told > asked:
+            asked, cause = told, why
+        if motion is not None and self._guarded(now_ns, motion, pull_mps2) and asked < Stop.FULL:
+            asked, cause = Stop.FULL, "guard: contact on the braking path"
+        return self.executor.step(now_ns, motion, asked, cause, pull_mps2)
 
     def take_notes(self) -> list[tuple[str, Note]]:
         """Return what happened since the last call, each with who says so."""

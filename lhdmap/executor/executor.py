@@ -22,6 +22,7 @@ STANDING_MPS = 0.02
 _SHIFT_MPS = 0.05  # slower than this the other gear may be asked for
 _FREED_MPS = 0.2  # so far below the bound a brake that the bound put on is let go
 _LONGEST_PERIOD_S = 0.1
+_RESERVE = 0.92  # of the bound is commanded: tyres slip downhill, and from the bound on it brakes
 
 
 class Executor:
@@ -33,7 +34,6 @@ class Executor:
         self.state, self.emergency = "standing", ""
         self._limiter, self._rate_rps = SpeedLimiter(), 0.0
         self._last_ns: int | None = None
-        self._motion: Motion | None = None
 
     def loaded(self, model: DriveModel) -> None:
         """Take the model for another load."""
@@ -73,39 +73,45 @@ class Executor:
     @property
     def standing(self) -> bool:
         """Whether the machine stood when it was last seen."""
-        return self._motion is not None and abs(self._motion.speed_mps) <= STANDING_MPS
+        return self.keeper.motion is not None and abs(self.speed_mps) <= STANDING_MPS
+
+    @property
+    def speed_mps(self) -> float:
+        """Speed when the machine was last seen."""
+        return 0.0 if self.keeper.motion is None else self.keeper.motion.speed_mps
 
     def step(
         self, now_ns: int, motion: Motion | None, stop: Stop = Stop.GO, cause: str = "", pull_mps2: float = 0.0
     ) -> Command:
-        """Return the command of now. `motion`: the newest that is known; `pull_mps2`: gravity along it, positive downhill."""
+        """Return the command of now.
+
+        Args:
+            now_ns: time.
+            motion: the newest that is known.
+            stop: the hardest stop that watchdog, guard or navigation asks for.
+            cause: why, for the journal.
+            pull_mps2: gravity along x of the machine: positive where the nose is lower.
+        """
         period_s = self._period_s(now_ns)
         self.keeper.sees(motion)
-        self._motion = motion or self._motion
         self.queue.forget(now_ns)
         if stop is Stop.EMERGENCY:
             self.stop(cause)
         wanted = self.queue.at(now_ns)
-        stop, cause = self._decided(now_ns, wanted, stop, cause, period_s, pull_mps2)
+        way = self.speed_mps if wanted is None or abs(self.speed_mps) > STANDING_MPS else wanted.speed_mps
+        bound = speed_bound(self.model, self.queue.left_s(now_ns), period_s, math.copysign(1.0, way) * pull_mps2)
+        stop, cause = self._decided(wanted, stop, cause, bound)
         if stop >= Stop.FULL or wanted is None:
             return self._brake(now_ns, cause, period_s)
         if stop is Stop.SERVICE:
             return self._service(now_ns, cause, period_s)
-        return self._drive(now_ns, wanted, period_s, self._bound(now_ns, period_s, pull_mps2), held=stop is Stop.HOLD)
+        return self._drive(now_ns, wanted, period_s, bound, held=stop is Stop.HOLD)
 
     def _period_s(self, now_ns: int) -> float:
         last, self._last_ns = self._last_ns, now_ns
         return 0.01 if last is None else min(max((now_ns - last) * 1e-9, 1e-3), _LONGEST_PERIOD_S)
 
-    def _speed(self) -> float:
-        return 0.0 if self._motion is None else self._motion.speed_mps
-
-    def _bound(self, now_ns: int, period_s: float, pull_mps2: float) -> float:
-        return speed_bound(self.model, self.queue.left_s(now_ns), period_s, pull_mps2)
-
-    def _decided(
-        self, now_ns: int, wanted: Setpoint | None, stop: Stop, cause: str, period_s: float, pull_mps2: float
-    ) -> tuple[Stop, str]:
+    def _decided(self, wanted: Setpoint | None, stop: Stop, cause: str, bound: float) -> tuple[Stop, str]:
         """Return the hardest stop that anybody asks for, and why."""
         if self.emergency:
             return Stop.EMERGENCY, self.emergency
@@ -113,7 +119,7 @@ class Executor:
             return stop, cause
         if wanted is None:
             return Stop.FULL, "queue exhausted"
-        bound, speed = self._bound(now_ns, period_s, pull_mps2), abs(self._speed())
+        speed = abs(self.speed_mps)
         freed = _FREED_MPS if self.state == "braking" else 0.0
         if bound <= 0.0 or (speed > STANDING_MPS and speed > bound - freed):
             return Stop.FULL, "a brake would end after the queue"
@@ -121,9 +127,10 @@ class Executor:
 
     def _drive(self, now_ns: int, wanted: Setpoint, period_s: float, bound: float, *, held: bool) -> Command:
         """Follow the queue within the limits."""
-        limiter, model, speed = self._limiter, self.model, self._speed()
+        limiter, model, speed = self._limiter, self.model, self.speed_mps
         self._goes("driving", "held" if held else "queue")
         target, slope = wanted.speed_mps, self.queue.slope_mps2(now_ns)
+        bound *= _RESERVE
         if held:
             bound = min(bound, abs(limiter.speed_mps))
         if abs(target) > bound:
@@ -154,7 +161,7 @@ class Executor:
     def _brake(self, now_ns: int, cause: str, period_s: float) -> Command:
         """Brake fully, and steer along the path by distance until standstill."""
         self._goes("standing" if self.standing else "braking", cause)
-        self._limiter.restart(self._speed())
+        self._limiter.restart(self.speed_mps)
         rate = 0.0 if self.standing else self._steered(self.keeper.steering(now_ns), period_s)
         self._rate_rps = rate
         return self._given(now_ns, 0.0, rate, brake=True, speed_mps=0.0)
@@ -172,5 +179,5 @@ class Executor:
 
     def _goes(self, state: str, cause: str) -> None:
         if state != self.state:
-            self.notes.add("state", self.state, state, cause, speed_mps=self._speed())
+            self.notes.add("state", self.state, state, cause, speed_mps=self.speed_mps)
             self.state = state

@@ -18,7 +18,6 @@ from lhdmap.executor.settings import ExecutorSettings
 from lhdmap.messages import FloatArray
 
 _NO_PLAN = np.zeros((0, 2))
-_LEAST_BRAKE_MPS2 = 0.2
 _FOR_EVER_S = 1e9
 
 
@@ -62,13 +61,14 @@ class Guard:
             commanded_mps: signed speed that is asked for; the drive may come that far before the brake does.
             plan: way and joint angle (K, 2) of the path from here, on which the executor brakes.
             age_s: of the points; the machine has moved on meanwhile.
-            pull_mps2: gravity along the motion, positive downhill.
+            pull_mps2: gravity along x of the machine: positive where the nose is lower.
         """
         speed, late_s = self._speed(motion, commanded_mps, age_s), self._late_s(age_s)
         points = np.ascontiguousarray(points_m, dtype=float).reshape(-1, 2)
         settings, bodies = self._settings, self._bodies
         margins = settings.margin_m, settings.margin_growth, settings.own_body_m
-        timing = late_s, max(self.model.brake_mps2 - pull_mps2, _LEAST_BRAKE_MPS2), self.model.brake_ramp_s
+        pull = max(math.copysign(1.0, speed) * pull_mps2, 0.0)
+        timing = late_s, self.model.brake_mps2, self.model.brake_ramp_s, pull
         state = speed, motion.articulation_rad, motion.articulation_rate_rps
         worst = Swept(contact=False, at_m=None, free_m=math.inf, stop_m=0.0, own=0)
         for ahead, held_s in self._assumed(plan, late_s):

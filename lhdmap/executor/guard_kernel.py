@@ -17,11 +17,13 @@ WAY, REACH, FRONT, REAR = 0, 1, 2, 6
 _LEAVES = 0.3  # what touches must get farther by so much per way
 _SETTLES_S = 0.2  # time in which the joint gets to where it is to be
 _MOST = 4000
+LEAST_BRAKE_MPS2 = 0.2
+"""By so much a full brake is stronger than gravity, however steep it is."""
 
 Shape = tuple[float, float, float, float, float]
 """Joint to front and rear axle (m), largest angle and rate of the joint (rad, rad/s), how far a body reaches from its axle (m)."""
-Timing = tuple[float, float, float]
-"""Seconds until the brake comes, full brake (m/s2), its ramp (s)."""
+Timing = tuple[float, float, float, float]
+"""Seconds until the brake comes, full brake (m/s2), its ramp (s), gravity along the motion (m/s2, not negative)."""
 Margins = tuple[float, float, float]
 """Margin (m), its growth with the way, depth of returns of the machine itself (m)."""
 
@@ -35,7 +37,7 @@ def braking_path(
     The rate is held for `held_s`, then the joint goes where `plan` (N, 2), way and angle, has it; without a plan it is held.
     """
     front_m, rear_m, most_bend, most_rate, far_m = shape
-    late_s, brake, ramp_s = timing
+    late_s, brake, ramp_s, pull = timing
     speed, bend, rate = motion
     x, y, heading, way, reach, time = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     gear = 1.0 if speed >= 0.0 else -1.0
@@ -51,8 +53,11 @@ def braking_path(
                 wanted = np.interp(way + pace * _SETTLES_S, plan[:, 0], plan[:, 1])
                 rate = min(max((wanted - bend) / _SETTLES_S, -most_rate), most_rate)
         after = min(max(bend + rate * step, -most_bend), most_bend)
-        slower = brake * min(max((time + 0.5 * step - late_s) / ramp_s, 0.0), 1.0) * step
-        later = max(pace - slower, 0.0)
+        since = time + 0.5 * step - late_s
+        if since > 0.0:  # the drive lets go when the brake comes
+            later = max(pace + (pull - max(brake, pull + LEAST_BRAKE_MPS2) * min(since / ramp_s, 1.0)) * step, 0.0)
+        else:
+            later = pace
         gone = 0.5 * (pace + later) * step
         middle = 0.5 * (bend + after)
         turn = (gear * gone * math.sin(middle) + rear_m * (after - bend)) / (front_m * math.cos(middle) + rear_m)

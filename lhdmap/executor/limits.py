@@ -6,22 +6,21 @@ import math
 
 from lhdmap.driving.model import DriveModel
 
-_LEAST_BRAKE_MPS2 = 0.2
-
-
-def stopping_lead_s(model: DriveModel, period_s: float) -> float:
-    """Return by how much a full brake is late, s: a period, the dead time, half of the brake's ramp."""
-    return period_s + model.dead_time_s + 0.5 * model.brake_ramp_s
+LEAST_BRAKE_MPS2 = 0.2
+"""A full brake is not taken for less, however steep it is."""
 
 
 def speed_bound(model: DriveModel, left_s: float, period_s: float, pull_mps2: float = 0.0) -> float:
     """Return u_v,max of Eq. (20) for |u_v|: from it a full brake ends before the last queued command does.
 
-    The paper's bound is D Q_dt; what a brake is late is taken from Q_dt, else the machine would still roll at its end.
-    `|u_v|`: the paper bounds forward speed alone (errata). `pull_mps2`: gravity along the motion, positive downhill.
+    The paper's bound is D Q_dt. What a brake is late (a period, the dead time, its ramp) is taken from Q_dt, else the machine
+    would still roll at its end; downhill it gains speed in the ramp, when the drive has let it go. `|u_v|`: the paper bounds
+    forward speed alone (errata). `pull_mps2`: gravity along the motion, positive downhill; uphill counts as level.
     """
-    brake = max(model.brake_mps2 - pull_mps2, _LEAST_BRAKE_MPS2)
-    return max(brake * (left_s - stopping_lead_s(model, period_s)), 0.0)
+    pull = max(pull_mps2, 0.0)
+    brake = max(model.brake_mps2 - pull, LEAST_BRAKE_MPS2)
+    late_s = period_s + model.dead_time_s
+    return max(brake * (left_s - late_s) - 0.5 * model.brake_mps2 * model.brake_ramp_s, 0.0)
 
 
 def dead_zone(rate_rps: float, zone_rps: float) -> float:

@@ -6,6 +6,7 @@ Holding the joint, or steering on in time, leaves it (guidance findings, Q6).
 
 from __future__ import annotations
 
+import math
 from collections import deque
 from typing import NamedTuple
 
@@ -49,25 +50,30 @@ class PathKeeper:
         self.model = model
         self.way_m = 0.0
         self.path: Path | None = None
-        self._motion: Motion | None = None
+        self.motion: Motion | None = None
         self._sent: deque[Sent] = deque(maxlen=_KEPT)
 
     def sees(self, motion: Motion | None) -> None:
-        """Take a motion, where it is newer than the last one; the way goes on by it."""
-        last = self._motion
-        if motion is None or (last is not None and motion.stamp_ns <= last.stamp_ns):
+        """Take a motion, where it is finite and newer than the last one; the way goes on by it."""
+        last = self.motion
+        if motion is None or not all(math.isfinite(value) for value in motion):
+            return
+        if last is not None and motion.stamp_ns <= last.stamp_ns:
             return
         if last is not None:
             self.way_m += 0.5 * abs(motion.speed_mps + last.speed_mps) * (motion.stamp_ns - last.stamp_ns) * 1e-9
-        self._motion = motion
+        self.motion = motion
 
     def gave(self, sent: Sent) -> None:
         """Note a command."""
         self._sent.append(sent)
 
     def plan(self, queue: CommandQueue, now_ns: int) -> None:
-        """Keep the path of what is queued, from where the machine will be when the first of it counts."""
-        motion = self._motion
+        """Keep the path of what is queued, from where the machine is, with what is on its way to it.
+
+        One that ends before the machine can stop replaces none: nobody could brake on it.
+        """
+        motion = self.motion
         if motion is None:
             return
         ahead = queue.rows(now_ns, motion.stamp_ns)
@@ -82,11 +88,13 @@ class PathKeeper:
             float(rows[-1, 0]),
             _STEP_S,
         )
-        self.path = Path(states[:, WAY].copy(), states[:, BEND].copy())
+        enough_m = self.way_m + self.model.stopping_m(motion.speed_mps)
+        if self.path is None or states[-1, WAY] >= enough_m:
+            self.path = Path(states[:, WAY].copy(), states[:, BEND].copy())
 
     def ahead(self, until_ns: int) -> FloatArray | None:
         """Return the state (5,) at a time, of all commands that have been given; None where no motion is known."""
-        motion = self._motion
+        motion = self.motion
         if motion is None:
             return None
         until_s = max((until_ns - motion.stamp_ns) * 1e-9, 0.0)

@@ -103,10 +103,12 @@ class Watchdog:
 
     def rearm(self, now_ns: int, needed: Collection[str]) -> tuple[str, ...]:
         """Arm, where nothing stands against it; return what does."""
+        if self.armed:
+            return ()
         reasons = self.refusals(now_ns, needed)
         if reasons:
             self.notes.add("armed", "disarmed", "disarmed", f"refused: {'; '.join(reasons)}")
-        elif not self.armed:
+        else:
             self.notes.add("armed", "disarmed", "armed", "re-armed", was=list(self.causes))
             self.armed, self.causes, self._held = True, (), False
         return reasons
