@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -39,6 +39,16 @@ class Control:
         self._notes, self._blocked, self._near = Notes(), False, 0
         self._points: dict[str, tuple[Motion, FloatArray]] = {}
         self._looked_ns: int | None = None
+
+    def saw(
+        self, name: str, stamp_ns: int, now_ns: int, values: Sequence[float] = (), content: int | None = None
+    ) -> bool:
+        """Take a message of an input, as `Watchdog.saw` does."""
+        return self.watchdog.saw(name, stamp_ns, now_ns, values, content)
+
+    def disagreement(self, stamp_ns: int, now_ns: int, apart_m: float, apart_rad: float) -> bool:
+        """Take by how much pose and scan disagree."""
+        return self.watchdog.disagreement(stamp_ns, now_ns, apart_m, apart_rad)
 
     def points(self, name: str, points_m: FloatArray, motion: Motion) -> None:
         """Take the points (N, 2) of a scanner in `base_link`, and the motion at their stamp; what is not finite goes."""

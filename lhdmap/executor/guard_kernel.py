@@ -145,6 +145,8 @@ def _met(
     last, (margin, growth) = len(path) - 1, wanted
     widest = margin + growth * path[last, WAY]
     k, now = 0, start
+    if start - path[last, REACH] > widest:
+        return math.inf
     while k < last and path[k, WAY] < before:
         to = path[k, REACH] + now - widest  # nothing can come near before the bodies have moved so far
         k += 1
