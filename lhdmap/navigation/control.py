@@ -60,6 +60,7 @@ class NavigationControl:
         self.goal = ""
         self.legs: list[Leg] = []
         self.leg = 0
+        self.may_move = True  # whether the machine is armed: one that is not does not move, and is not stuck
         self.closed: tuple[str, ...] = ()
         self._target = 0
         self._since_ns = 0
@@ -123,7 +124,7 @@ class NavigationControl:
         if standing and abs(left_m) < self._settings.arrived_m:
             self._stopped(now_ns, leg)
             return None
-        if not standing or self._since_ns == 0:
+        if not standing or self._since_ns == 0 or not self.may_move:
             self._since_ns = now_ns
         if (now_ns - self._since_ns) * 1e-9 > self._settings.stuck_s:
             self._stuck(leg, left_m)
@@ -197,7 +198,7 @@ class NavigationControl:
         path = moved(leg.path, se2.compose(located.pose_odom, se2.inverse(located.pose_map)))
         lead = self._leads[leg.gear].state(motion)
         at_m = _at_m(path, lead[0], lead[1])
-        if not standing or self._since_ns == 0:
+        if not standing or self._since_ns == 0 or not self.may_move:
             self._since_ns = now_ns
         waited = (now_ns - self._since_ns) * 1e-9 > self._settings.stuck_s
         if standing and (abs(leg.stop_m - at_m) < self._settings.arrived_m or waited):
