@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -25,6 +26,7 @@ from lhdmap.movement.routes import RouteOptions, RoutePlanner
 from lhdmap.navigation.goals import Approach, overrun, reached
 from lhdmap.navigation.leg import Leg, legs_of
 from lhdmap.navigation.settings import NavigationSettings
+from lhdmap.topology.model import DEAD_END, TopologicalMap, Tunnel, Waypoint
 
 IDLE, DRIVING, RESTING, BACKING, ARRIVED, ASSISTANCE = "idle", "driving", "resting", "backing", "arrived", "assistance"
 _BEHIND_M, _AHEAD_M = 12.0, 60.0
@@ -75,7 +77,7 @@ class NavigationControl:
         """Plan to a goal from a place of the map where the machine stands; raises UsageError where a name is wrong."""
         heading = math.degrees(float(located.pose_map[2]))
         asked = RouteOptions(heading=f"{heading:.1f}", avoid=self.closed, alternatives=0)
-        route = self._planner.route(start, goal, asked)
+        route = self._planner.route(start, goal, replace(asked, goal_heading=facing(self._planner.topology, goal)))
         self.goal = goal
         if not route.feasible:
             self._ask(f"no route: {route.reason}")
@@ -241,6 +243,17 @@ def _cut(now_ns: int, gear: int, path: FloatArray, stop_m: float, at_m: float) -
     """Return the directive with the part of a path around a place."""
     part = (path[:, 5] > at_m - _BEHIND_M) & (path[:, 5] < at_m + _AHEAD_M)
     return Directive(now_ns, gear, path[part], stop_m)
+
+
+def facing(topology: TopologicalMap, goal: str) -> str | None:
+    """Return the heading at a goal: a draw point or a dump at a dead end is faced with the bucket; None: any will do."""
+    point = topology.called(goal)
+    if not isinstance(point, Waypoint) or point.purpose not in ("draw_point", "dump"):
+        return None
+    node = topology.nodes[point.node]
+    if not isinstance(node, Tunnel) or DEAD_END not in node.ends:
+        return None
+    return "along" if node.ends[1] == DEAD_END else "against"
 
 
 def checked(planner: RoutePlanner, name: str) -> str:

@@ -28,7 +28,7 @@ from lhdmap.replay.process import (
     Received,
 )
 from lhdmap.replay.processes.feed import MOTION_TOPICS, MotionFeed
-from lhdmap.replay.processes.told import Asked, Health, ModeNow, Word
+from lhdmap.replay.processes.told import Asked, Health, Idle, ModeNow, Word
 from lhdmap.roles import ROLES
 
 EXECUTOR = "executor"
@@ -76,7 +76,8 @@ class Execute(Process):
             self._scan(message, now_ns, front=topic == _FRONT)
         elif topic == PLAN:
             watchdog.saw(GUIDANCE, message.stamp_ns, now_ns)
-            self.control.plan("guidance", message.setpoints, message.stamp_ns, now_ns)
+            if not isinstance(message, Idle):
+                self.control.plan("guidance", message.setpoints, message.stamp_ns, now_ns)
         elif topic == SEEN:
             watchdog.disagreement(message.stamp_ns, now_ns, message.apart_m, message.apart_rad)
         elif topic == DIRECTIVE:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections import deque
 
 from lhdmap.driving.motion import Motion
 from lhdmap.replay.process import POSE, Received
@@ -11,6 +12,7 @@ from lhdmap.roles import ROLES
 JOINTS, TACHOMETER = ROLES["joints"].topic, ROLES["tachometer"].topic
 MOTION_TOPICS = (POSE, JOINTS, TACHOMETER)
 _RATE_LAG_S = 0.1
+_SAMPLES = 4  # of the tachometer: its noise alone looks like creeping
 
 
 class MotionFeed:
@@ -24,7 +26,7 @@ class MotionFeed:
         self.heard_ns: int | None = None
         self._joint: tuple[int, float, float] | None = None
         self._speed_ns: int | None = None
-        self._speed_mps = 0.0
+        self._speeds: deque[float] = deque(maxlen=_SAMPLES)
 
     def take(self, received: Received) -> None:
         """Take a message of one of `MOTION_TOPICS`."""
@@ -36,13 +38,15 @@ class MotionFeed:
             self._bend(message.stamp_ns, bend, rate)
         elif topic == TACHOMETER:
             if math.isfinite(message.speed_mps):
-                self._speed_mps, self._speed_ns = message.speed_mps, message.stamp_ns
+                self._speeds.append(message.speed_mps)
+                self._speed_ns = message.stamp_ns
                 self._hear()
         elif topic == POSE and self._joint is not None:
             T = message.T_odom_base
             heading = math.atan2(T[1, 0], T[0, 0])
             _, bend, rate = self._joint
-            self.motion = Motion(message.stamp_ns, float(T[0, 3]), float(T[1, 3]), heading, bend, rate, self._speed_mps)
+            speed = sum(self._speeds) / max(len(self._speeds), 1)
+            self.motion = Motion(message.stamp_ns, float(T[0, 3]), float(T[1, 3]), heading, bend, rate, speed)
 
     def _bend(self, stamp_ns: int, bend: float, rate: float) -> None:
         if not math.isfinite(bend):

@@ -12,7 +12,7 @@ from lhdmap.messages import Command
 from lhdmap.replay.journal import Scribe
 from lhdmap.replay.process import DIRECTIVE, MILLISECOND_NS, PLAN, SEEN, Outgoing, Process, Received
 from lhdmap.replay.processes.feed import MOTION_TOPICS, MotionFeed
-from lhdmap.replay.processes.told import Asked
+from lhdmap.replay.processes.told import Asked, Idle
 from lhdmap.roles import ROLES
 
 GUIDANCE = "guidance"
@@ -42,6 +42,7 @@ class Guide(Process):
         if motion is None or asked is None or self._seen_ns is None or asked.directive is None:
             self._guidance.forget()
             self._scribe.goes("waiting", "no directive" if asked is None else asked.cause)
+            yield Outgoing(PLAN, Idle(now_ns))
             return
         if now_ns - asked.stamp_ns > _ASKED_NS:
             self._scribe.goes("waiting", "directive too old")

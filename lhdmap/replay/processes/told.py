@@ -26,6 +26,12 @@ class Asked(NamedTuple):
     cause: str
 
 
+class Idle(NamedTuple):
+    """Guidance lives, and has nothing to plan."""
+
+    stamp_ns: int
+
+
 class Word(NamedTuple):
     """What the station says: always a sign of life; a mode, arming, a stop, the joystick where they are wanted."""
 
