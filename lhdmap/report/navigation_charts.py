@@ -19,32 +19,34 @@ MODE_LEVELS = {"autonomous": 10.0, "idle": 0.0, "manual": -5.0, "assisted": -10.
 """The paper's scale: 10 autonomous, 0 idle, −10 tele-operation (assisted is that); manual has a level of its own."""
 
 
+_MODES = "mode: 10 autonomous, −5 manual, −10 tele-operated"
+
+
 def overview(samples: Samples) -> Figure:
-    """Draw speed (km/h), mode and distance (decametres) over time: Fig. 15."""
-    figure = charts.new_figure(3.2)
+    """Draw speed (km/h) and mode, and on a scale of its own the distance, over time: Fig. 15."""
+    figure = charts.new_figure(3.2, right_in=0.65)
     axes = figure.add_subplot()
     levels = np.array([MODE_LEVELS.get(str(one), np.nan) for one in samples.mode])
-    travelled = np.cumsum(np.abs(np.nan_to_num(samples.speed_mps)) * samples.moving) * STEP_S / 10.0
-    if np.isfinite(levels).any():
-        axes.step(
-            samples.time_s,
-            levels,
-            where="mid",
-            color=charts.ODOMETRY,
-            label="mode: 10 autonomous, −5 manual, −10 tele-operated",
-        )
-    axes.plot(*charts.envelope(samples.time_s, travelled), color=charts.TRUTH, label="travelled, dam")
+    told = np.isfinite(levels).any()
+    if told:
+        axes.step(samples.time_s, levels, where="mid", color=charts.ODOMETRY, label=_MODES)
     axes.plot(*charts.envelope(samples.time_s, 3.6 * samples.speed_mps), color=charts.FINAL, label="speed, km/h")
+    axes.plot([], [], "--", color=charts.TRUTH, label="travelled, m (right)")
     axes.axhline(0.0, color=charts.INK, linewidth=0.6, alpha=0.5)
-    axes.set(xlabel="time, s", ylabel="km/h, dam", xlim=_span(samples))
+    axes.set(xlabel="time, s", ylabel="speed, km/h; mode" if told else "speed, km/h", xlim=_span(samples))
     charts.legend_above(axes)
+    right = axes.twinx()
+    travelled = np.cumsum(np.abs(np.nan_to_num(samples.speed_mps)) * samples.moving) * STEP_S
+    right.plot(*charts.envelope(samples.time_s, travelled), "--", color=charts.TRUTH)
+    right.set(ylabel="travelled, m", ylim=(0.0, None))
+    right.grid(visible=False)
     return figure
 
 
 def steering(samples: Samples) -> Figure:
     """Draw the steering command and the angle of the joint: Figs. 17, 18."""
     angle_deg = np.degrees(samples.articulation_rad)
-    return _pair(samples, (samples.steering, "steering command, ±1"), (angle_deg, "articulation, °, left +"))
+    return _pair(samples, (samples.steering, "steering command, ±1"), (angle_deg, "articulation, °"))
 
 
 def propulsion(samples: Samples) -> Figure:
@@ -74,7 +76,7 @@ def _pair(samples: Samples, command: tuple[FloatArray, str], state: tuple[FloatA
     for axes, (values, label), colour in zip(panels, (command, state), (charts.ODOMETRY, charts.FINAL), strict=True):
         axes.plot(*charts.envelope(samples.time_s, values), color=colour, linewidth=1.0, label=label)
         axes.axhline(0.0, color=charts.INK, linewidth=0.6, alpha=0.5)
-        axes.set_ylabel(label.partition(",")[2].partition(",")[0].strip())
+        axes.set_ylabel(label.split(" ")[-2].rstrip(",") + ", " + label.split(" ")[-1])
         axes.yaxis.set_label_coords(-0.065, 0.5)
         charts.legend_above(axes)
     panels[1].set(xlabel="time, s", xlim=_span(samples))

@@ -46,7 +46,7 @@ class Samples(NamedTuple):
 
 def sampled(signals: Signals, machine: Machine, mode: str = "") -> Samples:
     """Return the drive at `RATE_HZ`; `mode` holds for all of it where the log has none."""
-    time_s = (np.arange(round(signals.length_s * RATE_HZ)) + 0.5) * STEP_S
+    time_s: FloatArray = (np.arange(round(signals.length_s * RATE_HZ), dtype=np.float64) + 0.5) * STEP_S
     largest_rps = math.radians(machine.dimensions.max_articulation_rate_dps)
     modes = signals.mode_at(time_s)
     if mode and not len(signals.mode.time_s):

@@ -53,9 +53,8 @@ def grouped(rows: Iterable[Row]) -> list[Group]:
     found = []
     for operation in dict.fromkeys(row.operation for row in usable):
         own = [row for row in usable if row.operation == operation]
-        for load in ("E", "L"):
-            if some := [row for row in own if row.load == load]:
-                found.append(_group(operation, load, some))
+        loads = [load for load in ("E", "L") if any(row.load == load for row in own)]
+        found += [_group(operation, load, [row for row in own if row.load == load]) for load in loads]
         found.append(_group(operation, ALL, own))
     return found
 

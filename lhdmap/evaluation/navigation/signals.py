@@ -16,6 +16,7 @@ from lhdmap.messages import Command, FloatArray, Joints, Message, Tachometer, Te
 
 ROLES = ("tachometer", "joints", "command", "mode")
 MAX_GAP_S = 0.5
+_NAMES = ("speed", "articulation", "propel", "steering", "mode")
 _FAR_NS = 600_000_000_000  # a mode told once may be this old when the sensors begin
 MODES = ("idle", "autonomous", "teleoperated", "assisted", "manual")
 
@@ -69,9 +70,7 @@ class SignalCollector:
     """Takes the messages of a log in any order; `signals` gives them as series."""
 
     def __init__(self) -> None:
-        self._samples: dict[str, list[tuple[int, float]]] = {
-            name: [] for name in ("speed", "articulation", "propel", "steering", "mode")
-        }
+        self._samples: dict[str, list[tuple[int, float]]] = {name: [] for name in _NAMES}
         self._odd: Counter[str] = Counter()
 
     def update(self, message: Message) -> None:
@@ -110,8 +109,8 @@ class SignalCollector:
             self._check_clock(start_ns, end_ns)
         rows = {name: _series(samples, start_ns) for name, samples in self._samples.items()}
         remarks = tuple(f"{text} ({count})" for text, count in self._odd.items())
-        names = ("speed", "articulation", "propel", "steering", "mode")
-        return Signals(start_ns, length_s, *(rows[name] for name in names), remarks)
+        speed, angle, propel, steering, mode = (rows[name] for name in _NAMES)
+        return Signals(start_ns, length_s, speed, angle, propel, steering, mode, remarks)
 
     def _check_clock(self, start_ns: int, end_ns: int) -> None:
         """Leave the mode out where its stamps (it has no header, so the recorder's) are of another clock."""

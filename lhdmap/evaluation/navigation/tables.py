@@ -61,18 +61,24 @@ RATE_FREE = (
     Column("acceleration_rms_mps2", "rms dv/dt m/s²", 3),
 )
 CONVENTION = (
-    f"E of Eqs. (22), (23) at {RATE_HZ:g} Hz: commands propel and steering rate / largest, each ±1; speed in km/h, articulation in "
-    "degrees; mean and largest of the whole drive. The paper tells neither rate nor units: its figures compare with these only "
-    "if they are the same."
+    f"E of Eqs. (22), (23) at {RATE_HZ:g} Hz: commands propel and steering rate / largest, each ±1; speed in km/h, "
+    "articulation in degrees; mean and largest of the whole drive. The paper tells neither rate nor units: its figures "
+    "compare with these only if they are the same."
 )
-NOTES = (
-    CONVENTION,
-    f"rms after one low pass: {LOW_PASS}; they do not depend on the log's rate.",
-    f"standing: slower than {STANDING_MPS:g} m/s by the wheels. TD, TAD: net and travelled; the paper's TD is net. σ: of a sample (n − 1).",
-    "walls: from the bodies' sides across to hits of the scanners, at their height, while the machine moves; the paper's least "
-    "distances end at 0.10 m, these do not.",
-    "paper: of its Table 4, the printed µ, σ (1-14) of ACD to MSD are those of the loaded runs alone; here each group has its own.",
+LOW_PASSED = f"rms after one low pass: {LOW_PASS}; they do not depend on the log's rate."
+STANDING = (
+    f"standing: slower than {STANDING_MPS:g} m/s by the wheels. TD, TAD: net and travelled; the paper's TD is net. "
+    "σ: of a sample (n − 1)."
 )
+WALLS = (
+    "walls: from the bodies' sides across to hits of the scanners, at their height, while the machine moves; the paper's "
+    "least distances end at 0.10 m, these do not."
+)
+PAPER = (
+    "paper: the µ, σ (1-14) that its Table 4 prints of ACD to MSD are those of the loaded runs alone; here each group has "
+    "its own."
+)
+NOTES = (CONVENTION, LOW_PASSED, STANDING, WALLS, PAPER)
 
 
 def tables(rows: Sequence[Row]) -> list[Table]:
