@@ -117,4 +117,5 @@ def _walls(
             mounts.update(message)
         elif isinstance(message, LaserScan):
             gauge.update(message, mounts.of(message.frame_id, role))
-    return gauge.rows, mounts.warnings
+    frozen = [f"{gauge.frozen} scans repeat the one before while the machine moves: not used for the walls"]
+    return gauge.rows, [*mounts.warnings, *(frozen if gauge.frozen else ())]

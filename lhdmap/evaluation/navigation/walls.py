@@ -14,10 +14,11 @@ from typing import NamedTuple
 import numba as nb
 import numpy as np
 
+from lhdmap.evaluation.navigation.drive import STANDING_MPS
 from lhdmap.evaluation.navigation.path import Moment, WheelPath
 from lhdmap.integration.self_filter import Rig, body_poses, in_boxes, rear_to_base, rig_of
 from lhdmap.machine import Machine
-from lhdmap.messages import FloatArray, LaserScan, Mount
+from lhdmap.messages import Float32Array, FloatArray, LaserScan, Mount
 from lhdmap.scan_matching.scan_points import half_sweep_ns
 
 _OWN_M = 0.10  # hits nearer to a box than this when they are seen are the machine itself
@@ -55,6 +56,8 @@ class WallGauge:
         self._rigs: dict[str, Rig] = {}
         self._blocks: deque[_Block] = deque()
         self._kept_at_m: dict[str, float] = {}
+        self._last_ranges: dict[str, Float32Array] = {}
+        self.frozen = 0  # scans of a moving machine that said the same as the one before
         self._stretch = -1
         self._last_s = -np.inf
         self._boxes, self._on_rear = _footprints(machine)
@@ -72,12 +75,21 @@ class WallGauge:
         if mount.child_frame not in self._rigs:
             self._rigs[mount.child_frame] = rig_of(mount, self._machine, _OWN_M)
         points = self._points(scan, self._rigs[mount.child_frame], moment)
-        if abs(moment.travelled_m - self._kept_at_m.get(mount.child_frame, -np.inf)) >= _KEPT_EACH_M:
+        if self._is_frozen(scan, mount.child_frame, moment):
+            points = points[:0]
+        elif abs(moment.travelled_m - self._kept_at_m.get(mount.child_frame, -np.inf)) >= _KEPT_EACH_M:
             self._kept_at_m[mount.child_frame] = moment.travelled_m
             self._blocks.append(_Block(points, moment.travelled_m))
         if time_s - self._last_s >= _MOMENT_S:
             self._last_s = time_s
             self.rows.append(self._row(time_s, moment, points))
+
+    def _is_frozen(self, scan: LaserScan, frame: str, moment: Moment) -> bool:
+        """Return whether a scanner repeats itself while the machine moves: its hits would be carried to wrong places."""
+        last, self._last_ranges[frame] = self._last_ranges.get(frame), scan.ranges_m
+        same = abs(moment.speed_mps) > STANDING_MPS and last is not None and np.array_equal(last, scan.ranges_m)
+        self.frozen += int(same)
+        return same
 
     def _forget(self, moment: Moment) -> None:
         """Drop hits that are passed, and all of them after a gap."""
@@ -97,8 +109,6 @@ class WallGauge:
         )  # fmt: skip
 
     def _row(self, time_s: float, moment: Moment, points: FloatArray) -> WallRow:
-        from lhdmap.evaluation.navigation.drive import STANDING_MPS
-
         size = self._machine.dimensions
         every = np.concatenate([*(block.points_odom for block in self._blocks), points])
         joint = np.array([moment.articulation_rad, size.joint_to_front_axle_m, size.joint_to_rear_axle_m])

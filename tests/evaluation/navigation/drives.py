@@ -71,8 +71,9 @@ def corridor(left_m: float, right_m: float, y_m: float = 0.0) -> Callable[[Array
 
 
 def scan(role: str, time_s: float, ranges: Array) -> LaserScan:
-    """Return a scan of the front or the rear scanner."""
-    return LaserScan(ns(time_s), f"lidar_{role}", FIRST_RAD, STEP_RAD, 0.0, 0.1, 40.0, ranges.astype(np.float32))
+    """Return a scan of the front or the rear scanner; a little of it changes, as in any real one."""
+    ranges = (ranges + 1e-4 * math.sin(30.0 * time_s)).astype(np.float32)
+    return LaserScan(ns(time_s), f"lidar_{role}", FIRST_RAD, STEP_RAD, 0.0, 0.1, 40.0, ranges)
 
 
 def mounts() -> dict[str, Mount]:
@@ -82,7 +83,7 @@ def mounts() -> dict[str, Mount]:
         mount = Machine().mounts[f"lidar_{role}"]
         T = mount.T_parent_sensor.copy()
         yaw = 0.0 if role == "front" else math.pi
-        T[:3, :3] = [[math.cos(yaw), 0, 0], [0, math.cos(yaw), 0], [0, 0, 1]]
+        T[:3, :3] = np.diag([math.cos(yaw), math.cos(yaw), 1.0])
         found[role] = Mount(START_NS, mount.parent, f"lidar_{role}", T)
     return found
 

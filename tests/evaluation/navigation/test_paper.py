@@ -38,7 +38,7 @@ def test_table_3(name: str, operation: str, load: str, n: int) -> None:
 
 def test_sigma_is_that_of_a_sample() -> None:
     group, line = _group("autonomous", "E"), printed()[0]["sigma(1-14) w/E"]
-    of_all = group.sigma["length_s"] * (6 / 7) ** 0.5  # type: ignore[operator]
+    of_all = group.sigma["length_s"] * (6 / 7) ** 0.5
     assert abs(of_all - line["length_s"]) > 5.0
     assert group.sigma["length_s"] == pytest.approx(line["length_s"], abs=0.05)
 

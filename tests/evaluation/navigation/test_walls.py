@@ -19,6 +19,7 @@ from tests.evaluation.navigation.drives import (
     Array,
     corridor,
     mounts,
+    ns,
     scan,
     signals,
 )
@@ -55,17 +56,20 @@ def test_one_scanner_is_enough_where_it_leads() -> None:
     assert behind["mdrw_m"] == pytest.approx(1.8 - HALF_M, abs=1e-3)
 
 
-def test_a_pinch_is_the_least_distance_and_lone_hits_are_not() -> None:
-    plain = corridor(2.0, 1.8)
+def _with_rib(pose: Array, from_m: float, to_m: float) -> Array:
+    """Return ranges in the corridor of 2.0 and 1.8 m with a rib 0.3 m out of the left wall."""
+    ranges = corridor(2.0, 1.8)(pose)
+    way = pose[2] + FIRST_RAD + STEP_RAD * np.arange(BEAMS)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        rib = 1.7 / np.sin(way)
+    at = pose[0] + rib * np.cos(way)
+    return np.where((rib > 0) & (at > from_m) & (at < to_m), rib, ranges)
 
+
+def test_a_pinch_is_the_least_distance_and_lone_hits_are_not() -> None:
     def pinched(pose: Array) -> Array:
-        """Return ranges with a rib 0.3 m out of the left wall at x = 12 to 13, and one false hit in a scan."""
-        ranges = plain(pose)
-        way = pose[2] + FIRST_RAD + STEP_RAD * np.arange(BEAMS)
-        with np.errstate(divide="ignore", invalid="ignore"):
-            rib = 1.7 / np.sin(way)
-        at = pose[0] + rib * np.cos(way)
-        ranges = np.where((rib > 0) & (at > 12.0) & (at < 13.0), rib, ranges)
+        """Return ranges with the rib at x = 12 to 13, and one false hit in a scan."""
+        ranges = _with_rib(pose, 12.0, 13.0)
         if abs(pose[0] - 8.8) < 0.01:
             ranges[20] = 1.4
         return ranges
@@ -130,6 +134,20 @@ def _by_points(radius_m: float, T_rear: Array) -> tuple[float, float]:
                 distances.append(gap[(gap >= 0.0) & (gap < 5.0)].min())
         least.append(float(min(distances)))
     return least[0], least[1]
+
+
+def test_a_frozen_scanner_is_not_carried_along() -> None:
+    """From 1 s on the front scanner repeats a scan with a rib ahead, 0.3 m out of the left wall at x = 4 to 5."""
+    path = WheelPath(signals(9.0, speed=lambda _: 2.0), MACHINE)
+    gauge, fixed = WallGauge(path, MACHINE, START_NS), mounts()
+    for time_s in np.arange(0.0, 8.9, 0.04):
+        at_s = min(time_s, 1.0)
+        sweep = scan("front", at_s, _with_rib(np.array([2.0 * at_s + 0.8, 0.0, 0.0]), 4.0, 5.0))
+        gauge.update(sweep._replace(stamp_ns=ns(time_s)), fixed["front"])
+    left = np.array([(row.time_s, row.left_m) for row in gauge.rows])
+    assert gauge.frozen > 150
+    assert np.nanmin(left[left[:, 0] < 6.0, 1]) == pytest.approx(1.7 - HALF_M, abs=1e-3)
+    assert np.nanmin(left[left[:, 0] > 6.5, 1]) == pytest.approx(2.0 - HALF_M, abs=1e-3)
 
 
 def test_after_a_gap_nothing_is_carried_on() -> None:
