@@ -117,7 +117,6 @@ def _read(request: DriveRequest, drives: list[Drive], rows: list[Row], console: 
         drive = read_drive(request)
     except LhdmapError as error:
         rows.append(failed(str(request.log), request.load, str(error)))
-        console.warn(str(error))
         return
     drives.append(drive)
     rows.append(drive.row)

@@ -99,7 +99,10 @@ def _apart(groups: Sequence[Group]) -> list[Group]:
 
 
 def as_text(rows: Sequence[Row]) -> str:
-    """Return all tables for a terminal."""
+    """Return all tables for a terminal; without a row that could be used, why."""
+    broken = [f"not used: {row.problem}" for row in rows if row.problem]
+    if len(broken) == len(rows):
+        return "\n".join(broken)
     parts = []
     for table in tables(rows):
         widths = [max(map(len, cells)) for cells in zip(table.heads, *table.lines, strict=True)]
@@ -108,7 +111,6 @@ def as_text(rows: Sequence[Row]) -> str:
             lines += [""] if number in table.groups_at and number else []
             lines.append(_aligned(line, widths))
         parts.append("\n".join(line.rstrip() for line in lines))
-    broken = [f"{row.log}: could not be used: {row.problem}" for row in rows if row.problem]
     return "\n\n".join([*parts, "\n".join([*broken, *NOTES])])
 
 

@@ -72,8 +72,8 @@ def corridor(left_m: float, right_m: float, y_m: float = 0.0) -> Callable[[Array
 
 def scan(role: str, time_s: float, ranges: Array) -> LaserScan:
     """Return a scan of the front or the rear scanner; a little of it changes, as in any real one."""
-    ranges = (ranges + 1e-4 * math.sin(30.0 * time_s)).astype(np.float32)
-    return LaserScan(ns(time_s), f"lidar_{role}", FIRST_RAD, STEP_RAD, 0.0, 0.1, 40.0, ranges)
+    stirred = (ranges + 1e-4 * math.sin(30.0 * time_s)).astype(np.float32)
+    return LaserScan(ns(time_s), f"lidar_{role}", FIRST_RAD, STEP_RAD, 0.0, 0.1, 40.0, stirred)
 
 
 def mounts() -> dict[str, Mount]:
