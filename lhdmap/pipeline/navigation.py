@@ -59,7 +59,7 @@ def read_drive(request: DriveRequest) -> Drive:
         InputError: the log cannot be read, or has nothing of a drive in it.
     """
     path, told_load = log_in(request.log)
-    with LogSource(path, request.topics, needs_scanner=False) as source:
+    with LogSource(path, request.topics, force=True, needs_scanner=False) as source:
         lacking = [text for role, text in _WITHOUT.items() if role not in source.roles and role != "mode"]
         if "mode" not in source.roles and not request.operation:
             lacking.append(_WITHOUT["mode"])

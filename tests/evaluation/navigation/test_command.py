@@ -7,10 +7,12 @@ import json
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 from lhdmap.cli.main import main
+from lhdmap.logs.writer import LogWriter
 
-from tests.evaluation.navigation.drives import write_log
+from tests.evaluation.navigation.drives import BEAMS, messages, scan, write_log
 
 FIGURES = {
     "mean_speed_kmh", "max_speed_kmh", "length_s", "navigation_s", "stop_s", "teleoperation_s", "td_net_m",
@@ -128,3 +130,17 @@ def test_a_log_with_scans_alone_is_told(tmp_path: Path, capsys: pytest.CaptureFi
     log = write_log(tmp_path / "scans.mcap", length_s=2.0, topics="fr")
     assert main(["eval", "navigation", str(log)]) == 3
     assert "no tachometer" in capsys.readouterr().err
+
+
+def test_a_dead_scanner_costs_the_walls_alone(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    log = tmp_path / "dead.mcap"
+    with LogWriter(log) as writer:
+        for k, message in enumerate(messages(6.0, lambda t: 2.0 + 0.01 * t, lambda t: 0.01 * t)):
+            writer.write(f"/machine/{('tachometer', 'joints', 'command')[k % 3]}", message)
+            if k % 6 == 0:
+                writer.write("/lidar/front/scan", scan("front", (k // 3) / 50.0, np.full(BEAMS, np.inf)))
+    assert main(["eval", "navigation", str(log), "--json", "--quiet"]) == 0
+    found, said = _json(capsys)
+    assert found["rows"][0]["mean_speed_kmh"] == pytest.approx(7.3, abs=0.05)
+    assert found["rows"][0]["adlw_m"] is None
+    assert "/lidar/front/scan" in said
