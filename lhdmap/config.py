@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from lhdmap.errors import ConfigError
+from lhdmap.executor.settings import ExecutorSettings
 from lhdmap.integration.integrator import IntegrationSettings
 from lhdmap.landmarks.settings import LandmarkSettings
 from lhdmap.localization.settings import LocalizationSettings
@@ -52,6 +53,7 @@ class Settings:
     topology: TopologySettings = field(default_factory=TopologySettings)
     landmarks: LandmarkSettings = field(default_factory=LandmarkSettings)
     localization: LocalizationSettings = field(default_factory=LocalizationSettings)
+    executor: ExecutorSettings = field(default_factory=ExecutorSettings)
     pile: PileSettings = field(default_factory=PileSettings)
     figure9: Figure9Constants = field(default_factory=Figure9Constants)
     figure9_repaired: RepairedConstants = field(default_factory=RepairedConstants)

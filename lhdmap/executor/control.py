@@ -1,0 +1,168 @@
+"""Executor, watchdog, guard and modes as one object: what a machine's computer runs between guidance and the valves."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+
+import numpy as np
+
+from lhdmap.driving.bodies import Bodies
+from lhdmap.driving.model import DriveModel
+from lhdmap.driving.motion import Motion, Setpoints
+from lhdmap.executor.executor import Executor
+from lhdmap.executor.guard import Guard, Swept
+from lhdmap.executor.modes import IDLE, MODES, Modes, operator_setpoints
+from lhdmap.executor.notes import Note, Notes, Stop
+from lhdmap.executor.settings import ExecutorSettings
+from lhdmap.executor.watchdog import Watchdog
+from lhdmap.messages import Command, FloatArray
+
+_GUARD_NS = 50_000_000
+
+
+class Control:
+    """Give it inputs (`watchdog`), points, plans and modes as they come, and call `step` each 10 to 20 ms.
+
+    It begins in `idle`, not armed. Nothing moves before `rearm`, a mode, and a plan made after both.
+    """
+
+    def __init__(
+        self, model: DriveModel, bodies: Bodies, settings: ExecutorSettings, inputs: Mapping[str, float]
+    ) -> None:
+        self.executor = Executor(model, settings)
+        self.watchdog, self.modes = Watchdog(inputs, settings), Modes()
+        self.guard = Guard(model, bodies, settings, period_s=_GUARD_NS * 1e-9)
+        self.swept: Swept | None = None
+        self._settings = settings
+        self._notes, self._blocked = Notes(), False
+        self._points: dict[str, tuple[Motion, FloatArray]] = {}
+        self._looked_ns: int | None = None
+
+    def points(self, name: str, points_m: FloatArray, motion: Motion) -> None:
+        """Take the points (N, 2) of a scanner in `base_link`, and the motion at their stamp; what is not finite goes."""
+        self._points[name] = motion, points_m[np.isfinite(points_m).all(axis=1)]
+
+    def plan(self, source: str, setpoints: Setpoints, made_ns: int, now_ns: int) -> bool:
+        """Take setpoints of `guidance` or `operator`, made of data of `made_ns`; False where they do not count now."""
+        fresh = now_ns - made_ns <= self._settings.age_s * 1e9
+        fits = self.watchdog.armed and fresh and self.modes.takes(source, made_ns)
+        return fits and self.executor.insert(setpoints, now_ns)
+
+    def operate(self, speed_mps: float, steering_rate_rps: float, made_ns: int, now_ns: int) -> bool:
+        """Take an operator's command as a plan."""
+        settings = self._settings
+        plan = operator_setpoints(speed_mps, steering_rate_rps, now_ns, settings.hold_s, settings.age_s)
+        return self.plan("operator", plan, made_ns, now_ns)
+
+    def mode(self, name: str, now_ns: int, cause: str = "") -> bool:
+        """Change the mode; the queue is emptied, so that the machine brakes until a plan comes that was made for it."""
+        before = self.modes.name
+        changed = self.modes.change(name, now_ns, refused=self._unfit(name, now_ns), cause=cause)
+        if changed and name != before:
+            self.executor.clear()
+        return changed
+
+    def emergency(self, cause: str) -> None:
+        """Stop, whatever else is wanted; latched, and not armed any more."""
+        self.executor.stop(cause)
+        self.watchdog.trip((f"emergency stop: {cause}",))
+
+    def release(self, cause: str) -> bool:
+        """Let go of the emergency stop; False where it holds on, since the machine still moves."""
+        return self.executor.release(cause)
+
+    def rearm(self, now_ns: int, mode: str = "") -> tuple[str, ...]:
+        """Arm for a mode (that in force, else `autonomous`); return what stands against it."""
+        if self.executor.emergency:
+            return (f"emergency stop: {self.executor.emergency}",)
+        name = mode or (self.modes.name if self.modes.name != IDLE else "autonomous")
+        reasons = self.watchdog.rearm(now_ns, MODES[name].needs)
+        if not reasons:
+            self.executor.clear()
+            self.modes.renew(now_ns)
+        return reasons
+
+    def step(
+        self, now_ns: int, motion: Motion | None, asked: Stop = Stop.GO, cause: str = "", pull_mps2: float = 0.0
+    ) -> Command:
+        """Return the command of now; the hardest stop of all layers wins, and of `asked`, what navigation wants."""
+        told, why = self.watchdog.check(now_ns, self.modes.mode.needs, standing=self.executor.standing)
+        if not self.watchdog.armed:
+            self.executor.clear()
+        if told > asked:
+            asked, cause = told, why
+        if motion is not None and self._guarded(now_ns, motion, pull_mps2) and asked < Stop.FULL:
+            asked, cause = Stop.FULL, "guard: contact on the braking path"
+        return self.executor.step(now_ns, motion, asked, cause, pull_mps2)
+
+    def take_notes(self) -> list[tuple[str, Note]]:
+        """Return what happened since the last call, each with who says so."""
+        parts = {
+            "watchdog": self.watchdog.notes,
+            "modes": self.modes.notes,
+            "guard": self._notes,
+            "executor": self.executor.notes,
+        }
+        return [(name, note) for name, notes in parts.items() for note in notes.take()]
+
+    def _unfit(self, name: str, now_ns: int) -> tuple[str, ...]:
+        """Return what stands against a mode, but for that the machine moves."""
+        if name not in MODES or name == IDLE:
+            return ()
+        if not self.watchdog.armed:
+            return ("not armed",)
+        needs = MODES[name].needs
+        return tuple(one for one in self.watchdog.refusals(now_ns, needs) if one != "the machine moves")
+
+    def _guarded(self, now_ns: int, motion: Motion, pull_mps2: float) -> bool:
+        """Return whether the guard holds the machine; one that it has stopped goes on from standstill alone."""
+        if self._looked_ns is not None and now_ns - self._looked_ns < _GUARD_NS:
+            return self._blocked
+        self._looked_ns = now_ns
+        wanted = self.executor.queue.at(now_ns)
+        self.swept = self.guard.sweep(
+            motion,
+            self._seen_from(motion),
+            commanded_mps=None if wanted is None else wanted.speed_mps,
+            plan=self._plan_ahead(),
+            pull_mps2=pull_mps2,
+        )
+        blocked = self.swept.contact or (self._blocked and not self.executor.standing)
+        if blocked != self._blocked:
+            before, self._blocked = ("blocked" if self._blocked else "free"), blocked
+            found = self.swept
+            self._notes.add(
+                "guard",
+                before,
+                "blocked" if blocked else "free",
+                "points on the braking path",
+                free_m=found.free_m,
+                stop_m=found.stop_m,
+                at_m=found.at_m,
+                own=found.own,
+            )
+        return blocked
+
+    def _seen_from(self, motion: Motion) -> FloatArray:
+        """Return all points in `base_link` of a motion: the machine has moved since they were seen."""
+        seen = [_moved(points, at, motion) for at, points in self._points.values()]
+        return np.concatenate(seen) if seen else np.zeros((0, 2))
+
+    def _plan_ahead(self) -> FloatArray | None:
+        path = self.executor.keeper.path
+        if path is None:
+            return None
+        ahead: FloatArray = np.column_stack([path.way_m - self.executor.keeper.way_m, path.bend_rad])
+        return ahead
+
+
+def _moved(points: FloatArray, before: Motion, after: Motion) -> FloatArray:
+    """Return points (N, 2) of `base_link` at one motion in that of another."""
+    turn = before.heading_rad - after.heading_rad
+    c, s = math.cos(after.heading_rad), math.sin(after.heading_rad)
+    dx, dy = before.x_m - after.x_m, before.y_m - after.y_m
+    shift = np.array([c * dx + s * dy, c * dy - s * dx])
+    ct, st = math.cos(turn), math.sin(turn)
+    moved: FloatArray = points @ np.array([[ct, st], [-st, ct]]) + shift
+    return moved
