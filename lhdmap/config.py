@@ -11,10 +11,12 @@ from typing import Any
 
 from lhdmap.errors import ConfigError
 from lhdmap.executor.settings import ExecutorSettings
+from lhdmap.guidance.settings import GuidanceSettings
 from lhdmap.integration.integrator import IntegrationSettings
 from lhdmap.landmarks.settings import LandmarkSettings
 from lhdmap.localization.settings import LocalizationSettings
 from lhdmap.movement.settings import MovementSettings
+from lhdmap.navigation.settings import NavigationSettings
 from lhdmap.odometry.cloud_settings import CloudOdometrySettings
 from lhdmap.odometry.settings import AnchorSettings, OdometrySettings, RangeFlowSettings, SearchSettings
 from lhdmap.odometry.trust_settings import TrustSettings
@@ -53,6 +55,8 @@ class Settings:
     topology: TopologySettings = field(default_factory=TopologySettings)
     landmarks: LandmarkSettings = field(default_factory=LandmarkSettings)
     localization: LocalizationSettings = field(default_factory=LocalizationSettings)
+    navigation: NavigationSettings = field(default_factory=NavigationSettings)
+    guidance: GuidanceSettings = field(default_factory=GuidanceSettings)
     executor: ExecutorSettings = field(default_factory=ExecutorSettings)
     pile: PileSettings = field(default_factory=PileSettings)
     figure9: Figure9Constants = field(default_factory=Figure9Constants)

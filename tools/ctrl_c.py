@@ -20,6 +20,7 @@ from pathlib import Path
 from lhdmap.pipeline.build import BuildRequest, build_map
 from lhdmap.topology.geojson import to_geojson
 from tests.cli.logs import write_room_log
+from tests.evaluation.navigation.drives import write_log
 from tests.exports.folders import map_folder
 from tests.topology.maps import ladder
 from tests.update.drives import first_way, mine, second_way, write_drive
@@ -52,6 +53,7 @@ def commands(work: Path) -> dict[str, list[str]]:
         "simulate": ["simulate", "drift", "--length", "4", "-o", "{out}.mcap"],
         "suite": ["simulate", "pile", "--suite", str(work / "s.toml"), "--jobs", "2", "-o", "{out}"],
         "eval": ["eval", "trajectory", str(work / "t.tum"), "--truth", str(work / "t.tum"), "--plot", "{out}.png"],
+        "eval-navigation": ["eval", "navigation", str(write_log(work / "drive.mcap")), "-o", "{out}"],
         "eval-pile": ["eval", "pile", "--truth", str(work / "t.csv")],
         "view": ["view", str(log), "--web", "--port", "9191"],
         "screenshot": ["view", str(log), "--screenshot", "{out}.png"],

@@ -62,7 +62,7 @@ def run(arguments: argparse.Namespace, console: Console) -> int:
     return 0
 
 
-def progress_of(console: Console) -> Any:
+def progress_of(console: Console, label: str = "build-map") -> Any:
     """Return a wrapper that shows progress by the stamps of the messages."""
 
     def wrap(messages: Iterable[Any], duration_s: float) -> Iterable[Any]:
@@ -74,7 +74,7 @@ def progress_of(console: Console) -> Any:
                 start.append(item[1].stamp_ns)
             return float(item[1].stamp_ns - start[0]) * 1e-9
 
-        return console.progress(messages, total=duration_s, label="build-map", position=position)
+        return console.progress(messages, total=duration_s, label=label, position=position)
 
     return wrap
 

@@ -14,6 +14,7 @@ from lhdmap.cli.options import add_common
 
 SUBJECTS = {
     "localization": "where a machine was on a map, against the truth of the drive and of the teaching drive",
+    "navigation": "speeds, times, distances, smoothness and walls of drives, as in Tables 3 and 4 of the navigation paper",
     "pile": "width, inclination and status of piles, as in Table 6 of the autonomous loading paper",
     "rockbreaker": "durations of rockbreaker trajectories, as in Table 3 of the rockbreaker paper",
     "trajectory": "absolute, relative and segment errors of a trajectory, and relations",

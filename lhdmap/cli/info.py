@@ -17,6 +17,7 @@ _WHAT = {
     "suite": "suite of scenes",
     "replay": "replay",
     "localization": "localization",
+    "navigation": "tables of drives",
 }
 
 

@@ -34,7 +34,8 @@ class LogSource:
     After entering, `roles` says which topic plays which role (of all files together), `start_ns` and `end_ns` which log
     times are covered, `survey` what was found in a quick look: sensors that say nothing have lost their roles.
     `warnings` and `damage` fill while reading. `force`: a log that the survey calls unusable is used nevertheless. `survey`: of
-    the same log, where it was opened before: it is not looked through again.
+    the same log, where it was opened before: it is not looked through again. `needs_scanner`: a log without
+    one is refused.
     """
 
     def __init__(
@@ -44,6 +45,7 @@ class LogSource:
         *,
         force: bool = False,
         survey: Survey | None = None,
+        needs_scanner: bool = True,
     ) -> None:
         listed = [paths] if isinstance(paths, (str, Path)) else list(paths)
         if not listed:
@@ -52,6 +54,7 @@ class LogSource:
         self.roles: dict[str, str] = {}
         self._overrides = dict(overrides or {})
         self._force = force
+        self._needs_scanner = needs_scanner
         self._known = survey
         self.survey = Survey()
         self._readers: list[LogReader] = []
@@ -62,7 +65,7 @@ class LogSource:
         with ExitStack() as stack:
             self._readers = [stack.enter_context(open_log(path)) for path in self.paths]
             self.roles = self._assigned()
-            if "front" not in self.roles and "points" not in self.roles:
+            if self._needs_scanner and "front" not in self.roles and "points" not in self.roles:
                 raise InputError(f"{self._names()}: {missing_scanner(self.topics(), self.roles.get('rear'))}")
             for reader in self._readers:
                 reader.truth_topics = frozenset({self.roles.get("ground_truth", "")})

@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 import time
 from collections import deque
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from types import TracebackType
@@ -61,6 +62,21 @@ class Where(NamedTuple):
     covariance: FloatArray | None
 
 
+class Fix(NamedTuple):
+    """The place at the newest scan in both frames (3,), covariance (3, 3) of x, y, heading in `map`, the floor's height."""
+
+    stamp_ns: int
+    status: str
+    pose_map: FloatArray
+    pose_odom: FloatArray
+    covariance: FloatArray
+    height_m: float
+
+
+Listener = Callable[[int, OdometryStep, PlanarOdometry], None]
+"""Told of each front scan: stamp, step, odometry."""
+
+
 @dataclass(slots=True)
 class _Trial:
     """A place under trial: since where on the way, and the support since."""
@@ -77,7 +93,12 @@ class Localizer:
     """
 
     def __init__(
-        self, known: KnownMap, settings: Settings, machine: Machine | None = None, start: FloatArray | None = None
+        self,
+        known: KnownMap,
+        settings: Settings,
+        machine: Machine | None = None,
+        start: FloatArray | None = None,
+        listener: Listener | None = None,
     ) -> None:
         # What lies beyond the map does not count: no loop is closed, no pile looked for.
         settings = replace(settings, pile=replace(settings.pile, method="off"))
@@ -92,6 +113,7 @@ class Localizer:
         self._trial: _Trial | None = None
         self._supports: deque[float] = deque(maxlen=self._settings.support_scans)
         self._before: FloatArray | None = None
+        self._listener = listener
         self._travelled_m = self._searched_m = 0.0
         self._probability = 0.0 if start is None else 1.0
         self._information = 0.0
@@ -126,6 +148,15 @@ class Localizer:
         pose = se2.compose(tracker.pose, se2.between(self._before, planar))
         return Where(self._status, np.array([pose[0], pose[1], tracker.height_m, pose[2]]), tracker.P)
 
+    @property
+    def fix(self) -> Fix | None:
+        """The newest place, whatever its status; None where there is none."""
+        if self._tracker is None or self._before is None or not self.rows:
+            return None
+        stamp_ns, status = self.rows[-1].stamp_ns, self._status
+        pose, height = self._tracker.pose.copy(), self._tracker.height_m
+        return Fix(stamp_ns, status, pose, self._before.copy(), self._tracker.P.copy(), height)
+
     def _started(self, start: FloatArray) -> Tracker:
         std = np.array([self._settings.start_std_m] * 2 + [math.radians(self._settings.start_std_deg)])
         height = float(start[3]) if len(start) > 3 else 0.0
@@ -149,6 +180,8 @@ class Localizer:
             self._judge(stamp_ns)
             self._look_around(step)
         self.rows.append(self._row(stamp_ns, step, source, 1e3 * (time.perf_counter() - began)))
+        if self._listener is not None:
+            self._listener(stamp_ns, step, odometry)
 
     def _hits(self, odometry: PlanarOdometry) -> tuple[FloatArray, int]:
         """Return hits (N, 2) of both scanners near the machine, thinned, and how many are the front one's."""

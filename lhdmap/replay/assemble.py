@@ -3,28 +3,41 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from pathlib import Path
 from typing import NamedTuple
 
+from lhdmap.config import Settings
+from lhdmap.driving.bodies import bodies_of
+from lhdmap.driving.model import drive_model
 from lhdmap.errors import ConfigError, UsageError
+from lhdmap.executor.control import Control
+from lhdmap.guidance.planner import GaussNewton, Guidance
+from lhdmap.movement.routes import RoutePlanner
+from lhdmap.navigation.control import NavigationControl
 from lhdmap.replay.engine import Engine, overrun_targets
 from lhdmap.replay.faults import Faults
 from lhdmap.replay.journal import Journal
 from lhdmap.replay.link import Link
-from lhdmap.replay.parts import Parts
+from lhdmap.replay.parts import Autonomous, Parts
 from lhdmap.replay.process import MACHINE, STATION, Process
 from lhdmap.replay.processes.driver import Driver
+from lhdmap.replay.processes.execute import EXECUTOR, PERIODS_S, Execute
 from lhdmap.replay.processes.film import Film
+from lhdmap.replay.processes.guide import GUIDANCE, Guide
+from lhdmap.replay.processes.locating import Locating
 from lhdmap.replay.processes.monitor import Monitor
-from lhdmap.replay.processes.perception import Perception
+from lhdmap.replay.processes.navigator import NAVIGATION, Navigator
+from lhdmap.replay.processes.perception import PERCEPTION, Perception
 from lhdmap.replay.processes.plant import Plant
 from lhdmap.replay.processes.recorder import Recorder
+from lhdmap.replay.processes.station import Station
 from lhdmap.replay.scenario import TELEOPERATOR, Scenario
 from lhdmap.replay.verdict import Tally
 from lhdmap.settings import nearest
 
 
-def parts_of(scenario: Scenario) -> Parts:
-    """Return world, machine, sensors and operator of a scenario.
+def parts_of(scenario: Scenario, folder: Path, settings: Settings | None = None) -> Parts:
+    """Return world, machine, sensors and operator of a scenario; a map that is to be made goes into `folder`.
 
     Raises:
         UsageError: there is no such place or route, or this version does not replay the kind.
@@ -32,12 +45,10 @@ def parts_of(scenario: Scenario) -> Parts:
     """
     if scenario.kind != "tram" or scenario.mission:
         what = f"kind = '{scenario.kind}'" + (" with a mission" if scenario.mission else "")
-        raise UsageError(
-            f"{what}: this version replays kind = 'tram', to a goal or along a route that an operator drives"
-        )
+        raise UsageError(f"{what}: this version replays kind = 'tram', to a goal or along a route")
     from lhdmap.replay.mine_parts import mine_parts  # what a mine needs takes a second to load
 
-    return mine_parts(scenario)
+    return mine_parts(scenario, folder, settings or Settings())
 
 
 class Watchers(NamedTuple):
@@ -69,9 +80,11 @@ def assemble(
     link = Link(scenario.link, faults, scenario.seed)
     monitor = Monitor(Tally(scenario.kind, scenario.limits, parts.goal_m), journal.of(Monitor.name))
     processes: list[Process] = [Plant(parts, faults, link, journal.of(Plant.name), scenario.seed)]
-    if scenario.perception:
+    if parts.autonomous is not None:
+        processes += _autonomous(scenario, parts, parts.autonomous, journal)
+    elif scenario.perception:
         processes.append(Perception(parts.settings, parts.machine, journal.of(Perception.name)))
-    site = STATION if scenario.driver == TELEOPERATOR else MACHINE
+    site = STATION if scenario.who == TELEOPERATOR else MACHINE
     if parts.operator is not None:
         processes.append(Driver(parts.operator, journal.of(Driver.name), site=site))
     processes += [*watchers.more, watchers.film, monitor]
@@ -79,6 +92,29 @@ def assemble(
     _check(scenario, parts, processes)
     engine = Engine(processes, journal, faults=faults, link=link, withhold_truth=withhold_truth)
     return Run(engine, monitor, faults, link)
+
+
+def _autonomous(scenario: Scenario, parts: Parts, given: Autonomous, journal: Journal) -> list[Process]:
+    """Return what drives the machine: perception on the map, navigation, guidance, executor, and the station that arms it."""
+    machine, settings = parts.machine, parts.settings
+    model, bodies = drive_model(machine, 1000.0 * scenario.load), bodies_of(machine)
+    navigation = NavigationControl(
+        RoutePlanner(given.known.topology, settings.movement, loaded=given.errand.loaded),
+        model,
+        bodies,
+        settings.navigation,
+        journal.of(NAVIGATION).goes,
+    )
+    eyes_m = {1: machine.mounts["lidar_front"].position_m[0], -1: -machine.mounts["lidar_rear"].position_m[0]}
+    guidance = Guidance(model, bodies, eyes_m, settings.guidance, GaussNewton(settings.guidance))
+    control = Control(model, bodies, settings.executor, PERIODS_S)
+    return [
+        Locating(given.known, settings, machine, given.start, journal.of(PERCEPTION)),
+        Navigator(navigation, given.errand, journal.of(NAVIGATION)),
+        Guide(guidance, journal.of(GUIDANCE)),
+        Execute(control, machine, given.mode, journal.of(EXECUTOR)),
+        Station("autonomous", scenario.rearm_s, journal.of(Station.name)),
+    ]
 
 
 def _check(scenario: Scenario, parts: Parts, processes: Sequence[Process]) -> None:

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
+from lhdmap.config import Settings
 from lhdmap.machine import Machine, load_machine
 from lhdmap.messages import FloatArray
 from lhdmap.mine.network import Network, make_network
@@ -17,14 +18,14 @@ from lhdmap.mine.stands import place_pose
 from lhdmap.mine.topology import Directory
 from lhdmap.replay.faults import Position
 from lhdmap.replay.parts import Parts, Touch
-from lhdmap.replay.scenario import TELEOPERATOR, Scenario
+from lhdmap.replay.scenario import AUTONOMOUS, OPERATOR, TELEOPERATOR, Scenario
+from lhdmap.replay.teaching import autonomous_of
 from lhdmap.simulation.history import START_NS
 from lhdmap.simulation.mine_drive import node_of, planned
 from lhdmap.simulation.mine_world.bumper import Bumper
 from lhdmap.simulation.mine_world.world import MineWorld
 from lhdmap.simulation.operator import Operator, OperatorSettings
 from lhdmap.simulation.sensing.sections import SensorSettings
-from lhdmap.simulation.sensing.sensor import Sensor
 from lhdmap.simulation.sensing.suite import sensors_of
 from lhdmap.simulation.vehicle.shaking import VIBRATION_DEG, Shaking
 from lhdmap.simulation.vehicle.state import VehicleState
@@ -33,6 +34,7 @@ from lhdmap.simulation.vehicle.vehicle import Vehicle
 _DRAWN_M = 1.0
 _KG = 1000.0  # of a tonne
 _SLOWER = 1.4  # a drive with its bends and rests takes so much longer than its way at full speed
+TOLD = {OPERATOR: "manual", TELEOPERATOR: "teleoperated"}
 _LEAST_CLEAR_M = 1.0  # what is farther is not measured
 
 
@@ -52,18 +54,21 @@ class BodyBumper:
         return self._bumper.clearance_m(state, _LEAST_CLEAR_M)
 
 
-def mine_parts(scenario: Scenario) -> Parts:
-    """Return the parts of a drive by hand.
+def mine_parts(scenario: Scenario, folder: Path, settings: Settings) -> Parts:
+    """Return the parts of a drive in a mine; a map that is wanted and not there is made, in `folder` where none is named.
 
     Raises:
         ConfigError: there is no such mine.
-        UsageError: the route or the start is not in it.
+        UsageError: the route, the start or the goal is not in it.
     """
     machine = load_machine(Path(scenario.machine) if scenario.machine else None)
     network = make_network(load_plan(find_plan(scenario.mine)))
     start = start_of(network, machine, scenario.start or None)
-    settings = OperatorSettings(speed_kmh=scenario.speed_kmh, wander_m=scenario.wander_m)
-    legs = planned(network, machine, start, scenario.route or scenario.goal, settings, scenario.seed)
+    drives_itself = scenario.who == AUTONOMOUS
+    operating = OperatorSettings(speed_kmh=scenario.speed_kmh, wander_m=scenario.wander_m)
+    legs = planned(network, machine, start, scenario.route or scenario.goal, operating, scenario.seed)
+    autonomous = autonomous_of(scenario, network, machine, folder, settings) if drives_itself else None
+    told = _mode_of(TOLD[scenario.who]) if autonomous is None else autonomous.mode
     world = MineWorld(network, machine)
     vehicle = Vehicle(machine, world, seed=scenario.seed)
     places = _places(network, machine)
@@ -73,8 +78,8 @@ def mine_parts(scenario: Scenario) -> Parts:
         world=world,
         vehicle=vehicle,
         start=_state(vehicle, network.tubes[start.tube].pose(start.at_m, start.facing), scenario),
-        sensors=_sensors(scenario, machine, network),
-        operator=Operator(legs, machine, settings, seed=scenario.seed),
+        sensors=sensors_of(machine, SensorSettings(), seed=scenario.seed, mode=told, node=node_of(Directory(network))),
+        operator=None if drives_itself else Operator(legs, machine, operating, seed=scenario.seed),
         bumper=BodyBumper(machine, world),
         shaking=Shaking(math.radians(VIBRATION_DEG), scenario.seed),
         changing=world,
@@ -82,17 +87,14 @@ def mine_parts(scenario: Scenario) -> Parts:
         goal_m=places.get(scenario.goal),
         lines_m=_walls(network),
         expected_s=_SLOWER * way_m / (scenario.speed_kmh / 3.6) + 10.0,
+        settings=settings,
+        autonomous=autonomous,
     )
 
 
 def _state(vehicle: Vehicle, pose: FloatArray, scenario: Scenario) -> VehicleState:
     x, y, z, yaw = pose.tolist()
     return vehicle.at_rest(x, y, yaw, near_z_m=z, time_ns=START_NS, load_kg=_KG * scenario.load)
-
-
-def _sensors(scenario: Scenario, machine: Machine, network: Network) -> list[Sensor]:
-    mode = _mode_of("teleoperated" if scenario.driver == TELEOPERATOR else "manual")
-    return sensors_of(machine, SensorSettings(), seed=scenario.seed, mode=mode, node=node_of(Directory(network)))
 
 
 def _mode_of(mode: str) -> Callable[[int, FloatArray], str]:

@@ -10,7 +10,10 @@ from typing import Any, NamedTuple, Protocol
 from lhdmap.config import Settings
 from lhdmap.machine import Machine
 from lhdmap.messages import Command, FloatArray
+from lhdmap.pipeline.localize import KnownMap
 from lhdmap.replay.faults import Position
+from lhdmap.replay.processes.navigator import Errand
+from lhdmap.replay.processes.told import ModeNow
 from lhdmap.simulation.drift import Mesh
 from lhdmap.simulation.sensing.sensor import Sensor
 from lhdmap.simulation.surroundings import View
@@ -104,6 +107,15 @@ class Changing(Protocol):
         ...
 
 
+class Autonomous(NamedTuple):
+    """The map, about where on it the machine stands at first (4,: x, y, yaw, z), its errand, and the mode that the log tells."""
+
+    known: KnownMap
+    start: FloatArray | None
+    errand: Errand
+    mode: ModeNow
+
+
 @dataclass(frozen=True, slots=True)
 class Parts:
     """All that is simulated, and what is known of it beforehand.
@@ -122,7 +134,8 @@ class Parts:
         lines_m: walls or centre lines (N, 3) to draw.
         expected_s: about how long it will take.
         shaking: vibration that the sensors feel.
-        settings: of the perception.
+        settings: of perception and control.
+        autonomous: what a machine that drives itself is given; None: nobody does, or the operator.
     """
 
     machine: Machine
@@ -139,3 +152,4 @@ class Parts:
     expected_s: float | None = None
     shaking: Shaking | None = None
     settings: Settings = field(default_factory=Settings)
+    autonomous: Autonomous | None = None

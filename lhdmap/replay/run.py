@@ -68,7 +68,7 @@ def replay(request: ReplayRequest, parts: Parts | None = None) -> ReplayResult:
     """
     interruption = Interruption()
     with RunFolderWriter(KIND, request.target, force=request.force, inputs=request.sources) as folder:
-        made = parts_of(request.scenario) if parts is None else parts
+        made = parts_of(request.scenario, folder.path) if parts is None else parts
         with interruption.comes_first():
             verdict = _Replay(request, made, folder).run(interruption)
         path = folder.complete(_info(request, verdict))

@@ -16,7 +16,7 @@ from lhdmap.settings_tree import load_tree, part, tree_toml
 from lhdmap.simulation.sensing.faults import FaultSettings
 
 KINDS = ("tram", "loading", "mission", "haulage", "grizzly")
-OPERATOR, TELEOPERATOR = "operator", "teleoperator"
+AUTONOMOUS, OPERATOR, TELEOPERATOR = "autonomous", "operator", "teleoperator"
 FOLDER = "pipelines/scenarios"
 _NO_MEASUREMENTS = ("/tf_static", "/ground_truth/odometry")
 
@@ -56,15 +56,23 @@ class Scenario:
     goal: str = setting("", doc="Place to drive to.")
     load: float = setting(0.0, unit="t", minimum=0.0, maximum=100.0, doc="What is in the bucket at the start.")
     driver: str = setting(
-        OPERATOR,
-        choices=(OPERATOR, TELEOPERATOR),
-        doc="Who drives: a scripted operator who sees the truth, in the cabin, or at the station behind the link.",
+        "",
+        choices=("", AUTONOMOUS, OPERATOR, TELEOPERATOR),
+        doc="Who drives: lhdmap itself (autonomous), or a scripted operator who sees the truth, in the cabin (operator) or at the "
+        "station behind the link (teleoperator). Empty: autonomous to a goal, the operator along a route.",
     )
     route: str = setting("", doc="Drifts and places in order, - for reverse gear: T1,T2,-T3,DP1; empty: all drifts.")
     speed_kmh: float = setting(10.0, unit="km/h", minimum=0.5, maximum=40.0, doc="The operator's speed on straights.")
     wander_m: float = setting(0.0, unit="m", minimum=0.0, maximum=1.0, doc="The operator's lateral wandering, rms.")
     perception: bool = setting(True, doc="Whether odometry runs on what the sensors say.")
     mission: tuple[Errand, ...] = part(tuple)
+    rearm_s: float = setting(
+        5.0,
+        unit="s",
+        minimum=0.0,
+        maximum=3600.0,
+        doc="How long the station looks at a stop before it arms the machine again.",
+    )
     limits: Limits = part(Limits)
     link: LinkSettings = part(LinkSettings)
     faults: tuple[FaultSettings, ...] = part(tuple, key="fault")
@@ -73,6 +81,8 @@ class Scenario:
         """Check what a key alone cannot; raises ConfigError."""
         if self.goal and self.mission:
             raise ConfigError(f"goal = '{self.goal}' and mission: one of them was wanted")
+        if self.driver == AUTONOMOUS and not self.goal:
+            raise ConfigError("driver = 'autonomous': a goal was wanted")
         if self.goal and self.route:
             raise ConfigError(f"goal = '{self.goal}' and route = '{self.route}': one of them was wanted")
         for number, fault in enumerate(self.faults, start=1):
@@ -80,6 +90,11 @@ class Scenario:
                 _check_target(fault)
             except ConfigError as error:
                 raise ConfigError(f"[[fault]] {number}: {error}") from error
+
+    @property
+    def who(self) -> str:
+        """Who drives."""
+        return self.driver or (AUTONOMOUS if self.goal else OPERATOR)
 
 
 def _check_target(fault: FaultSettings) -> None:
@@ -142,7 +157,9 @@ def load_scenario(path: Path, **over: Any) -> Scenario:
 def _beside(path: Path, name: str, *, folder: bool = False) -> str:
     """Return a name, or the path of the file (or folder) that is beside the scenario under it."""
     there = path.parent / name
-    return str(there) if name and (there.is_dir() if folder else there.is_file()) else name
+    if folder:  # one that is not there yet is built beside the scenario
+        return str(there) if name and not Path(name).is_dir() else name
+    return str(there) if name and there.is_file() else name
 
 
 def scenario_toml(scenario: Scenario) -> str:

@@ -1,0 +1,123 @@
+"""How fast: the least of what limits, clearance, bends, steering and sight allow along the predicted way, with limited jerk."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numba as nb
+import numpy as np
+
+from lhdmap.driving.model import DriveModel
+from lhdmap.guidance.directive import SPEED, Directive
+from lhdmap.guidance.field import Field, distance
+from lhdmap.guidance.settings import GuidanceSettings
+from lhdmap.guidance.solver import Solution
+from lhdmap.messages import FloatArray
+
+_FREE_M, _BESIDE_M, _NARROW_M, _STOP_M = 0.5, 0.2, 0.05, -0.02
+_STEERING_SHARE = 0.85
+_CREEP_MPS = 0.3
+_SIGHT_STEP_M, _SIGHT_CLEAR_M = 0.5, 0.10
+
+
+class Speeds(NamedTuple):
+    """Speeds (K + 1,) at the ends of the stages, m/s, how far is seen, and what limits the first metres."""
+
+    speed_mps: FloatArray
+    sight_m: float
+    by: str
+
+
+def speeds_of(
+    solution: Solution,
+    predicted: FloatArray,
+    start: tuple[float, float],
+    directive: Directive,
+    sight_m: float,
+    model: DriveModel,
+    settings: GuidanceSettings,
+) -> Speeds:
+    """Return the speeds along a solution, from a speed and an acceleration at its start."""
+    caps = _caps(solution, predicted, directive, model, settings)
+    way = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(solution.states[:, :2], axis=0).T))])
+    at = directive.path[solution.at, 5]
+    left_m = np.maximum(directive.stop_m - at, 0.0)
+    braking, full = settings.brake_mps2, settings.sight_brake_share * model.brake_mps2
+    caps["stop"] = np.sqrt(2.0 * braking * left_m)
+    caps["sight"] = np.maximum(_stop_within(np.maximum(sight_m - way, 0.0), full, model), 0.3 * (sight_m > way))
+    names = list(caps)
+    table = np.stack([caps[name] for name in names])
+    cap = table.min(axis=0)
+    for k in range(len(cap) - 2, -1, -1):
+        cap[k] = min(cap[k], math.sqrt(cap[k + 1] ** 2 + 2.0 * braking * (way[k + 1] - way[k])))
+    speed = _forward(cap, start, settings, model)
+    return Speeds(speed, sight_m, names[int(table[:, : max(len(cap) // 3, 1)].min(axis=1).argmin())])
+
+
+def _caps(
+    solution: Solution, predicted: FloatArray, directive: Directive, model: DriveModel, settings: GuidanceSettings
+) -> dict[str, FloatArray]:
+    """Return what each limit allows at each state (K + 1,); `predicted` (K,): the speeds that the solution was found with."""
+    top = float(model.top_speed_mps)
+    at = solution.at
+    clear = solution.clearance_m
+    beside = np.interp(
+        clear, [_STOP_M, _NARROW_M, _BESIDE_M, _FREE_M], [0.0, settings.narrow_mps, settings.beside_mps, top]
+    )
+    bend, rate = solution.states[:, 3], np.append(solution.rates, solution.rates[-1])
+    curvature = np.abs(np.sin(bend)) / (model.front_m * np.cos(bend) + model.rear_m)
+    planned = math.radians(settings.rate_dps)
+    with np.errstate(divide="ignore"):
+        lateral = np.sqrt(settings.lateral_mps2 / np.maximum(curvature, 1e-6))
+    reachable = _STEERING_SHARE * planned / np.maximum(np.abs(rate), 1e-6)
+    return {
+        "limit": directive.path[at, SPEED],
+        "clearance": beside,
+        "bend": lateral,
+        "steering": np.maximum(np.append(predicted, predicted[-1]) * reachable, _CREEP_MPS),
+    }
+
+
+def _stop_within(way_m: FloatArray, brake_mps2: float, model: DriveModel) -> FloatArray:
+    """Return the highest speed from which the machine stops within a way, dead time and ramp included."""
+    blind = model.dead_time_s + 0.5 * model.brake_ramp_s
+    speed: FloatArray = brake_mps2 * (np.sqrt(blind**2 + 2.0 * way_m / brake_mps2) - blind)
+    return speed
+
+
+def _forward(cap: FloatArray, start: tuple[float, float], settings: GuidanceSettings, model: DriveModel) -> FloatArray:
+    """Return speeds under caps (K + 1,): quick to slow down, slow to speed up."""
+    step = settings.stage_s
+    speed, rise = np.empty(len(cap)), min(max(start[1], 0.0), settings.accelerate_mps2)
+    speed[0] = start[0]
+    for k in range(1, len(cap)):
+        rise = min(rise + settings.jerk_mps3 * step, settings.accelerate_mps2)
+        wanted = min(cap[k], speed[k - 1] + rise * step)
+        speed[k] = max(wanted, speed[k - 1] - model.deceleration_mps2 * step, 0.0)
+        rise = min(rise, max((speed[k] - speed[k - 1]) / step, 0.0))
+    return speed
+
+
+@nb.njit(cache=True, nogil=True)
+def _seen_m(x: float, y: float, path: FloatArray, first: int, field: Field) -> float:
+    """Return how far along a path from its point `first` a straight look from (x, y) reaches."""
+    seen = 0.0
+    start = path[first, 5]
+    for n in range(first, len(path), 2):
+        dx, dy = path[n, 0] - x, path[n, 1] - y
+        far = math.sqrt(dx * dx + dy * dy)
+        gone = 0.5
+        while gone < far:
+            free, which = distance(x + gone * dx / far, y + gone * dy / far, field)
+            if which >= 0 and free < _SIGHT_CLEAR_M:
+                return seen
+            gone += max(free, 0.2)
+        seen = path[n, 5] - start
+    return seen
+
+
+def sight_m(eye: tuple[float, float], directive: Directive, first: int, field: Field, nose_m: float) -> float:
+    """Return how far before the nose the path is seen from an eye (x, y), along it from its point `first`."""
+    seen = _seen_m(eye[0], eye[1], directive.path, first, field)
+    return max(seen - nose_m, 0.0)

@@ -1,0 +1,136 @@
+"""Command executor, watchdog and guard as a process: the last one before the machine."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from lhdmap.driving.motion import Motion
+from lhdmap.executor.control import Control
+from lhdmap.executor.notes import Stop
+from lhdmap.executor.watchdog import GUIDANCE, LINK, MOTION, OPERATOR, SCAN_FRONT, SCAN_REAR
+from lhdmap.integration.beams import scan_points
+from lhdmap.kinematics import T_base_rear
+from lhdmap.machine import Machine
+from lhdmap.messages import FloatArray, LaserScan
+from lhdmap.replay.journal import Scribe
+from lhdmap.replay.process import (
+    DIRECTIVE,
+    MACHINE_SAYS,
+    MILLISECOND_NS,
+    PLAN,
+    POSE,
+    SEEN,
+    STATION_SAYS,
+    Outgoing,
+    Process,
+    Received,
+)
+from lhdmap.replay.processes.feed import MOTION_TOPICS, MotionFeed
+from lhdmap.replay.processes.told import Asked, Health, Idle, ModeNow, Word
+from lhdmap.roles import ROLES
+
+EXECUTOR = "executor"
+PERIODS_S = {MOTION: 0.02, SCAN_FRONT: 0.04, SCAN_REAR: 0.04, "pose": 0.2, GUIDANCE: 0.05, OPERATOR: 0.1, LINK: 0.1}
+"""Inputs of the watchdog and their periods; the pose of a scan is later than the scan: it waits for the inclinometer's filter."""
+_FRONT, _REAR = ROLES["front"].topic, ROLES["rear"].topic
+_COMMAND = ROLES["command"].topic
+_TELLS_NS = 200 * MILLISECOND_NS
+_GUARD_RANGE_M = 20.0
+
+
+class Execute(Process):
+    """A command each 20 ms."""
+
+    name, period_ns, priority = EXECUTOR, 20 * MILLISECOND_NS, 40
+    reads = (*MOTION_TOPICS, _FRONT, _REAR, SEEN, PLAN, DIRECTIVE, STATION_SAYS)
+
+    def __init__(self, control: Control, machine: Machine, mode: ModeNow, scribe: Scribe) -> None:
+        self.control, self._machine, self._mode, self._scribe = control, machine, mode, scribe
+        self._feed = MotionFeed()
+        self._wanted = Stop.GO
+        self._told_ns = 0
+        self._pull_mps2 = 0.0
+
+    def step(self, now_ns: int, inbox: Sequence[Received]) -> Iterator[Outgoing]:
+        """Take what has come; give the command of now."""
+        for received in inbox:
+            self._take(received, now_ns)
+        command = self.control.step(now_ns, self._feed.motion, self._wanted, "navigation", self._pull_mps2)
+        for who, note in self.control.take_notes():
+            self._scribe.event(
+                f"{who}: {note.event}", note.cause, before=note.before, after=note.after, **dict(note.values)
+            )
+        self._scribe.goes(self.control.executor.state, self.control.modes.name)
+        self._mode.text = self.control.modes.name
+        yield Outgoing(_COMMAND, command)
+        if now_ns - self._told_ns >= _TELLS_NS:
+            self._told_ns = now_ns
+            yield Outgoing(MACHINE_SAYS, self._health(now_ns))
+
+    def _take(self, received: Received, now_ns: int) -> None:
+        topic, _, message = received
+        watchdog = self.control.watchdog
+        if topic in (_FRONT, _REAR):
+            self._scan(message, now_ns, front=topic == _FRONT)
+        elif topic == PLAN:
+            watchdog.saw(GUIDANCE, message.stamp_ns, now_ns)
+            if not isinstance(message, Idle):
+                self.control.plan("guidance", message.setpoints, message.stamp_ns, now_ns)
+        elif topic == SEEN:
+            watchdog.disagreement(message.stamp_ns, now_ns, message.apart_m, message.apart_rad)
+        elif topic == DIRECTIVE:
+            self._ask(message)
+        elif topic == STATION_SAYS:
+            self._obey(message, now_ns)
+        else:
+            self._feed.take(received)
+            if self._feed.heard_ns is not None:
+                watchdog.saw(MOTION, self._feed.heard_ns, now_ns)
+            if topic == POSE:
+                self._pull_mps2 = 9.81 * float(-message.T_odom_base[2, 0])
+
+    def _ask(self, asked: Asked) -> None:
+        self._wanted = Stop.SERVICE if asked.directive is None else Stop.GO
+
+    def _scan(self, scan: LaserScan, now_ns: int, *, front: bool) -> None:
+        points, _ = scan_points(scan)
+        content = hash(scan.ranges_m.tobytes())
+        name = SCAN_FRONT if front else SCAN_REAR
+        if len(points) == 0 or not self.control.watchdog.saw(name, scan.stamp_ns, now_ns, content=content):
+            return
+        motion = self._feed.motion
+        if motion is not None:
+            self.control.points(name, self._in_base(points, motion, front=front), motion)
+
+    def _in_base(self, points: FloatArray, motion: Motion, *, front: bool) -> FloatArray:
+        """Return points (M, 2) of a scanner in `base_link`, as its mount on the file has it."""
+        mount = self._machine.mounts["lidar_front" if front else "lidar_rear"]
+        T = mount.T_parent_sensor
+        if mount.parent == "rear_link":
+            T = T_base_rear(motion.articulation_rad, self._machine) @ T
+        placed = points @ T[:3, :3].T + T[:3, 3]
+        near = (np.hypot(placed[:, 0], placed[:, 1]) < _GUARD_RANGE_M) & (placed[:, 2] > 0.3)
+        kept: FloatArray = placed[near, :2]
+        return kept
+
+    def _obey(self, word: Word, now_ns: int) -> None:
+        control = self.control
+        control.watchdog.saw(LINK, word.stamp_ns, now_ns)
+        control.watchdog.saw(OPERATOR, word.stamp_ns, now_ns)
+        if word.emergency:
+            control.emergency(word.emergency)
+        if word.release:
+            control.release("station")
+        if word.rearm:
+            control.rearm(now_ns, word.mode)
+        if word.mode:
+            control.mode(word.mode, now_ns, "station")
+        if word.speed_mps is not None:
+            control.operate(word.speed_mps, word.steering_rate_rps, word.stamp_ns, now_ns)
+
+    def _health(self, now_ns: int) -> Health:
+        control = self.control
+        watchdog = control.watchdog
+        return Health(now_ns, watchdog.armed, control.modes.name, control.executor.standing, watchdog.causes)

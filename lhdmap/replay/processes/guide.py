@@ -1,0 +1,69 @@
+"""Guidance as a process."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Iterator, Sequence
+
+from lhdmap.driving.motion import Setpoint
+from lhdmap.guidance.local_walls import LocalWalls
+from lhdmap.guidance.planner import Guidance
+from lhdmap.messages import Command
+from lhdmap.replay.journal import Scribe
+from lhdmap.replay.process import DIRECTIVE, MILLISECOND_NS, PLAN, SEEN, Outgoing, Process, Received
+from lhdmap.replay.processes.feed import MOTION_TOPICS, MotionFeed
+from lhdmap.replay.processes.told import Asked, Idle
+from lhdmap.roles import ROLES
+
+GUIDANCE = "guidance"
+_COMMAND = ROLES["command"].topic
+_ASKED_NS = 500 * MILLISECOND_NS
+
+
+class Guide(Process):
+    """A plan each 50 ms while there is a fresh directive; its journal has what limits the speed."""
+
+    name, period_ns, latency_ns, priority = GUIDANCE, 50 * MILLISECOND_NS, 10 * MILLISECOND_NS, 30
+    reads = (*MOTION_TOPICS, SEEN, DIRECTIVE, _COMMAND)
+
+    def __init__(self, guidance: Guidance, scribe: Scribe) -> None:
+        self._guidance, self._scribe = guidance, scribe
+        self._feed, self._walls = MotionFeed(), LocalWalls(guidance.settings.memory_m)
+        self._sent: deque[Setpoint] = deque(maxlen=100)
+        self._asked: Asked | None = None
+        self._seen_ns: int | None = None
+        scribe.goes("waiting", "no directive")
+
+    def step(self, now_ns: int, inbox: Sequence[Received]) -> Iterator[Outgoing]:
+        """Take what has come and plan."""
+        for received in inbox:
+            self._take(received)
+        motion, asked = self._feed.motion, self._asked
+        if motion is None or asked is None or self._seen_ns is None or asked.directive is None:
+            self._guidance.forget()
+            self._scribe.goes("waiting", "no directive" if asked is None else asked.cause)
+            yield Outgoing(PLAN, Idle(now_ns))
+            return
+        if now_ns - asked.stamp_ns > _ASKED_NS:
+            self._scribe.goes("waiting", "directive too old")
+            return
+        plan = self._guidance.plan(now_ns, motion, tuple(self._sent), self._walls.points(), asked.directive)
+        gear = "forward" if plan.gear > 0 else "reverse"
+        self._scribe.goes(gear, "directive", clearance_m=round(plan.clearance_m, 3), by=plan.speeds.by)
+        yield Outgoing(PLAN, plan)
+
+    def _take(self, received: Received) -> None:
+        topic, _, message = received
+        if topic == SEEN:
+            self._walls.add(message.pose_odom, message.points_m)
+            self._seen_ns = message.stamp_ns
+        elif topic == DIRECTIVE:
+            self._asked = message
+        elif topic == _COMMAND:
+            self._sent.append(self._as_setpoint(message, received.sent_ns))
+        else:
+            self._feed.take(received)
+
+    def _as_setpoint(self, command: Command, sent_ns: int) -> Setpoint:
+        speed = 0.0 if command.brake else command.propel * self._guidance.model.top_speed_mps
+        return Setpoint(sent_ns, speed, command.steering_rate_rps)

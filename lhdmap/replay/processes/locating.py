@@ -1,0 +1,82 @@
+"""Perception on a map as a process: odometry and localization in one, fed with what comes over the bus and nothing else."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from lhdmap.config import Settings
+from lhdmap.machine import Machine
+from lhdmap.messages import FloatArray
+from lhdmap.navigation.control import Located
+from lhdmap.odometry.planar import PlanarOdometry
+from lhdmap.odometry.steps import OdometryStep
+from lhdmap.pipeline.localize import KnownMap, Localizer
+from lhdmap.replay.journal import Scribe
+from lhdmap.replay.process import LOCATED, MILLISECOND_NS, POSE, SEEN, Outgoing, Process, Received
+from lhdmap.replay.processes.perception import PERCEPTION
+from lhdmap.replay.processes.told import Seen
+from lhdmap.roles import BUILD_MAP, ROLES, read_by
+
+_ROLE_OF = {ROLES[name].topic: name for name in read_by(BUILD_MAP)}
+
+_STEP_S = 0.08  # a machine that stands or creeps has to know so, too
+_HALF_WINDOW_S = 0.08  # scans wait for the inclinometer's filter: a control loop has less time than a map
+
+
+class Locating(Process):
+    """Gives the pose of now in `odom`, the hits of each processed scan, and the place on the map."""
+
+    name, period_ns, priority = PERCEPTION, 20 * MILLISECOND_NS, 10
+    reads = tuple(_ROLE_OF)
+
+    def __init__(
+        self, known: KnownMap, settings: Settings, machine: Machine, start: FloatArray | None, scribe: Scribe
+    ) -> None:
+        self._scribe = scribe
+        self._seen: list[Seen] = []
+        often = replace(settings.odometry, step_s=min(settings.odometry.step_s, _STEP_S))
+        soon = replace(settings.attitude, half_window_s=min(settings.attitude.half_window_s, _HALF_WINDOW_S))
+        live = replace(settings, odometry=often, attitude=soon)
+        self.localizer = Localizer(known, live, machine, start, listener=self._listen)
+        scribe.goes("waiting", "no scan yet")
+
+    def step(self, now_ns: int, inbox: Sequence[Received]) -> Iterator[Outgoing]:
+        """Feed what has come; tell the pose of now, and what new scans have told."""
+        self._feed(inbox)
+        pose = self.localizer.pipeline.pose_at(now_ns)
+        if pose is None:
+            return
+        yield Outgoing(POSE, pose)
+        seen, self._seen = self._seen, []
+        for one in seen:
+            yield Outgoing(SEEN, one)
+        fix = self.localizer.fix
+        if seen and fix is not None:
+            row = self.localizer.rows[-1]
+            self._scribe.goes(fix.status, row.source, node=row.node, rho_m=row.rho_m, lateral_m=row.lateral_m)
+            yield Outgoing(
+                LOCATED,
+                Located(fix.stamp_ns, fix.status, fix.pose_map, fix.pose_odom, fix.covariance, fix.height_m),
+            )
+
+    def finish(self, now_ns: int, inbox: Sequence[Received]) -> None:
+        """End the stream."""
+        self._feed(inbox)
+        with self.localizer:
+            self.localizer.finish()
+
+    def _feed(self, inbox: Sequence[Received]) -> None:
+        for received in inbox:
+            self.localizer.update(_ROLE_OF[received.topic], received.message)
+
+    def _listen(self, stamp_ns: int, step: OdometryStep, odometry: PlanarOdometry) -> None:
+        if not step.processed:
+            return
+        points = np.concatenate([part[:, :2] for part in (odometry.points, odometry.points_behind)])
+        lost = self.localizer.pipeline.records.lost_now
+        apart = (math.inf, math.inf) if lost else (0.0, 0.0)
+        self._seen.append(Seen(stamp_ns, step.T_odom_base.copy(), points, *apart))

@@ -1,0 +1,74 @@
+"""The map of an autonomous drive: taught first where there is none, by an operator who drives through the whole mine."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from lhdmap.config import Settings
+from lhdmap.errors import UsageError
+from lhdmap.machine import Machine
+from lhdmap.messages import FloatArray
+from lhdmap.mine.network import Network
+from lhdmap.pipeline.build import BuildRequest, build_map
+from lhdmap.pipeline.localize import KnownMap
+from lhdmap.replay.parts import Autonomous
+from lhdmap.replay.processes.navigator import Errand
+from lhdmap.replay.processes.told import ModeNow
+from lhdmap.replay.scenario import Scenario
+from lhdmap.settings import nearest
+from lhdmap.simulation.mine_drive import MineDriveSettings, simulate_mine
+from lhdmap.simulation.operator import OperatorSettings
+from lhdmap.topology.model import AccessPoint, TopologicalMap, Waypoint
+
+_TEACH_KMH = 8.0
+_SEED_APART = 1000  # the teaching drive is another drive
+
+
+def autonomous_of(
+    scenario: Scenario, network: Network, machine: Machine, folder: Path, settings: Settings
+) -> Autonomous:
+    """Return what a machine needs that drives to the scenario's goal; its map is made in `folder` where none is named.
+
+    Raises:
+        UsageError: start or goal are not on the map.
+    """
+    path = Path(scenario.map) if scenario.map else folder / "map"
+    if not path.is_dir():
+        teach(scenario, network, machine, path, settings)
+    known = KnownMap.read(path)
+    start, pose = _start(known.topology, scenario.start)
+    _known(known.topology, scenario.goal, "goal")
+    return Autonomous(known, pose, Errand(start, scenario.goal, scenario.load > 0.0), ModeNow("idle"))
+
+
+def teach(scenario: Scenario, network: Network, machine: Machine, path: Path, settings: Settings) -> None:
+    """Drive through the mine by hand, with names, and build its map at `path`; the log stays beside it."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    log = path.with_name(f"{path.name}_teaching.mcap")
+    drive = MineDriveSettings(
+        seed=scenario.seed + _SEED_APART, names=True, truth=False, operator=OperatorSettings(speed_kmh=_TEACH_KMH)
+    )
+    simulate_mine(network, machine, drive, log, force=True)
+    build_map(BuildRequest([log], path, settings=settings, machine=machine))
+
+
+def _start(topology: TopologicalMap, name: str) -> tuple[str, FloatArray | None]:
+    """Return the point that a drive begins at, and its pose (4,: x, y, yaw, z)."""
+    if not name:
+        origin = np.zeros(3)
+        points = list(topology.points.values())
+        near = min(points, key=lambda one: float(np.linalg.norm(one.pose[:3] - origin)))
+        return near.id, np.zeros(4)
+    found = _known(topology, name, "start")
+    if isinstance(found, (Waypoint, AccessPoint)):
+        return name, found.pose[[0, 1, 3, 2]]
+    raise UsageError(f"start = '{name}': the machine needs a place to stand at, not a whole node")
+
+
+def _known(topology: TopologicalMap, name: str, key: str) -> object:
+    found = topology.called(name)
+    if found is None:
+        raise UsageError(f"{key} = '{name}': not on the map{nearest(name, topology.names())}")
+    return found
