@@ -62,8 +62,8 @@ class Watchdog:
         return True
 
     def disagreement(self, stamp_ns: int, now_ns: int, apart_m: float, apart_rad: float) -> bool:
-        """Take by how much pose and scan disagree; it is news of the input `pose`."""
-        if not self.saw(POSE, stamp_ns, now_ns, (apart_m, apart_rad)):
+        """Take by how much pose and scan disagree, infinite: altogether; it is news of the input `pose`."""
+        if math.isnan(apart_m) or math.isnan(apart_rad) or not self.saw(POSE, stamp_ns, now_ns):
             return False
         self._apart = abs(apart_m), abs(apart_rad)
         self._agreed = 0 if self._jumps() else self._agreed + 1
@@ -129,7 +129,9 @@ class Watchdog:
                 reasons.append("link lost" if lost else f"{name} {told}")
         if POSE in needed and self._jumps():
             apart_m, apart_rad = self._apart
-            reasons.append(f"pose and scan disagree by {apart_m:.2f} m, {math.degrees(apart_rad):.1f} deg")
+            lost = math.isinf(apart_m) or math.isinf(apart_rad)
+            by = "altogether" if lost else f"by {apart_m:.2f} m, {math.degrees(apart_rad):.1f} deg"
+            reasons.append(f"pose and scan disagree {by}")
         return tuple(reasons)
 
     def _jumps(self) -> bool:

@@ -80,7 +80,14 @@ def test_what_is_no_news_counts_as_no_input(stamp_ms: int, values: tuple[float, 
 
 
 @pytest.mark.parametrize(
-    ("apart", "stops"), [((0.19, 0.0), False), ((0.21, 0.0), True), ((0.0, 0.017), False), ((0.0, -0.018), True)]
+    ("apart", "stops"),
+    [
+        ((0.19, 0.0), False),
+        ((0.21, 0.0), True),
+        ((0.0, 0.017), False),
+        ((0.0, -0.018), True),
+        ((math.inf, math.inf), True),
+    ],
 )
 def test_a_pose_that_jumps_against_the_scan_stops(apart: tuple[float, float], stops: bool) -> None:
     dog = fed(1000)
