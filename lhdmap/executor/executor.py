@@ -22,6 +22,7 @@ STANDING_MPS = 0.02
 _SHIFT_MPS = 0.05  # slower than this the other gear may be asked for
 _FREED_MPS = 0.2  # so far below the bound a brake that the bound put on is let go
 _LONGEST_PERIOD_S = 0.1
+_PARKS_MPS = 0.8  # a brake for a planned stop is for its end alone
 _RESERVE = 0.92  # of the bound is commanded: tyres slip downhill, and from the bound on it brakes
 
 
@@ -141,7 +142,23 @@ class Executor:
             target, slope = 0.0, 0.0  # the other gear through standstill alone
         limits = model.acceleration_mps2, model.deceleration_mps2, self.settings.jerk_mps3
         limiter.follow(target, slope, limits, period_s)
-        return self._driven(now_ns, self._steered(wanted.steering_rate_rps, period_s))
+        rate = self._steered(wanted.steering_rate_rps, period_s)
+        if self._comes_to_rest(self.queue.rest_m(now_ns)):
+            return self._given(now_ns, 0.0, rate, brake=True, speed_mps=0.0)
+        return self._driven(now_ns, rate)
+
+    def _comes_to_rest(self, left_m: float) -> bool:
+        """Return whether the brake ends a planned stop, in `left_m`, and holds the machine there.
+
+        The drive runs out with its lag: it cannot be fed forward to less than nothing, and would go on for decimetres and
+        seconds. The brake takes over when its way is what the plan has left.
+        """
+        limiter, model = self._limiter, self.model
+        pace, slope = abs(limiter.speed_mps), math.copysign(limiter.slope_mps2, limiter.speed_mps * limiter.slope_mps2)
+        if abs(self.speed_mps) > _PARKS_MPS:
+            return False
+        runs_out = pace + model.drive_lag_s * slope <= 0.0
+        return runs_out and model.stopping_m(pace) - pace * model.dead_time_s >= left_m
 
     def _service(self, now_ns: int, cause: str, period_s: float) -> Command:
         """Come to rest by the drive, along the path, then brake."""
@@ -150,7 +167,10 @@ class Executor:
         self._goes("stopping", cause)
         limits = self.model.acceleration_mps2, self.model.deceleration_mps2, self.settings.jerk_mps3
         self._limiter.follow(0.0, 0.0, limits, period_s)
-        return self._driven(now_ns, self._steered(self.keeper.steering(now_ns), period_s))
+        rate = self._steered(self.keeper.steering(now_ns), period_s)
+        if self._comes_to_rest(0.5 * self._limiter.speed_mps**2 / self.model.deceleration_mps2):
+            return self._given(now_ns, 0.0, rate, brake=True, speed_mps=0.0)
+        return self._driven(now_ns, rate)
 
     def _driven(self, now_ns: int, rate_rps: float) -> Command:
         """Return the command for the limiter's speed: the lag of the drive is fed forward."""

@@ -72,6 +72,19 @@ class CommandQueue:
         before, after = self._points[k - 1], self._points[k]
         return (after.speed_mps - before.speed_mps) / ((after.at_ns - before.at_ns) * 1e-9)
 
+    def rest_m(self, now_ns: int) -> float:
+        """Return the way that is planned until the machine stands, m; infinite where it is not to stand."""
+        now = self.at(now_ns)
+        if now is None:
+            return 0.0
+        way, before = 0.0, now
+        for after in self._points[bisect_right(self._points, now_ns, key=_time) :]:
+            if before.speed_mps == 0.0:
+                break
+            way += 0.5 * abs(before.speed_mps + after.speed_mps) * (after.at_ns - before.at_ns) * 1e-9
+            before = after
+        return way if before.speed_mps == 0.0 else math.inf
+
     def left_s(self, now_ns: int) -> float:
         """Return `Q_dt` of Eq. (20): how long what is queued lasts, s."""
         return max((self._points[-1].at_ns - now_ns) * 1e-9, 0.0) if self._points else 0.0

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -149,11 +150,11 @@ def test_a_service_stop_is_by_the_drive_and_ends_on_the_brake() -> None:
     bench.drive(6.0, stop=Stop.SERVICE)
     assert bench.state.speed_mps == pytest.approx(0.0, abs=1e-3)
     speeds = np.array([one.speed_mps for one in bench.states[before:]])
-    assert np.diff(speeds).min() / STEP_S > -1.6  # 1.5 by the drive, and a little rolling
+    assert np.diff(speeds[speeds > 0.8]).min() / STEP_S > -1.6  # 1.5 by the drive, and a little rolling
     moving = [
         command
         for command, state in zip(bench.commands[before:], bench.states[before:], strict=False)
-        if state.speed_mps > 0.1
+        if state.speed_mps > 1.0
     ]
     assert not any(command.brake for command in moving)
     assert bench.commands[-1].brake
@@ -232,6 +233,35 @@ def test_ramps_are_followed_and_jerk_is_limited() -> None:
     assert miss[times < 13.0].max() < 0.1
     speeds = np.array([one.propel for one in bench.commands]) * bench.model.top_speed_mps
     assert np.abs(np.diff(speeds)).max() / STEP_S < 1.6 + bench.model.drive_lag_s * 4.1
+
+
+@pytest.mark.parametrize("load_kg", [0.0, FULL_KG])
+@pytest.mark.parametrize("gear", [1, -1])
+@pytest.mark.parametrize("slows", [0.5, 0.8])
+def test_a_planned_stop_ends_where_and_when_it_is_planned(load_kg: float, gear: int, slows: float) -> None:
+    """The drive alone would run out over decimetres, and need two seconds more."""
+    bench = Bench(load_kg=load_kg)
+    bench.roll(gear * 2.0)
+
+    def wanted(t: float) -> float:
+        return min(max(slows * (2.0 + 2.0 / slows - t), 0.0), 2.0)
+
+    def plan(now_ns: int) -> Setpoints:
+        times = [now_ns + round((0.03 + 0.15 * k) * SECOND) for k in range(25)]
+        return tuple(Setpoint(at, gear * wanted(at / SECOND), 0.0) for at in times)
+
+    bench.drive(12.0, plan)
+    speeds = np.array([gear * one.speed_mps for one in bench.states])
+    times = np.arange(len(speeds)) * STEP_S
+    planned = np.array([wanted(t - bench.model.dead_time_s) for t in times])
+    assert abs(float((speeds - planned).sum()) * STEP_S) < 0.05
+    assert abs(times[speeds < 1e-3][0] - times[planned == 0.0][0]) < 0.3
+    assert speeds.min() > -0.01
+    assert bench.commands[-1].brake  # it is held
+    ends = [before.brake != after.brake for before, after in pairwise(bench.commands)]
+    assert sum(ends) == 1
+    bench.drive(3.0, lambda now: even(gear * 1.0, now))
+    assert gear * bench.state.speed_mps > 0.9
 
 
 def test_a_steering_command_is_limited_and_has_a_dead_zone() -> None:
