@@ -23,6 +23,7 @@ _SHIFT_MPS = 0.05  # slower than this the other gear may be asked for
 _FREED_MPS = 0.2  # so far below the bound a brake that the bound put on is let go
 _LONGEST_PERIOD_S = 0.1
 _PARKS_MPS = 0.8  # a brake for a planned stop is for its end alone
+_STAYS_M = 0.03  # it stays on until the plan goes on by so much
 _RESERVE = 0.92  # of the bound is commanded: tyres slip downhill, and from the bound on it brakes
 
 
@@ -33,7 +34,7 @@ class Executor:
         self.model, self.settings = model, settings
         self.queue, self.keeper, self.notes = CommandQueue(), PathKeeper(model), Notes()
         self.state, self.emergency = "standing", ""
-        self._limiter, self._rate_rps = SpeedLimiter(), 0.0
+        self._limiter, self._rate_rps, self._resting = SpeedLimiter(), 0.0, False
         self._last_ns: int | None = None
 
     def loaded(self, model: DriveModel) -> None:
@@ -156,9 +157,12 @@ class Executor:
         limiter, model = self._limiter, self.model
         pace, slope = abs(limiter.speed_mps), math.copysign(limiter.slope_mps2, limiter.speed_mps * limiter.slope_mps2)
         if abs(self.speed_mps) > _PARKS_MPS:
+            self._resting = False
             return False
+        brakes_m = model.stopping_m(pace) - pace * model.dead_time_s
         runs_out = pace + model.drive_lag_s * slope <= 0.0
-        return runs_out and model.stopping_m(pace) - pace * model.dead_time_s >= left_m
+        self._resting = left_m <= (2.0 * brakes_m + _STAYS_M if self._resting else brakes_m if runs_out else -1.0)
+        return self._resting
 
     def _service(self, now_ns: int, cause: str, period_s: float) -> Command:
         """Come to rest by the drive, along the path, then brake."""

@@ -80,7 +80,8 @@ class Watchdog:
         degraded = self._degraded(now_ns, needed)
         if degraded != self._held:
             self._held = degraded
-            self.notes.add("link", "good" if degraded else "degraded", "degraded" if degraded else "good")
+            was, now = ("good", "degraded") if degraded else ("degraded", "good")
+            self.notes.add("link", was, now, "sign of life of the station")
         return (Stop.HOLD, "link degraded") if degraded else (Stop.GO, "")
 
     def trip(self, causes: Sequence[str]) -> None:
