@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -19,6 +19,7 @@ from lhdmap.executor.watchdog import Watchdog
 from lhdmap.messages import Command, FloatArray
 
 _GUARD_NS = 50_000_000
+_LOOKS = 2  # in a row, before a point within the margin is believed: a single one is noise
 
 
 class Control:
@@ -32,12 +33,22 @@ class Control:
     ) -> None:
         self.executor = Executor(model, settings)
         self.watchdog, self.modes = Watchdog(inputs, settings), Modes()
-        self.guard = Guard(model, bodies, settings, period_s=_GUARD_NS * 1e-9)
+        self.guard = Guard(model, bodies, settings, period_s=_LOOKS * _GUARD_NS * 1e-9)
         self.swept: Swept | None = None
         self._settings = settings
-        self._notes, self._blocked = Notes(), False
+        self._notes, self._blocked, self._near = Notes(), False, 0
         self._points: dict[str, tuple[Motion, FloatArray]] = {}
         self._looked_ns: int | None = None
+
+    def saw(
+        self, name: str, stamp_ns: int, now_ns: int, values: Sequence[float] = (), content: int | None = None
+    ) -> bool:
+        """Take a message of an input, as `Watchdog.saw` does."""
+        return self.watchdog.saw(name, stamp_ns, now_ns, values, content)
+
+    def disagreement(self, stamp_ns: int, now_ns: int, apart_m: float, apart_rad: float) -> bool:
+        """Take by how much pose and scan disagree."""
+        return self.watchdog.disagreement(stamp_ns, now_ns, apart_m, apart_rad)
 
     def points(self, name: str, points_m: FloatArray, motion: Motion) -> None:
         """Take the points (N, 2) of a scanner in `base_link`, and the motion at their stamp; what is not finite goes."""
@@ -128,7 +139,9 @@ class Control:
             plan=self._plan_ahead(),
             pull_mps2=pull_mps2,
         )
-        blocked = self.swept.contact or (self._blocked and not self.executor.standing)
+        self._near = self._near + 1 if self.swept.contact else 0
+        seen = self.swept.hit or self._near >= _LOOKS
+        blocked = seen or (self._blocked and not self.executor.standing)
         if blocked != self._blocked:
             before, self._blocked = ("blocked" if self._blocked else "free"), blocked
             found = self.swept

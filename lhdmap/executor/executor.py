@@ -92,8 +92,10 @@ class Executor:
             cause: why, for the journal.
             pull_mps2: gravity along x of the machine: positive where the nose is lower.
         """
-        period_s = self._period_s(now_ns)
         self.keeper.sees(motion)
+        if self._last_ns is None:
+            self._limiter.restart(self.speed_mps)  # it may be driven already
+        period_s = self._period_s(now_ns)
         self.queue.forget(now_ns)
         if stop is Stop.EMERGENCY:
             self.stop(cause)

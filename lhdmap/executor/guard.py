@@ -19,15 +19,18 @@ from lhdmap.messages import FloatArray
 
 _NO_PLAN = np.zeros((0, 2))
 _FOR_EVER_S = 1e9
+_BRAKE_SHARE = 0.9  # brakes that are so much weaker than the machine file's still stop before
 
 
 class Swept(NamedTuple):
     """What the guard found: whether a contact is predicted, where in `base_link`, the way until it, the braking path's length.
 
-    `own`: points that are deep in a body where it stands, returns of the machine itself.
+    `contact`: a point comes within the margin; `hit`: into a body itself. `own`: points that are deep in a body where it stands,
+    returns of the machine itself.
     """
 
     contact: bool
+    hit: bool
     at_m: tuple[float, float] | None
     free_m: float
     stop_m: float
@@ -35,7 +38,7 @@ class Swept(NamedTuple):
 
 
 class Guard:
-    """Predicts contact on the braking path. `period_s`: time between two looks, which is its reaction."""
+    """Predicts contact on the braking path. `period_s`: how late a stop is asked for, such as at the next look."""
 
     def __init__(self, model: DriveModel, bodies: Bodies, settings: ExecutorSettings, period_s: float = 0.05) -> None:
         self._bodies, self._settings, self._period_s = bodies, settings, period_s
@@ -53,7 +56,7 @@ class Guard:
         age_s: float = 0.0,
         pull_mps2: float = 0.0,
     ) -> Swept:
-        """Return what a brake that is decided on at the next look meets.
+        """Return what a brake that is asked for `period_s` from now meets.
 
         Args:
             motion: speed and joint of now.
@@ -68,13 +71,16 @@ class Guard:
         settings, bodies = self._settings, self._bodies
         margins = settings.margin_m, settings.margin_growth, settings.own_body_m
         pull = max(math.copysign(1.0, speed) * pull_mps2, 0.0)
-        timing = late_s, self.model.brake_mps2, self.model.brake_ramp_s, pull
+        timing = late_s, _BRAKE_SHARE * self.model.brake_mps2, self.model.brake_ramp_s, pull
         state = speed, motion.articulation_rad, motion.articulation_rate_rps
-        worst = Swept(contact=False, at_m=None, free_m=math.inf, stop_m=0.0, own=0)
+        worst = Swept(contact=False, hit=False, at_m=None, free_m=math.inf, stop_m=0.0, own=0)
         for ahead, held_s in self._assumed(plan, late_s):
             path = braking_path(state, self._shape(), timing, ahead, held_s)
             which, free_m, own = first_contact(path, points, bodies.front_box_m, bodies.rear_box_m, margins)
             worst = worst._replace(stop_m=max(worst.stop_m, float(path[-1, 0])), own=own)
+            if which >= 0 and not worst.hit:
+                inside = first_contact(path, points, bodies.front_box_m, bodies.rear_box_m, (0.0, 0.0, margins[2]))
+                worst = worst._replace(hit=inside[0] >= 0)
             if free_m < worst.free_m:
                 x, y = points[which].tolist()
                 worst = worst._replace(contact=True, at_m=(x, y), free_m=free_m)

@@ -14,7 +14,7 @@ from lhdmap.messages import FloatArray
 
 WAY, REACH, FRONT, REAR = 0, 1, 2, 6
 """Columns of a pose: way (m), how far a point of a body has moved at most (m); x, y, cos, sin of both axles in `base_link`."""
-_LEAVES = 0.3  # what touches must get farther by so much per way
+_LEAVES, _LEFT_M = 0.3, 0.3  # what touches must get farther by so much per way, over this way
 _SETTLES_S = 0.2  # time in which the joint gets to where it is to be
 _MOST = 4000
 LEAST_BRAKE_MPS2 = 0.2
@@ -107,44 +107,54 @@ def apart(pose: FloatArray, at: int, box: FloatArray, x: float, y: float) -> flo
 def first_contact(
     path: FloatArray, points: FloatArray, front: FloatArray, rear: FloatArray, margins: Margins
 ) -> tuple[int, float, int]:
-    """Return the point (N, 2) that a body meets first, -1 for none, the way until then, and how many are the machine itself."""
+    """Return the point (N, 2) that a body meets first, -1 for none, the way until then, and how many are the machine itself.
+
+    What is beside the machine must not hold it for ever, what is in its way must: where something is nearer than the
+    margin already, half of that is the margin; what touches must get farther.
+    """
     margin, growth, own_m = margins
-    found, free, own = -1, math.inf, 0
-    last = len(path) - 1
-    widest, total = margin + growth * path[last, WAY], path[last, REACH]
+    found, free, own, beside = -1, math.inf, 0, margin
+    starts = np.empty(len(points))
     for i in range(len(points)):
         x, y = points[i, 0], points[i, 1]
-        start = min(apart(path[0], FRONT, front, x, y), apart(path[0], REAR, rear, x, y))
-        if start < -own_m:
+        starts[i] = min(apart(path[0], FRONT, front, x, y), apart(path[0], REAR, rear, x, y))
+        if starts[i] < -own_m:
             own += 1
-            continue
-        if start - total > widest:
-            continue
-        k, now = 0, start
-        while k < last and path[k, WAY] < free:
-            room = now - widest
-            if start >= margin and room > 0.0:  # nothing can have come near before the bodies have moved so far
-                to = path[k, REACH] + room
-                k += 1
-                while k < last and path[k, REACH] < to:
-                    k += 1
-            else:
-                k += 1
-            now = min(apart(path[k], FRONT, front, x, y), apart(path[k], REAR, rear, x, y))
-            if now < _wanted(start, path[k, WAY], margin, growth):
-                if path[k, WAY] < free:
-                    found, free = i, path[k, WAY]
-                break
+        else:
+            beside = min(beside, starts[i])
+    wanted = (margin, growth) if beside >= margin else (0.5 * max(beside, 0.0), 0.0)
+    for i in range(len(points)):
+        if starts[i] >= -own_m:
+            way = _met(path, points[i], starts[i], front, rear, wanted, free)
+            if way < free:
+                found, free = i, way
     return found, free, own
 
 
 @nb.njit(cache=True, nogil=True)
-def _wanted(start: float, way: float, margin: float, growth: float) -> float:
-    """Return how far a point must be from a body after a way.
-
-    One that is nearer than the margin from the start may get half as near; one that touches must get farther: what is
-    beside the machine must not hold it for ever, what is in its way must.
-    """
-    if start >= margin:
-        return margin + growth * way
-    return 0.5 * start if start > 0.0 else min(start + _LEAVES * way, margin)
+def _met(
+    path: FloatArray,
+    point: FloatArray,
+    start: float,
+    front: FloatArray,
+    rear: FloatArray,
+    wanted: tuple[float, float],
+    before: float,
+) -> float:
+    """Return the way after which a body comes too near to a point, infinite where it does not `before` a way."""
+    last, (margin, growth) = len(path) - 1, wanted
+    widest = margin + growth * path[last, WAY]
+    k, now = 0, start
+    if start - path[last, REACH] > widest:
+        return math.inf
+    while k < last and path[k, WAY] < before:
+        to = path[k, REACH] + now - widest  # nothing can come near before the bodies have moved so far
+        k += 1
+        while k < last and path[k, REACH] < to:
+            k += 1
+        now = min(apart(path[k], FRONT, front, point[0], point[1]), apart(path[k], REAR, rear, point[0], point[1]))
+        way = path[k, WAY]
+        least = margin + growth * way if start > 0.0 else start + _LEAVES * min(way, _LEFT_M)
+        if now < least:
+            return way
+    return math.inf

@@ -71,10 +71,20 @@ class ExecutorSettings:
         doc="Reports in a row in which pose and scan agree, before the machine is armed again.",
     )
     margin_m: float = setting(
-        0.05, unit="m", minimum=0.0, maximum=1.0, doc="So near to a body a point on the braking path is a contact."
+        0.02,
+        unit="m",
+        minimum=0.0,
+        maximum=1.0,
+        source="measured: 0.05 stops a machine at 0.10 m from a wall by the noise of 2 cm alone",
+        doc="So near to a body a point on the braking path is a contact.",
     )
     margin_growth: float = setting(
-        0.01, unit="m/m", minimum=0.0, maximum=0.2, doc="How the margin grows with the way to the point."
+        0.02,
+        unit="m/m",
+        minimum=0.0,
+        maximum=0.2,
+        source="measured",
+        doc="How the margin grows with the way to the point.",
     )
     own_body_m: float = setting(
         0.1,

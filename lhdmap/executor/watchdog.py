@@ -27,9 +27,9 @@ class _Input:
         self.stamp_ns: int | None = None
         self.content: int | None = None
 
-    def age_s(self, now_ns: int) -> float:
-        """Return the age of the newest news, s; infinite where there was none."""
-        return math.inf if self.stamp_ns is None else (now_ns - self.stamp_ns) * 1e-9
+    def older(self, now_ns: int, limit_s: float) -> bool:
+        """Return whether the newest news is older than a limit, or there was none."""
+        return self.stamp_ns is None or now_ns - self.stamp_ns > round(limit_s * 1e9)
 
 
 class Watchdog:
@@ -62,8 +62,8 @@ class Watchdog:
         return True
 
     def disagreement(self, stamp_ns: int, now_ns: int, apart_m: float, apart_rad: float) -> bool:
-        """Take by how much pose and scan disagree; it is news of the input `pose`."""
-        if not self.saw(POSE, stamp_ns, now_ns, (apart_m, apart_rad)):
+        """Take by how much pose and scan disagree, infinite: altogether; it is news of the input `pose`."""
+        if math.isnan(apart_m) or math.isnan(apart_rad) or not self.saw(POSE, stamp_ns, now_ns):
             return False
         self._apart = abs(apart_m), abs(apart_rad)
         self._agreed = 0 if self._jumps() else self._agreed + 1
@@ -123,12 +123,15 @@ class Watchdog:
     def _wrong(self, now_ns: int, needed: Collection[str]) -> tuple[str, ...]:
         reasons = []
         for name, one in self._inputs.items():
-            if name in needed and one.age_s(now_ns) > self.limit_s(name):
-                told = "never seen" if one.stamp_ns is None else f"{one.age_s(now_ns):.2f} s old"
-                reasons.append("link lost" if name == LINK and one.stamp_ns is not None else f"{name} {told}")
+            if name in needed and one.older(now_ns, self.limit_s(name)):
+                lost = name == LINK and one.stamp_ns is not None
+                told = "never seen" if one.stamp_ns is None else f"{(now_ns - one.stamp_ns) * 1e-9:.2f} s old"
+                reasons.append("link lost" if lost else f"{name} {told}")
         if POSE in needed and self._jumps():
             apart_m, apart_rad = self._apart
-            reasons.append(f"pose and scan disagree by {apart_m:.2f} m, {math.degrees(apart_rad):.1f} deg")
+            lost = math.isinf(apart_m) or math.isinf(apart_rad)
+            by = "altogether" if lost else f"by {apart_m:.2f} m, {math.degrees(apart_rad):.1f} deg"
+            reasons.append(f"pose and scan disagree {by}")
         return tuple(reasons)
 
     def _jumps(self) -> bool:
@@ -139,4 +142,4 @@ class Watchdog:
         link = self._inputs.get(LINK)
         if link is None or LINK not in needed:
             return False
-        return link.age_s(now_ns) > max(self.settings.age_s, self.settings.age_periods * link.period_s)
+        return link.older(now_ns, max(self.settings.age_s, self.settings.age_periods * link.period_s))

@@ -60,6 +60,12 @@ class Bench:
     def state(self) -> VehicleState:
         return self.states[-1]
 
+    def roll(self, speed_mps: float) -> None:
+        """Let it roll at a speed, as if it had been driven so for long."""
+        start = self.state._replace(speed_mps=speed_mps, wheel_speed_mps=speed_mps)
+        given = Command(start.time_ns, speed_mps / self.model.top_speed_mps, 0.0, 0.0, 0.0, full_rpm=False, brake=False)
+        self.states = [start._replace(pending=((start.time_ns, given),))]
+
     def drive(
         self,
         seconds: float,

@@ -27,7 +27,8 @@ FULL_KG = 11_000.0
 def test_the_machine_stands_before_the_last_command(gear: int, load_kg: float, grade: float, speed: float) -> None:
     """Eq. (20), in both gears (errata: |u_v|)."""
     bench = Bench(load_kg=load_kg, grade=grade)
-    bench.drive(12.0, lambda now: even(gear * speed, now))
+    bench.roll(gear * speed)
+    bench.drive(4.0, lambda now: even(gear * speed, now))
     uphill = gear * grade > 0.0  # where the engine does not give every speed
     if grade == 0.0:
         assert gear * bench.state.speed_mps > 0.9 * speed
@@ -70,7 +71,8 @@ def test_stopping_distances_are_those_of_the_table(kmh: float, brake: float) -> 
     wanted = rows[[2.5, 2.0, 1.2, 0.8].index(brake)]
     for reaction_s, way_m in zip((0.05, 0.35, 1.0), wanted, strict=True):
         bench = Bench(machine)
-        bench.drive(14.0, lambda now: even(kmh / 3.6, now, stages=80))
+        bench.roll(kmh / 3.6)
+        bench.drive(0.5, lambda now: even(kmh / 3.6, now, stages=80))
         fault = len(bench.states) - 1
         bench.drive(reaction_s, lambda now: even(kmh / 3.6, now, stages=80))
         bench.drive(20.0, stop=Stop.FULL, until_rest=True)
@@ -89,7 +91,7 @@ def in_a_bend(
     """Return how far the leading edge is off its path at standstill, m, and the joint, degrees: a stop where a bend begins."""
     machine = Machine(brakes=Brakes(deceleration_mps2=brake))
     way, bend = bend_over_way(8.0)
-    slope, speed, start_s = np.gradient(bend, way), kmh / 3.6, 6.0
+    slope, speed, start_s = np.gradient(bend, way), kmh / 3.6, 1.0
     lag_s = drive_model(machine).steering_lag_s
 
     def plan(now_ns: int) -> Setpoints:
@@ -100,6 +102,8 @@ def in_a_bend(
         )
 
     freely, stopped = Bench(machine), Bench(machine)
+    freely.roll(gear * speed)
+    stopped.roll(gear * speed)
     freely.drive(start_s + 10.0, plan)
     stopped.drive(start_s + 0.25, plan)
     stopped.drive(10.0, stop=Stop.FULL, until_rest=True, hand=hand, seen=seen)
@@ -139,7 +143,8 @@ def test_a_held_joint_leaves_the_path() -> None:
 
 def test_a_service_stop_is_by_the_drive_and_ends_on_the_brake() -> None:
     bench = Bench()
-    bench.drive(8.0, lambda now: even(3.0, now, stages=80))
+    bench.roll(3.0)
+    bench.drive(1.0, lambda now: even(3.0, now, stages=80))
     before = len(bench.states)
     bench.drive(6.0, stop=Stop.SERVICE)
     assert bench.state.speed_mps == pytest.approx(0.0, abs=1e-3)

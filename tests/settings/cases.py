@@ -43,6 +43,7 @@ _SECTIONS = {
     "integration": Case("tilted"),
     "smoothing": Case("lap"),
     "landmarks": Case("landmarks"),
+    "executor": Case("driven"),
     "pile": Case("pile"),
     "figure9": Case("pile", base=_FOUND),
     "figure9_repaired": Case("pile", base={"pile.method": "figure9_repaired"}),

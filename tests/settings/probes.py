@@ -8,6 +8,7 @@ from __future__ import annotations
 import functools
 import hashlib
 import json
+import math
 import tempfile
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, fields, is_dataclass
@@ -40,6 +41,7 @@ from lhdmap.smoothing.trust import expected_error
 from lhdmap.topology.build import Seen, topology_of
 from lhdmap.topology.geojson import to_geojson
 
+from tests.executor.rig import Rig
 from tests.landmarks.worlds import MODERATE, TunnelWorld, drive, tunnel
 from tests.localization import known
 from tests.movement.mines import fast_ladder
@@ -237,6 +239,51 @@ def localized(settings: Settings, *, way_m: float, jump_m: float = 0.0, known_st
     return digest(rows, localizer.withheld, localizer.lost_stretches, localizer.first_fix)
 
 
+def driven(settings: Settings) -> str:
+    """Return the digest of what a machine is told while inputs fail, pose and scan disagree, and things are near."""
+    inputs = {"motion": 0.01, "scan_front": 0.04, "pose": 0.04, "link": 0.1, "operator": 0.2}
+    rig, told = Rig(settings.executor, inputs), []
+    control = rig.control
+    rig.beside = [(60.0, 1.225 + 0.056)]
+    rig.own = [(2.0, 1.225 - 0.12)]
+
+    def go(seconds: float, mode: str = "") -> None:
+        def each() -> None:
+            if mode and not (control.watchdog.armed and control.modes.name == mode) and rig.speed == 0.0:
+                control.rearm(rig.now_ns, mode)
+                control.mode(mode, rig.now_ns)
+            told.append((rig.command, *control.take_notes()))
+
+        rig.run(seconds, each)
+
+    go(5.0, "autonomous")
+    for name, failed_s in (("motion", 0.4), ("link", 2.5)):
+        rig.failed.add(name)
+        go(failed_s)
+        rig.failed.clear()
+        go(6.0, "autonomous")
+    for apart in ((0.25, 0.0), (0.0, math.radians(1.2))):
+        rig.apart_m, rig.apart_rad = apart
+        go(0.5)
+        rig.apart_m, rig.apart_rad = 0.0, 0.0
+        go(6.0, "autonomous")
+    rig.rate_wanted = math.radians(0.4)
+    go(1.0)
+    rig.rate_wanted = math.radians(-10.0)
+    go(1.0)
+    rig.rate_wanted = 0.0
+    control.mode("idle", rig.now_ns)
+    go(3.0)
+    go(5.0, "teleoperated")
+    rig.failed.add("operator")
+    go(0.7)
+    rig.failed.clear()
+    go(5.0, "teleoperated")
+    rig.operates = False
+    go(6.0)
+    return digest(told)
+
+
 def _mapped(stream: Callable[[], Stream], primary: Literal["front", "points"] = "front", *, own: bool = False) -> Probe:
     return lambda settings: run(settings, stream(), primary, own=own)
 
@@ -255,6 +302,7 @@ PROBES: dict[str, Probe] = {
     "returning": _mapped(streams.returning, "points"),
     "cut": _mapped(streams.cut, "points"),
     "lap": lap,
+    "driven": driven,
     "landmarks": landmarks,
     "pile": pile,
     "recording": recording,
