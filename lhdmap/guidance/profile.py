@@ -41,8 +41,7 @@ def speeds_of(
     """Return the speeds along a solution, from a speed and an acceleration at its start."""
     caps = _caps(solution, predicted, directive, model, settings)
     way = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(solution.states[:, :2], axis=0).T))])
-    at = directive.path[solution.at, 5]
-    left_m = np.maximum(directive.stop_m - at, 0.0)
+    left_m = np.maximum(directive.stop_m - _along(solution, directive.path), 0.0)
     braking, full = settings.brake_mps2, settings.sight_brake_share * model.brake_mps2
     caps["stop"] = np.sqrt(2.0 * braking * left_m)
     caps["sight"] = np.maximum(_stop_within(np.maximum(sight_m - way, 0.0), full, model), 0.3 * (sight_m > way))
@@ -53,6 +52,14 @@ def speeds_of(
         cap[k] = min(cap[k], math.sqrt(cap[k + 1] ** 2 + 2.0 * braking * (way[k + 1] - way[k])))
     speed = _forward(cap, start, settings, model)
     return Speeds(speed, sight_m, names[int(table[:, : max(len(cap) // 3, 1)].min(axis=1).argmin())])
+
+
+def _along(solution: Solution, path: FloatArray) -> FloatArray:
+    """Return how far along a path each state (K + 1,) is, between its points too."""
+    points, states = path[solution.at], solution.states
+    off = states[:, :2] - points[:, :2]
+    along: FloatArray = points[:, 5] + np.cos(points[:, 2]) * off[:, 0] + np.sin(points[:, 2]) * off[:, 1]
+    return along
 
 
 def _caps(

@@ -22,9 +22,11 @@ from lhdmap.errors import UsageError
 from lhdmap.geometry import se2
 from lhdmap.guidance.directive import Directive, moved
 from lhdmap.messages import FloatArray
+from lhdmap.movement.route import Route
 from lhdmap.movement.routes import RouteOptions, RoutePlanner
 from lhdmap.navigation.goals import Approach, overrun, reached
 from lhdmap.navigation.leg import Leg, legs_of
+from lhdmap.navigation.room import with_room
 from lhdmap.navigation.settings import NavigationSettings
 from lhdmap.topology.model import DEAD_END, TopologicalMap, Tunnel, Waypoint
 
@@ -56,6 +58,8 @@ class NavigationControl:
         self, planner: RoutePlanner, model: DriveModel, bodies: Bodies, settings: NavigationSettings, say: Say
     ) -> None:
         self._planner, self._model, self._settings, self._say = planner, model, settings, say
+        self._nose_m = float(bodies.front_m[:, 0].max())
+        self._tail_m = model.wheelbase_m - float(bodies.rear_m[:, 0].min())
         self._leads = {gear: lead_of(gear, model, bodies) for gear in (1, -1)}
         self.state = IDLE
         self.reason = ""
@@ -76,13 +80,18 @@ class NavigationControl:
     def go(self, start: str, goal: str, located: Located, *, loaded: bool = False) -> None:
         """Plan to a goal from a place of the map where the machine stands; raises UsageError where a name is wrong."""
         heading = math.degrees(float(located.pose_map[2]))
-        asked = RouteOptions(heading=f"{heading:.1f}", avoid=self.closed, alternatives=0)
-        route = self._planner.route(start, goal, replace(asked, goal_heading=facing(self._planner.topology, goal)))
+        topology = self._planner.topology
+        asked = RouteOptions(heading=f"{heading:.1f}", goal_heading=facing(topology, goal), alternatives=0)
+
+        def ask(avoid: tuple[str, ...]) -> Route:
+            return self._planner.route(start, goal, replace(asked, avoid=avoid))
+
+        route = with_room(topology, ask, self.closed, self._nose_m, self._tail_m, self._settings.room_m)
         self.goal = goal
         if not route.feasible:
             self._ask(f"no route: {route.reason}")
             return
-        self.legs = legs_of(self._planner.topology, route, self._model.wheelbase_m, self._settings, loaded=loaded)
+        self.legs = legs_of(topology, route, self._model.wheelbase_m, self._nose_m, self._settings, loaded=loaded)
         self.leg, self._target, self._tries = 0, 0, 0
         if not self.legs:
             self._goes(ARRIVED, "already there")

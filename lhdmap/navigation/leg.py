@@ -18,6 +18,7 @@ from scipy.ndimage import gaussian_filter1d
 from lhdmap.guidance.directive import path_of
 from lhdmap.messages import FloatArray
 from lhdmap.movement.route import Route, Step
+from lhdmap.navigation.room import room_m
 from lhdmap.navigation.settings import NavigationSettings
 from lhdmap.topology.model import Connection, TopologicalMap, Tunnel
 
@@ -57,14 +58,15 @@ def legs_of(
     topology: TopologicalMap,
     route: Route,
     wheelbase_m: float,
+    nose_m: float,
     settings: NavigationSettings,
     *,
     loaded: bool = False,
 ) -> list[Leg]:
-    """Return the legs of a feasible route."""
+    """Return the legs of a feasible route; `nose_m`: how far the machine reaches before `base_link`."""
     runs = _runs(route.states)
     return [
-        _leg(topology, run, wheelbase_m, settings, loaded=loaded, inversion=k + 1 < len(runs))
+        _leg(topology, run, wheelbase_m, nose_m, settings, loaded=loaded, inversion=k + 1 < len(runs))
         for k, run in enumerate(runs)
     ]
 
@@ -87,6 +89,7 @@ def _leg(
     topology: TopologicalMap,
     run: list[Step],
     wheelbase_m: float,
+    nose_m: float,
     settings: NavigationSettings,
     *,
     loaded: bool,
@@ -116,7 +119,9 @@ def _leg(
     path = _smooth(path_of(whole, np.minimum(limit, _limit_kmh(gear, settings, loaded=loaded)) / 3.6, weight))
     path[:, 4] = _widened(path[:, 4], settings.crossing_margin_m)
     goal = lead_m + along
-    ahead = wheelbase_m + settings.room_behind_m if inversion else wheelbase_m if gear < 0 else 0.0
+    ahead = wheelbase_m if gear < 0 else 0.0
+    if inversion and gear > 0:  # the rear axle leads next: it has to be at the point
+        ahead = min(wheelbase_m, max(room_m(topology, run[-1], nose_m) - nose_m - settings.room_m, 0.0))
     moved = tuple(Target(one.point, one.node, lead_m + one.at_m, one.pose, one.crossing) for one in targets)
     return Leg(gear, path, goal + ahead, goal, moved, inversion)
 

@@ -44,8 +44,12 @@ class NavigationSettings:
     )
     standing_mps: float = setting(0.03, unit="m/s", minimum=0.001, maximum=0.5, doc="Slower than this is standing.")
     inversion_s: float = setting(1.5, unit="s", minimum=0.0, maximum=60.0, doc="Rest before a change of gear.")
-    room_behind_m: float = setting(
-        1.5, unit="m", minimum=0.0, maximum=20.0, doc="How far the other axle goes beyond the point of an inversion."
+    room_m: float = setting(
+        0.7,
+        unit="m",
+        minimum=0.0,
+        maximum=20.0,
+        doc="Room left before the end of a short drift in which the gear changes.",
     )
     crossing_weight: float = setting(
         30.0,

@@ -12,7 +12,8 @@ from lhdmap.roles import ROLES
 JOINTS, TACHOMETER = ROLES["joints"].topic, ROLES["tachometer"].topic
 MOTION_TOPICS = (POSE, JOINTS, TACHOMETER)
 _RATE_LAG_S = 0.1
-_SAMPLES = 4  # of the tachometer: its noise alone looks like creeping
+_SAMPLES, _LONG = 4, 12  # of the tachometer: its noise alone looks like creeping
+_STANDS_MPS = 0.02
 
 
 class MotionFeed:
@@ -26,7 +27,7 @@ class MotionFeed:
         self.heard_ns: int | None = None
         self._joint: tuple[int, float, float] | None = None
         self._speed_ns: int | None = None
-        self._speeds: deque[float] = deque(maxlen=_SAMPLES)
+        self._speeds: deque[float] = deque(maxlen=_LONG)
 
     def take(self, received: Received) -> None:
         """Take a message of one of `MOTION_TOPICS`."""
@@ -45,8 +46,16 @@ class MotionFeed:
             T = message.T_odom_base
             heading = math.atan2(T[1, 0], T[0, 0])
             _, bend, rate = self._joint
-            speed = sum(self._speeds) / max(len(self._speeds), 1)
+            speed = self._speed()
             self.motion = Motion(message.stamp_ns, float(T[0, 3]), float(T[1, 3]), heading, bend, rate, speed)
+
+    def _speed(self) -> float:
+        """Return the speed of now: of the last samples; none where they are the noise of a machine that stands."""
+        speeds = list(self._speeds)
+        if not speeds or abs(sum(speeds) / len(speeds)) < _STANDS_MPS:
+            return 0.0
+        newest = speeds[-_SAMPLES:]
+        return sum(newest) / len(newest)
 
     def _bend(self, stamp_ns: int, bend: float, rate: float) -> None:
         if not math.isfinite(bend):
