@@ -40,6 +40,11 @@ class Control:
         self._points: dict[str, tuple[Motion, FloatArray]] = {}
         self._looked_ns: int | None = None
 
+    def loaded(self, model: DriveModel) -> None:
+        """Take the model for another load."""
+        self.executor.loaded(model)
+        self.guard.model = model
+
     def saw(
         self, name: str, stamp_ns: int, now_ns: int, values: Sequence[float] = (), content: int | None = None
     ) -> bool:

@@ -8,7 +8,9 @@ import pytest
 from hypothesis import settings
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, rule
+from lhdmap.driving.model import drive_model
 from lhdmap.executor.modes import MODES
+from lhdmap.machine import Machine
 
 from tests.executor.rig import INPUTS, MS, PERIOD_MS, Rig, ahead
 
@@ -147,6 +149,20 @@ def test_an_operator_does_not_pass_the_guard_either() -> None:
     rig.thing_m = rig.x_m + 3.2 + 3.5
     rig.run(6.0)
     assert rig.x_m + 3.2 < rig.thing_m
+
+
+def test_a_loaded_machine_is_braked_for_earlier() -> None:
+    """The model of the load is that of bound and guard alike."""
+    rig = started()
+    rig.control.loaded(drive_model(Machine(), 11_000.0))
+    rig.run(0.1)
+    loaded = rig.control.swept
+    rig.control.loaded(drive_model(Machine()))
+    rig.run(0.1)
+    empty = rig.control.swept
+    assert loaded is not None
+    assert empty is not None
+    assert loaded.stop_m > 1.1 * empty.stop_m
 
 
 class Faults(RuleBasedStateMachine):

@@ -54,6 +54,16 @@ def test_the_past_is_dropped_but_for_what_is_interpolated_from() -> None:
     assert now.speed_mps == pytest.approx(4.5)
 
 
+def test_the_way_until_a_planned_rest() -> None:
+    one = queue((0, 2.0, 0.0), (1000, 2.0, 0.0), (2000, 0.0, 0.0), (3000, 0.0, 0.0), (4000, 1.0, 0.0))
+    assert one.rest_m(0) == pytest.approx(3.0)
+    assert one.rest_m(1500 * MS) == pytest.approx(0.25)
+    assert one.rest_m(2500 * MS) == 0.0
+    assert one.rest_m(3500 * MS) == math.inf
+    assert one.rest_m(9000 * MS) == 0.0
+    assert queue((0, -2.0, 0.0), (1000, 0.0, 0.0)).rest_m(0) == pytest.approx(1.0)
+
+
 @pytest.mark.parametrize(
     "wrong",
     [
