@@ -6,6 +6,7 @@ import math
 
 from lhdmap.driving.model import DriveModel
 
+_CATCH_S = 0.5  # time in which a miss is made up for
 LEAST_BRAKE_MPS2 = 0.2
 """A full brake is not taken for less, however steep it is."""
 
@@ -42,8 +43,9 @@ class SpeedLimiter:
         """Go a period towards a target that changes by `slope_mps2`; `limits`: acceleration, deceleration, jerk."""
         up, down, jerk = limits
         miss = target_mps - self.speed_mps
+        # Each new plan begins with the speed that the machine will have: what is missing to it must not undo the plan's slope.
         # the slope from which `jerk` brings it to nought in the moment in which the target is reached
-        catch = math.copysign(min(abs(miss) / dt_s, math.sqrt(2.0 * jerk * abs(miss))), miss)
+        catch = math.copysign(min(abs(miss) / max(dt_s, _CATCH_S), math.sqrt(2.0 * jerk * abs(miss))), miss)
         slope = _within(slope_mps2 + catch, self.slope_mps2 - jerk * dt_s, self.slope_mps2 + jerk * dt_s)
         ahead = self.speed_mps > 0.0 or (self.speed_mps == 0.0 and slope >= 0.0)
         low, high = (

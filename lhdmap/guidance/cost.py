@@ -150,6 +150,14 @@ def _body(
 
 
 @nb.njit(cache=True, nogil=True)
+def least_clearance(state: FloatArray, vehicle: Vehicle, outline: Outline, field: Field) -> float:
+    """Return the least signed clearance of both bodies at a state (5,)."""
+    weights = Weights(-math.inf, 0.0, -math.inf, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    _, least = _clearances(np.zeros((4, 4)), np.zeros(4), state, vehicle, weights, outline, field)
+    return least
+
+
+@nb.njit(cache=True, nogil=True)
 def _route(
     A: FloatArray, b: FloatArray, state: FloatArray, path: FloatArray, at: int, weights: Weights, share: float
 ) -> float:

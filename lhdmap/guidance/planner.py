@@ -21,6 +21,7 @@ from lhdmap.guidance.cost import Vehicle, Weights
 from lhdmap.guidance.directive import Directive
 from lhdmap.guidance.field import Field, field_around
 from lhdmap.guidance.outline import Outline, outline_of
+from lhdmap.guidance.paper import PaperCost
 from lhdmap.guidance.profile import Speeds, sight_m, speeds_of
 from lhdmap.guidance.settings import GuidanceSettings
 from lhdmap.guidance.solver import Problem, Solution, rolled, solve
@@ -176,6 +177,11 @@ class Guidance:
             Setpoint(from_ns + round(t * _SECOND_NS), gear * v, gear * w)
             for t, v, w in zip(times.tolist(), speed.tolist(), rate.tolist(), strict=True)
         )
+
+
+def method_of(settings: GuidanceSettings) -> Method:
+    """Return the method that the settings name."""
+    return PaperCost(settings) if settings.method == "paper" else GaussNewton(settings)
 
 
 def weights_of(settings: GuidanceSettings, points: int) -> Weights:

@@ -11,7 +11,7 @@ from lhdmap.driving.bodies import bodies_of
 from lhdmap.driving.model import drive_model
 from lhdmap.errors import ConfigError, UsageError
 from lhdmap.executor.control import Control
-from lhdmap.guidance.planner import GaussNewton, Guidance
+from lhdmap.guidance.planner import Guidance, method_of
 from lhdmap.movement.routes import RoutePlanner
 from lhdmap.navigation.control import NavigationControl
 from lhdmap.replay.engine import Engine, overrun_targets
@@ -106,7 +106,7 @@ def _autonomous(scenario: Scenario, parts: Parts, given: Autonomous, journal: Jo
         journal.of(NAVIGATION).goes,
     )
     eyes_m = {1: machine.mounts["lidar_front"].position_m[0], -1: -machine.mounts["lidar_rear"].position_m[0]}
-    guidance = Guidance(model, bodies, eyes_m, settings.guidance, GaussNewton(settings.guidance))
+    guidance = Guidance(model, bodies, eyes_m, settings.guidance, method_of(settings.guidance))
     control = Control(model, bodies, settings.executor, PERIODS_S)
     return [
         Locating(given.known, settings, machine, given.start, journal.of(PERCEPTION)),

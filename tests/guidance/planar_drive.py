@@ -49,9 +49,10 @@ def swept_half_widths(line: FloatArray) -> tuple[FloatArray, FloatArray]:
     bend = np.zeros(len(line))
     for k in range(len(line) - 1):
         curvature = (heading[k + 1] - heading[k]) / 0.1
-        bend[k + 1] = bend[k] + 0.1 * (
-            curvature * (lead.lead_m * math.cos(bend[k]) + lead.trail_m) - math.sin(bend[k])
-        ) / lead.trail_m
+        bend[k + 1] = (
+            bend[k]
+            + 0.1 * (curvature * (lead.lead_m * math.cos(bend[k]) + lead.trail_m) - math.sin(bend[k])) / lead.trail_m
+        )
     left, right = np.full(len(line), 1.225), np.full(len(line), 1.225)
     for k in range(0, len(line), 2):
         outlines = placed(np.array([*line[k], heading[k], bend[k]]))
@@ -79,11 +80,15 @@ def placed(state: FloatArray) -> FloatArray:
     return np.vstack([front, np.array([rx, ry]) + BODIES.rear_m @ np.array([[c, s], [-s, c]])])
 
 
-def narrow(radius_m: float, turn_deg: float, c_m: float, seed: int = 0, rms_m: float = 0.05) -> tuple[FloatArray, FloatArray]:
+def narrow(
+    radius_m: float, turn_deg: float, c_m: float, seed: int = 0, rms_m: float = 0.05
+) -> tuple[FloatArray, FloatArray]:
     """A centre line and walls with `c_m` of least room beside the swept bodies, rough outward."""
     line = bend_line(radius_m, turn_deg)
     left, right = swept_half_widths(line)
-    fields = [noise_field(np.random.default_rng([seed, k]), Scales(4, 8.0, 0.6), (0.0, 200.0), (0.0, 1.0)) for k in range(2)]
+    fields = [
+        noise_field(np.random.default_rng([seed, k]), Scales(4, 8.0, 0.6), (0.0, 200.0), (0.0, 1.0)) for k in range(2)
+    ]
     at = 0.1 * np.arange(len(line))
     rough = []
     for one in fields:
@@ -140,7 +145,9 @@ def drive(
         force = next((one for one in reversed(sent) if one.at_ns <= dead), sent[0])
         change = (force.speed_mps - speed) * -math.expm1(-0.01 / MODEL.drive_lag_s)
         speed += min(max(change, -0.015), 0.01)
-        after = stepped(tuple(state.tolist()), speed, gain * force.steering_rate_rps, 0.01, MODEL.front_m, MODEL.rear_m, 0.2)
+        after = stepped(
+            tuple(state.tolist()), speed, gain * force.steering_rate_rps, 0.01, MODEL.front_m, MODEL.rear_m, 0.2
+        )
         state = np.array(after)
         now += STEP_NS
         if now % 100_000_000 == 0:
