@@ -17,16 +17,17 @@ import numpy.typing as npt
 
 from lhdmap.landmarks.distinct import TEMPER, TRUNCATED
 from lhdmap.localization.strips import Strips
-from lhdmap.messages import Float32Array, FloatArray
+from lhdmap.messages import FloatArray
 
 _OUTSIDE_CHI2 = 5.0
 """Of a tunnel that is not in the map: the least that unmapped ones had in rough walls, where walls tell it at all."""
 _APART_M, _APART_RAD = 2.0, 0.35
+_LEVEL_M = 4.0
 _PLACES = 5
 
 
 class LiveProfile(NamedTuple):
-    """Channels of the last metres: `values`, `variances` (3, J), NaN where not known; `line` (3,): pose of the last bin in `odom`."""
+    """Channels of the last metres: `values`, `variances` (3, J), NaN where not known; `line` (3,): last bin's pose in `odom`."""
 
     values: FloatArray
     variances: FloatArray
@@ -46,49 +47,61 @@ class PlaceOnStrips(NamedTuple):
     probability: float
 
 
-def likeliest(strips: Strips, live: LiveProfile, weights: FloatArray) -> tuple[list[PlaceOnStrips], float]:
-    """Return the likeliest places, best first, each at one of its own, and what a place outside the map would cost.
+class Costs:
+    """What each place of the strips costs a live profile; `outside` (nats): what a tunnel that is not in the map would.
 
     `weights` (3,): of the channels.
     """
-    count = live.values.shape[1]
-    if not count or not len(strips.poses):
-        return [], 0.0
-    known = np.isfinite(live.values) & np.isfinite(live.variances)
-    values, variances = (
-        np.where(known, one, other).astype(np.float32) for one, other in ((live.values, 0.0), (live.variances, 1.0))
-    )
-    scaled = (0.5 * TEMPER * weights).astype(np.float32)
-    outside = (scaled[:, None] * known).sum(axis=0, dtype=np.float32) * np.float32(_OUTSIDE_CHI2 - 1.0)
-    costs, chosen = _slide(
-        *(strips.values, strips.variances, strips.known, scaled, values, variances, known),
-        *(strips.starts, strips.before, strips.before_starts, np.cumsum(outside, dtype=np.float32)),
-    )
-    total = float(outside.sum())
-    mass = np.exp(np.minimum(float(costs.min()), total) - costs.astype(np.float64))
-    all_mass = float(mass.sum()) + len(costs) * math.exp(min(float(costs.min()) - total, 0.0))
-    found, left = [], costs.copy()
-    for _ in range(_PLACES):
-        best = int(left.argmin())
-        if not math.isfinite(left[best]):
-            break
-        same = _same_place(strips.poses, best)
-        squares, number = _compared(
-            *(best, strips.values, strips.variances, strips.known, values, variances, known),
-            *(strips.starts, chosen),
+
+    def __init__(self, strips: Strips, live: LiveProfile, weights: FloatArray) -> None:
+        self._strips = strips
+        known = np.isfinite(live.values) & np.isfinite(live.variances)
+        values, variances = (
+            np.where(known, one, other).astype(np.float32) for one, other in ((live.values, 0.0), (live.variances, 1.0))
         )
-        share = number / max(int(known[:2].sum()), 1)
-        probability = float(mass[same].sum()) / all_mass
-        found.append(PlaceOnStrips(best, float(costs[best]), squares / max(number, 1), share, probability))
-        left[same] = np.inf
-    return found, total
+        scaled = (0.5 * TEMPER * weights).astype(np.float32)
+        outside = np.cumsum((scaled[:, None] * known).sum(axis=0) * (_OUTSIDE_CHI2 - 1.0))
+        self.outside = float(outside[-1])
+        self._map, self._live = (strips.values, strips.variances, strips.known), (values, variances, known)
+        self._bins = max(int(known[:2].sum()), 1)
+        ways = strips.starts, strips.before, strips.before_starts
+        self._costs, self._chosen = _slide(*self._map, scaled, *self._live, *ways, outside.astype(np.float32))
+        least = min(float(self._costs.min()), self.outside)
+        self._mass = np.exp(least - self._costs.astype(np.float64))
+        self._all_mass = float(self._mass.sum()) + len(self._costs) * math.exp(least - self.outside)
 
+    def likeliest(self, count: int = _PLACES) -> list[PlaceOnStrips]:
+        """Return the likeliest places, best first, each at one of its own."""
+        found: list[PlaceOnStrips] = []
+        left = self._costs.copy()
+        while len(found) < count and math.isfinite(left.min()):
+            best = int(left.argmin())
+            same = self.near(self._strips.poses[best], float(self._strips.heights_m[best]))
+            found.append(self._told(best, same))
+            left[same] = np.inf
+        return found
 
-def _same_place(poses: FloatArray, place: int) -> npt.NDArray[np.bool_]:
-    apart = np.abs(poses - poses[place])
-    turn = np.abs((apart[:, 2] + math.pi) % (2.0 * math.pi) - math.pi)
-    same: npt.NDArray[np.bool_] = (apart[:, 0] ** 2 + apart[:, 1] ** 2 < _APART_M**2) & (turn < _APART_RAD)
-    return same
+    def at(self, line: FloatArray, height_m: float) -> PlaceOnStrips | None:
+        """Return the best place about a pose (3,) of the live profile's last bin; None where the map has no walls there."""
+        near = np.flatnonzero(self.near(line, height_m))
+        if not len(near):
+            return None
+        best = int(near[self._costs[near].argmin()])
+        return self._told(best, self.near(self._strips.poses[best], height_m))
+
+    def near(self, pose: FloatArray, height_m: float) -> npt.NDArray[np.bool_]:
+        """Return which places (B,) are about a pose (3,)."""
+        apart = np.abs(self._strips.poses - pose)
+        turn = np.abs((apart[:, 2] + math.pi) % (2.0 * math.pi) - math.pi)
+        level = np.abs(self._strips.heights_m - height_m) < _LEVEL_M
+        same: npt.NDArray[np.bool_] = (apart[:, 0] ** 2 + apart[:, 1] ** 2 < _APART_M**2) & (turn < _APART_RAD) & level
+        return same
+
+    def _told(self, place: int, same: npt.NDArray[np.bool_]) -> PlaceOnStrips:
+        squares, number = _compared(place, *self._map, *self._live, self._strips.starts, self._chosen)
+        probability = float(self._mass[same].sum()) / self._all_mass
+        cost = float(self._costs[place])
+        return PlaceOnStrips(place, cost, squares / max(number, 1), number / self._bins, probability)
 
 
 @nb.njit(cache=True, nogil=True, fastmath={"nnan", "ninf", "nsz", "contract"})
@@ -99,7 +112,7 @@ def _add(costs, values, variances, known, live):  # type: ignore[no-untyped-def]
     for b in range(costs.shape[0]):
         d = values[b] - at
         x = d * d / (variances[b] + variance)
-        x = x if x < truncated else truncated
+        x = min(x, truncated)
         costs[b] += weight * known[b] * (x - one)
 
 

@@ -1,8 +1,8 @@
 """The map as strips of wall profile: left and right wall and turn of the mid line, each 0.1 m, along all ways through the graph.
 
-A tunnel is one strip. Through an intersection there is a strip for each pair of arms, which begins and ends some metres inside the
-tunnels, where the mid line no longer bends. Each strip is there in both directions. A strip knows which ones lead into it, so that
-a profile runs on across every hand-over (`lhdmap.localization.placing`). Where nothing leads in, the way comes from outside the map.
+A tunnel is one strip. Through an intersection there is a strip for each pair of arms, which begins and ends some metres inside
+the tunnels, where the mid line no longer bends. Each strip is there in both directions. A strip knows which ones lead into it, so
+that a profile runs on across every hand-over (`lhdmap.localization.placing`). Where nothing leads in, the way comes from outside.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ Port = tuple[str, int, bool]
 
 
 class Strip(NamedTuple):
-    """One way along walls: `values`, `variances` (3, n) as `channels` gives them, mid line `poses` (n, 3) and `heights_m` in `map`.
+    """One way along walls: `values`, `variances` (3, n) of `channels`, mid line `poses` (n, 3) and `heights_m` in `map`.
 
     `enters`, `leaves`: ports, None at an end of the map.
     """
@@ -237,9 +237,7 @@ def _turned(strip: Strip) -> Strip:
     values, variances = strip.values[[1, 0, 2], ::-1].copy(), strip.variances[[1, 0, 2], ::-1]
     values[2] *= -1.0
     poses = strip.poses[::-1] + np.array([0.0, 0.0, math.pi])
-    return Strip(
-        strip.node, values, variances, poses, strip.heights_m[::-1], _back(strip.leaves), _back(strip.enters)
-    )
+    return Strip(strip.node, values, variances, poses, strip.heights_m[::-1], _back(strip.leaves), _back(strip.enters))
 
 
 def _back(port: Port | None) -> Port | None:

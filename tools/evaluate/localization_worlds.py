@@ -1,8 +1,9 @@
-"""Planar mines of separate tunnels, taught by a drive whose odometry drifts, and other drives through them: truth for localization."""
+"""Planar mines of separate tunnels, taught by a drive whose odometry drifts, and other drives through them, with truth."""
 
 from __future__ import annotations
 
 import functools
+import itertools
 import math
 from typing import NamedTuple
 
@@ -16,7 +17,6 @@ from lhdmap.landmarks.surface import fused, placed
 from lhdmap.messages import FloatArray
 from lhdmap.pipeline.localize import KnownMap
 from lhdmap.topology.model import UNEXPLORED, TopologicalMap, Tunnel
-
 from tests.landmarks.worlds import MODERATE, ROUGH, SMOOTH, TunnelWorld, seen, tunnel
 
 LENGTH_M, TUNNELS, APART_M = 300.0, 10, 500.0
@@ -72,7 +72,7 @@ def world_of(kind: str, seed: int, number: int) -> TunnelWorld:
 def drifting(true: FloatArray, rng: np.random.Generator, begin: FloatArray) -> FloatArray:
     """Return the poses (K, 3) that an odometry has of true ones, from a pose (3,) on."""
     said, scale = [begin], 1.0 + SCALE * rng.choice([-1.0, 1.0])
-    for before, after in zip(true[:-1], true[1:], strict=True):
+    for before, after in itertools.pairwise(true):
         step = se2.between(before, after)
         way = math.hypot(step[0], step[1])
         turn = WALK_RAD * math.sqrt(way) * rng.standard_normal()
@@ -87,9 +87,7 @@ def poses_through(world: TunnelWorld, every_m: float, rng: np.random.Generator, 
     weave = offset + 0.15 * np.sin(at / 7.0 + phase)
     jitter = math.radians(0.3) * np.sin(at / 3.0 + phase)
     places = at[::-1] if back else at
-    return np.array(
-        [world.pose(*where) for where in zip(places, weave, jitter + math.pi * back, strict=True)]
-    )
+    return np.array([world.pose(*where) for where in zip(places, weave, jitter + math.pi * back, strict=True)])
 
 
 @functools.lru_cache(maxsize=2)
