@@ -1,15 +1,16 @@
 """`Localizer`: messages in, where the machine is on a map out; the same object for a log and for a running machine.
 
 messages -> MappingPipeline (odometry alone) -> steps -> Tracker against the map's walls
--> GlobalSearch where the place is not known, or lost
+-> Finder: searches in a thread of their own where the place is not known, or lost, and checks of the one that is tracked
 """
 
 from __future__ import annotations
 
+import copy
 import math
 import time
 from collections import deque
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from types import TracebackType
 from typing import NamedTuple, Self
@@ -20,9 +21,11 @@ from lhdmap.config import Settings
 from lhdmap.geometry import se2
 from lhdmap.landmarks.model import Landmarks
 from lhdmap.landmarks.store import read_landmarks
+from lhdmap.localization.finder import Finder
 from lhdmap.localization.place_on_map import Placer
 from lhdmap.localization.rows import CANDIDATE, LOST, NOWHERE, TRACKING, UNKNOWN, Row
-from lhdmap.localization.search import Found, GlobalSearch, RecentWay
+from lhdmap.localization.search import CHECK, CONFIRM, FIND, Candidate, GlobalSearch, Search
+from lhdmap.localization.strips import strips_of
 from lhdmap.localization.tracker import Tracker
 from lhdmap.localization.walls import MapWalls
 from lhdmap.machine import Machine
@@ -52,6 +55,11 @@ class KnownMap(NamedTuple):
         sheets = read_sheets(folder.file("free_space.npz"))
         return cls(read_topology(path), read_landmarks(folder.file("landmarks.npz")), sheets)
 
+    def search(self, walls: MapWalls, settings: Settings) -> GlobalSearch:
+        """Return what searches it, with walls of its own: it works in a thread of its own."""
+        strips = strips_of(self.topology, self.landmarks, settings.landmarks)
+        return GlobalSearch(strips, copy.copy(walls), settings.localization, settings.landmarks)
+
 
 class Where(NamedTuple):
     """Where the machine is now: status, pose (x, y, z, yaw) in `map`, covariance (3, 3) of x, y, yaw; None where not known."""
@@ -63,42 +71,52 @@ class Where(NamedTuple):
 
 @dataclass(slots=True)
 class _Trial:
-    """A place under trial: since where on the way, and the support since."""
+    """A place under trial: since where on the way."""
 
     since_m: float
-    margin: float
-    supports: list[float] = field(default_factory=list)
 
 
 class Localizer:
     """Takes messages by role in time order; `rows` is what it said of each front scan, `where` the newest.
 
-    `start` (4,): x, y, yaw (rad) and height about where the machine begins; None: it is searched for. A context manager.
+    `start` (4,): x, y, yaw (rad) and height about where the machine begins; None: it is searched for. `live`: a running machine,
+    where nothing waits for a search; of a log each is waited for, so that the rows are the same each time. A context manager.
     """
 
     def __init__(
-        self, known: KnownMap, settings: Settings, machine: Machine | None = None, start: FloatArray | None = None
+        self,
+        known: KnownMap,
+        settings: Settings,
+        machine: Machine | None = None,
+        start: FloatArray | None = None,
+        *,
+        live: bool = False,
     ) -> None:
         # What lies beyond the map does not count: no loop is closed, no pile looked for.
         settings = replace(settings, pile=replace(settings.pile, method="off"))
         self._settings = settings.localization
         self.pipeline = MappingPipeline(settings, machine, cloud=False, on_step=self._take)
         self._walls, self._placer = MapWalls(known.topology, known.landmarks), Placer(known.topology)
-        self._search = GlobalSearch(known.sheets, self._walls, self._settings)
-        self._way = RecentWay(self._settings.window_m)
+        search = known.search(self._walls, settings)
+        self._finder = Finder(search, self._settings, settings.landmarks, waits=not live)
         self._tracker = None if start is None else self._started(start)
         self._turnable = start is not None  # a waypoint's heading is its node's: the machine may face the other way
         self._status = UNKNOWN if start is None else TRACKING
         self._trial: _Trial | None = None
         self._supports: deque[float] = deque(maxlen=self._settings.support_scans)
         self._before: FloatArray | None = None
-        self._travelled_m = self._searched_m = 0.0
+        self._travelled_m = 0.0
         self._probability = 0.0 if start is None else 1.0
         self._information = 0.0
         self.withheld, self.lost_stretches = 0, 0
         self.first_fix: tuple[float, float] | None = None  # seconds, metres
         self._began_ns: int | None = None
         self.rows: list[Row] = []
+
+    @property
+    def searches(self) -> list[Search]:
+        """What each search over the map said: places, their probabilities, and why none was believed."""
+        return list(self._finder.searches)
 
     def __enter__(self) -> Self:
         return self
@@ -107,6 +125,7 @@ class Localizer:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         """Let go of what is held."""
+        self._finder.close()
         self.pipeline.__exit__(kind, error, trace)
 
     def update(self, role: str, message: Message) -> None:
@@ -144,10 +163,12 @@ class Localizer:
         source = ""
         if step.processed:
             points, front = self._hits(odometry)
-            self._way.add(self._travelled_m, step.T_odom_base, points)
+            self._finder.add(step.T_odom_base, points)
             source = self._correct(points, front)
-            self._judge(stamp_ns)
-            self._look_around(step)
+            self._judge()
+            self._look_around(stamp_ns, step)
+            if self._status == TRACKING and self.first_fix is None:
+                self.first_fix = ((stamp_ns - self._began_ns) * 1e-9, self._travelled_m)
         self.rows.append(self._row(stamp_ns, step, source, 1e3 * (time.perf_counter() - began)))
 
     def _hits(self, odometry: PlanarOdometry) -> tuple[FloatArray, int]:
@@ -172,8 +193,8 @@ class Localizer:
         self._information = said.information_along
         return "walls" if said.support > 0.0 else "odometry"
 
-    def _judge(self, stamp_ns: int) -> None:
-        """Decide by the support whether the place still holds, or holds at last."""
+    def _judge(self) -> None:
+        """Decide by the support whether the place still holds."""
         if self._tracker is None or self._status == LOST or not self._supports:
             return
         place = self._placer.at(self._tracker.pose, self._tracker.height_m, 1.0)
@@ -182,17 +203,12 @@ class Localizer:
         holds = float(np.mean(self._supports)) >= max(wanted, 0.15)
         if not holds and len(self._supports) == self._supports.maxlen:
             self._drop()
-        elif self._trial is not None and self._travelled_m - self._trial.since_m >= self._settings.confirm_m:
-            self._status, self._trial = TRACKING, None
-            self._probability = 1.0
-        if self._status == TRACKING and self.first_fix is None and self._began_ns is not None:
-            self.first_fix = ((stamp_ns - self._began_ns) * 1e-9, self._travelled_m)
 
     def _drop(self) -> None:
         """Give a place up: a trial that failed, or one that was lost."""
         self._supports.clear()
         self._probability = 0.0
-        self._searched_m = self._travelled_m - self._settings.search_m + 1.0  # search again soon
+        self._finder.again()
         if self._trial is not None:
             self.withheld += 1
             self._trial, self._tracker = None, None
@@ -200,28 +216,42 @@ class Localizer:
             return
         self.lost_stretches += 1
         self._status = LOST
-        self._way = RecentWay(self._settings.window_m)  # what was seen before may be of another place
+        self._finder.forget()
 
-    def _look_around(self, step: OdometryStep) -> None:
-        """Search the whole map, where the place is not known and the machine has moved on since the last search."""
-        wanted_m = min(self._settings.search_m, self._settings.window_m - 1.0)
-        if self._status not in (UNKNOWN, LOST) or self._way.length_m < wanted_m:
+    def _look_around(self, stamp_ns: int, step: OdometryStep) -> None:
+        """Take over what a search has said, and begin the next one that is due."""
+        said = self._finder.answer(stamp_ns, step.T_odom_base)
+        if said is not None and said.purpose == self._purpose:
+            self._take_over(said)
+        if self._trial is not None and self._travelled_m - self._trial.since_m < self._settings.confirm_m:
             return
-        if self._travelled_m - self._searched_m < self._settings.search_m:
-            return
-        self._searched_m = self._travelled_m
-        found = self._search.places(self._way, step.T_odom_base)
-        if not found or found[0].margin < self._settings.margin:
-            self.withheld += bool(found)
-            return
-        self._try(found[0])
+        tracker = None if self._purpose == FIND else self._tracker
+        claimed = None if tracker is None else np.append(tracker.pose, tracker.height_m)
+        self._finder.ask(self._purpose, stamp_ns, self._travelled_m, step.T_odom_base, claimed)
 
-    def _try(self, found: Found) -> None:
+    @property
+    def _purpose(self) -> str:
+        return {TRACKING: CHECK, CANDIDATE: CONFIRM}.get(self._status, FIND)
+
+    def _take_over(self, said: Search) -> None:
+        """Try the place that was found, keep or drop the one on trial, drop the tracked one that is contradicted."""
+        if said.claimed is not None:
+            self._probability = said.claimed.probability
+        if said.purpose == FIND and not said.refused:
+            self._try(said.candidates[0])
+        elif said.purpose == FIND:
+            self.withheld += bool(said.candidates)
+        elif said.purpose == CONFIRM and said.confirms:
+            self._status, self._trial = TRACKING, None
+        elif said.purpose == CONFIRM or said.contradicts:
+            self._drop()
+
+    def _try(self, found: Candidate) -> None:
         std = np.array([0.1, 0.1, math.radians(1.0)])
         height = self._placer.height_m(found.pose[0], found.pose[1], found.height_m)
         self._tracker = Tracker(self._walls, self._settings, found.pose, np.diag(std**2), height)
-        self._trial = _Trial(self._travelled_m, found.margin)
-        self._status, self._probability = CANDIDATE, min(max(found.margin, 0.0), 1.0)
+        self._trial = _Trial(self._travelled_m)
+        self._status, self._probability = CANDIDATE, found.probability
         self._supports.clear()
 
     def _row(self, stamp_ns: int, step: OdometryStep, source: str, latency_ms: float) -> Row:
