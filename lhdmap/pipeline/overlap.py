@@ -14,7 +14,8 @@ import numpy as np
 
 from lhdmap.config import Settings
 from lhdmap.geometry import se2
-from lhdmap.localization.search import GlobalSearch, RecentWay
+from lhdmap.localization.recent_way import RecentWay
+from lhdmap.localization.search import FIND, GlobalSearch, Question
 from lhdmap.localization.walls import MapWalls
 from lhdmap.messages import FloatArray
 from lhdmap.pipeline.localize import KnownMap
@@ -23,7 +24,7 @@ from lhdmap.update import fit
 
 _WINDOW_M, _EVERY_M = 24.0, 12.0
 _LEVEL_M, _RANGE_M = 2.5, 12.0  # hits of walls, near the machine
-_LEAST_SUPPORT, _OF_EACH, _TRIED = 0.35, 3, 4
+_LEAST_PROBABILITY, _TRIED = 0.05, 8
 _SAME_M, _SAME_RAD, _DRIFT = 2.0, math.radians(5.0), 0.01
 _FEWEST_TIED, _SHARE_TIED = 5, 0.5
 _AS_WELL = 0.5  # of the scans that fit at the best place: with so many a second place is as good
@@ -38,18 +39,17 @@ class Overlap(NamedTuple):
 
 
 class _Place(NamedTuple):
-    """A place that a window proposes: `T_map_drive` (3,), the machine's pose (3,) in the drive's frame there, support."""
+    """A place that a window proposes: `T_map_drive` (3,), the machine's pose (3,) in the drive's frame there, its probability over its χ²."""
 
     T_map_drive: FloatArray
     pose: FloatArray
-    support: float
+    weight: float
 
 
 def overlap_of(known: KnownMap, seen: fit.Seen, drive: fit.Seen, settings: Settings) -> Overlap:
     """Return where a drive lies in a map whose own drive has `seen` it."""
-    walls = MapWalls(known.topology, known.landmarks)
-    search = GlobalSearch(known.sheets, walls, settings.localization)
-    groups = _groups(_proposed(search, drive))
+    search = known.search(MapWalls(known.topology, known.landmarks), settings)
+    groups = _groups(_proposed(search, drive, settings))
     fits = [fit.fitted(seen, drive, group[0].T_map_drive, settings.smoothing) for group in groups[:_TRIED]]
     held = sorted((one for one in fits if one is not None and _holds(one)), key=lambda one: -one.tied)
     apart = [one for one in held[1:] if _differ(one, held[0], drive)]
@@ -60,20 +60,22 @@ def overlap_of(known: KnownMap, seen: fit.Seen, drive: fit.Seen, settings: Setti
     return Overlap(held[0])
 
 
-def _proposed(search: GlobalSearch, drive: fit.Seen) -> list[_Place]:
+def _proposed(search: GlobalSearch, drive: fit.Seen, settings: Settings) -> list[_Place]:
     """Return what each window of the drive proposes."""
-    found, way = list[_Place](), RecentWay(_WINDOW_M)
-    travelled = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(drive.poses[:, :2], axis=0).T))])
-    next_m = _WINDOW_M - 1.0
-    for view, pose, at_m in zip(drive.views, drive.poses[:, [0, 1, 3]], travelled.tolist(), strict=True):
-        way.add(at_m, pose, _near(view))
-        if at_m >= next_m:
-            next_m = at_m + _EVERY_M
-            found += [
-                _Place(se2.compose(one.pose, se2.inverse(pose)), pose, one.support)
-                for one in search.places(way, pose)[:_OF_EACH]
-                if one.support >= _LEAST_SUPPORT
-            ]
+    found, way, searched_m = list[_Place](), RecentWay(_WINDOW_M, settings.landmarks), 0.0
+    poses = drive.poses[:, [0, 1, 3]]
+    travelled = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(poses[:, :2], axis=0).T))])
+    for view, pose, at_m in zip(drive.views, poses, travelled.tolist(), strict=True):
+        way.add(pose, _near(view))
+        if at_m - searched_m < _EVERY_M or way.length_m < settings.localization.search_m:
+            continue
+        searched_m = at_m
+        said = search.answer(Question(view.time_ns, at_m, FIND, way.snapshot(), pose, None))
+        found += [
+            _Place(se2.compose(one.pose, se2.inverse(pose)), pose, one.probability / max(one.chi2, 1.0))
+            for one in said.candidates
+            if one.probability >= _LEAST_PROBABILITY
+        ]
     return found
 
 
@@ -84,13 +86,13 @@ def _near(view: View) -> FloatArray:
 
 
 def _groups(places: list[_Place]) -> list[list[_Place]]:
-    """Return the places that agree on where the drive lies, the group with the most support first, its best place in front."""
-    left, groups = sorted(places, key=lambda one: -one.support), list[list[_Place]]()
+    """Return the places that agree on where the drive lies, the likeliest group first, its best place in front."""
+    left, groups = sorted(places, key=lambda one: -one.weight), list[list[_Place]]()
     while left:
         own = [one for one in left if _agree(left[0], one)]
         left = [one for one in left if not any(one is other for other in own)]
         groups.append(own)
-    return sorted(groups, key=lambda group: -sum(one.support for one in group))
+    return sorted(groups, key=lambda group: -sum(one.weight for one in group))
 
 
 def _agree(a: _Place, b: _Place) -> bool:
