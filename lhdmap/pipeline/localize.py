@@ -21,6 +21,7 @@ from lhdmap.config import Settings
 from lhdmap.geometry import se2
 from lhdmap.landmarks.model import Landmarks
 from lhdmap.landmarks.store import read_landmarks
+from lhdmap.localization.changes import WorldChanges
 from lhdmap.localization.finder import Finder
 from lhdmap.localization.place_on_map import Placer
 from lhdmap.localization.rows import CANDIDATE, LOST, NOWHERE, TRACKING, UNKNOWN, Row
@@ -98,6 +99,7 @@ class Localizer:
         self.pipeline = MappingPipeline(settings, machine, cloud=False, on_step=self._take)
         self._walls, self._placer = MapWalls(known.topology, known.landmarks), Placer(known.topology)
         search = known.search(self._walls, settings)
+        self.world = WorldChanges(known.topology, known.sheets, self._walls)
         self._finder = Finder(search, self._settings, settings.landmarks, waits=not live)
         self._tracker = None if start is None else self._started(start)
         self._turnable = start is not None  # a waypoint's heading is its node's: the machine may face the other way
@@ -160,7 +162,7 @@ class Localizer:
             if self._tracker is not None:
                 self._tracker.predict(moved, step.error.covariance if step.processed else np.zeros((3, 3)))
         self._before = step.T_odom_base.copy()
-        source = ""
+        source, points = "", np.zeros((0, 2))
         if step.processed:
             points, front = self._hits(odometry)
             self._finder.add(step.T_odom_base, points)
@@ -170,6 +172,11 @@ class Localizer:
             if self._status == TRACKING and self.first_fix is None:
                 self.first_fix = ((stamp_ns - self._began_ns) * 1e-9, self._travelled_m)
         self.rows.append(self._row(stamp_ns, step, source, 1e3 * (time.perf_counter() - began)))
+        if (
+            self._tracker is not None and self._status in (TRACKING, LOST) and len(points)
+        ):  # the place does not wait for it
+            place, known = (self._tracker.pose, self._tracker.height_m), self._status == TRACKING
+            self.world.update(stamp_ns, self._travelled_m, place, points, known=known)
 
     def _hits(self, odometry: PlanarOdometry) -> tuple[FloatArray, int]:
         """Return hits (N, 2) of both scanners near the machine, thinned, and how many are the front one's."""
@@ -249,6 +256,8 @@ class Localizer:
     def _try(self, found: Candidate) -> None:
         std = np.array([0.1, 0.1, math.radians(1.0)])
         height = self._placer.height_m(found.pose[0], found.pose[1], found.height_m)
+        if self._tracker is not None:
+            self.world.found(self._travelled_m, self._tracker.pose, found.pose)
         self._tracker = Tracker(self._walls, self._settings, found.pose, np.diag(std**2), height)
         self._trial = _Trial(self._travelled_m)
         self._status, self._probability = CANDIDATE, found.probability

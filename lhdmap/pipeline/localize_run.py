@@ -13,6 +13,7 @@ import numpy as np
 from lhdmap.config import Settings, settings_table
 from lhdmap.errors import InputError
 from lhdmap.geometry import se3
+from lhdmap.localization.changes import Change
 from lhdmap.localization.rows import TRACKING, Row, columns
 from lhdmap.logs.source import LogSource
 from lhdmap.machine import Machine
@@ -24,6 +25,7 @@ from lhdmap.pipeline.mounts import machine_of
 from lhdmap.pipeline.outcome import ROLES_READ
 from lhdmap.report.localization_page import write_localization_report
 from lhdmap.runfolder import RunFolderWriter, RunInfo
+from lhdmap.topology.model import TopologicalMap
 from lhdmap.trajectory import Trajectory, write_tum
 
 KIND = "localization"
@@ -78,6 +80,8 @@ def localize(request: LocalizeRequest) -> LocalizeResult:
         write_tum(folder.path / "localization.tum", trajectory_of(localizer.rows))
         folder.finished(folder.path / "localization.tum")
         drawn = request.target.name, known.topology, known.sheets
+        changes = localizer.world.changes()
+        folder.write_json("changes.json", changes_table(changes, known.topology, request))
         write_localization_report(folder.path / "report.html", drawn, localizer.rows, summary, told)
         folder.finished(folder.path / "report.html")
         options = {**settings_table(request.settings), "request": {"map": str(request.map.resolve())}}
@@ -96,6 +100,7 @@ def summary_of(localizer: Localizer) -> dict[str, Any]:
         "first_fix_m": None if first is None else first[1],
         "lost_stretches": localizer.lost_stretches,
         "false_fix_guard": localizer.withheld,
+        "changes": len(localizer.world.changes()),
         "latency_ms": {"median": float(np.median(latencies)), "p99": float(np.quantile(latencies, 0.99))},
     }
 
@@ -107,3 +112,24 @@ def trajectory_of(rows: Sequence[Row]) -> Trajectory:
     positions = np.array([[row.x_m, row.y_m, row.z_m] for row in kept]).reshape(-1, 3)
     yaw = np.array([row.yaw_rad for row in kept])
     return Trajectory(stamps, positions, se3.quaternions_from_rpy(np.zeros(len(kept)), np.zeros(len(kept)), yaw))
+
+
+def changes_table(changes: Sequence[Change], topology: TopologicalMap, request: LocalizeRequest) -> dict[str, Any]:
+    """Return what is not as in the map as JSON values, and the command that takes it over."""
+    names = {node.id: node.name for node in topology.nodes.values()}
+    listed = [{"name": names.get(one.node, ""), **_rounded(one._asdict())} for one in changes]
+    command = " ".join(["lhdmap update-map", str(request.map), *map(str, request.logs)]) if changes else None
+    return {"changes": listed, "update": command}
+
+
+def _rounded(values: Mapping[str, Any]) -> dict[str, Any]:
+    """Return values with millimetres, NaN as null."""
+
+    def told(value: Any) -> Any:
+        if isinstance(value, tuple):
+            return [told(one) for one in value]
+        if isinstance(value, float):
+            return round(value, 3) if math.isfinite(value) else None
+        return value
+
+    return {key: told(value) for key, value in values.items()}

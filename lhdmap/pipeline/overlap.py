@@ -39,7 +39,10 @@ class Overlap(NamedTuple):
 
 
 class _Place(NamedTuple):
-    """A place that a window proposes: `T_map_drive` (3,), the machine's pose (3,) in the drive's frame there, its probability over its χ²."""
+    """A place that a window proposes: `T_map_drive` (3,), the machine's pose (3,) in the drive's frame there.
+
+    `weight`: its probability, over the reduced χ² of its walls.
+    """
 
     T_map_drive: FloatArray
     pose: FloatArray
