@@ -107,13 +107,13 @@ class GlobalSearch:
     def answer(self, asked: Question) -> Search:
         """Search the whole map."""
         window, said = asked.window, Search(*asked[:2], asked.window.length_m, asked.purpose, (), "no walls in reach")
-        live = window.profile(self._landmarks)
+        live = window.profile(self._landmarks, self._strips.noise)
         if not len(self._strips.poses) or not np.isfinite(live.values[:2]).any():
             return said
         costs = Costs(self._strips, live, self._weights)
         T_line_base = se2.compose(se2.inverse(live.line), asked.T_odom_base)
         places = costs.likeliest()
-        rivals = [min([costs.outside, *(other.cost for other in places if other is not one)]) for one in places]
+        rivals = [min([0.0, *(other.cost for other in places if other is not one)]) for one in places]
         candidates = [
             self._candidate(one, rival - one.cost, T_line_base) for one, rival in zip(places, rivals, strict=True)
         ]
@@ -125,7 +125,7 @@ class GlobalSearch:
             line = se2.compose(asked.claimed[:3], se2.inverse(T_line_base))
             place = costs.at(line, asked.claimed[3])
             if place is not None:
-                gap = min(costs.outside, places[0].cost) - place.cost
+                gap = min(0.0, places[0].cost) - place.cost
                 claimed = self._candidate(place, gap, T_line_base)._replace(pose=asked.claimed[:3])
         return said._replace(candidates=tuple(candidates), refused=refused, claimed=claimed)
 
