@@ -110,14 +110,12 @@ class RecentWay:
         thinned: FloatArray = points[np.sort(first)]
         return thinned
 
-    def snapshot(self) -> Window:
-        """Return what a search needs, so that it may run beside what goes on here."""
+    def snapshot(self, within_m: float = math.inf) -> Window:
+        """Return what a search needs, of the way within some travel of the machine; it may run beside what goes on here."""
         points, counts = self.cells()
-        return Window(points, counts, np.array([pose[:2] for _, pose in self._way]), self._axis(), self.length_m)
-
-    def _axis(self) -> tuple[FloatArray, FloatArray]:
-        """Return the poses (3,) of the machine at both ends of the way."""
-        return self._way[0][1], self._way[-1][1]
+        way = [one for one in self._way if abs(one[0] - self._ahead_m) <= within_m]
+        ends = way[0][1], way[-1][1]
+        return Window(points, counts, np.array([pose[:2] for _, pose in way]), ends, way[-1][0] - way[0][0])
 
 
 class Window(NamedTuple):

@@ -243,7 +243,7 @@ class Localizer:
             self.withheld += bool(said.candidates)
         elif said.purpose == CONFIRM and said.confirms:
             self._status, self._trial = TRACKING, None
-        elif said.purpose == CONFIRM or said.contradicts:
+        elif said.purpose == CONFIRM or said.denied:
             self._drop()
 
     def _try(self, found: Candidate) -> None:
