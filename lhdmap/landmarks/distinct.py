@@ -67,14 +67,17 @@ def not_distinctive(at_m: Float32Array, gap: Float32Array, least: float) -> Stre
     return [one for one in found if one[1] - one[0] >= _LEAST_M]
 
 
-def channels(profile: Profile, step_m: float) -> tuple[FloatArray, FloatArray]:
-    """Return values and variances (P, 3): left and right wall, turn of the mid line; NaN where not known."""
+def channels(profile: Profile, step_m: float, noise: float = 1.0) -> tuple[FloatArray, FloatArray]:
+    """Return values and variances (P, 3): left and right wall, turn of the mid line; NaN where not known.
+
+    `noise`: factor of what of the walls' variance is not due to their slope.
+    """
     values, variances = [], []
     for wall, variance in ((profile.left_m, profile.left_var), (profile.right_m, profile.right_var)):
         distance = wall.astype(np.float64)
         slope = np.abs(np.gradient(distance, step_m))
         values.append(distance)
-        variances.append(variance + (slope * _SLOPE_M) ** 2 + 0.5 * _BASE_M**2)
+        variances.append(noise * (variance + 0.5 * _BASE_M**2) + (slope * _SLOPE_M) ** 2)
     half = max(round(0.5 * _TURN_M / step_m), 1)
     heading, turn = profile.heading_rad.astype(np.float64), np.full(len(profile.at_m), np.nan)
     if len(heading) > 2 * half:

@@ -13,6 +13,8 @@ from lhdmap.localization.search_thread import SearchThread
 from lhdmap.localization.settings import LocalizationSettings
 from lhdmap.messages import FloatArray
 
+_CHECKED_M = 12.0  # what lies farther back says nothing of a machine that was moved since
+_GROWS = 0.2  # a search needs so much more wall than the one before
 _KEPT = 20_000  # searches: of a day; older ones are forgotten
 
 
@@ -44,12 +46,14 @@ class Finder:
         self, purpose: str, stamp_ns: int, travelled_m: float, T_odom_base: FloatArray, claimed: FloatArray | None
     ) -> None:
         """Begin a search if one is due; `claimed` (4,): place x, y, yaw, height that is on trial or tracked."""
-        every_m = {FIND: self._settings.search_every_m, CHECK: self._settings.check_every_m, CONFIRM: 0.0}[purpose]
+        finding_m = max(self._settings.search_every_m, _GROWS * self._way.length_m)
+        every_m = {FIND: finding_m, CHECK: self._settings.check_every_m, CONFIRM: 0.0}[purpose]
         # Standing still tells nothing new.
         if self._thread.busy or travelled_m - self._asked_m < every_m or self._way.length_m < self._settings.search_m:
             return
         self._asked_m = travelled_m
-        self._thread.ask(Question(stamp_ns, travelled_m, purpose, self._way.snapshot(), T_odom_base.copy(), claimed))
+        window = self._way.snapshot(_CHECKED_M if purpose == CHECK else math.inf)
+        self._thread.ask(Question(stamp_ns, travelled_m, purpose, window, T_odom_base.copy(), claimed))
 
     def answer(self, stamp_ns: int, T_odom_base: FloatArray) -> Search | None:
         """Return the answer that is due, its places carried on to where the machine is now."""

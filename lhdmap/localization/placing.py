@@ -1,9 +1,10 @@
 """A live profile is laid over all strips of a map: what each place costs, and which are the likeliest.
 
 A place is where the newest bin of the live profile lies. It costs half the sum of squared differences over their variance,
-truncated at 3 sigma, tempered by a third, as neighbouring bins are not independent (`lhdmap.landmarks.distinct`); one is taken off
-each, so that what is not known counts for nothing. From bin to bin each cost moves on by one place; where strips meet, the
-cheapest of those that lead in goes on: so all ways through the graph are tried at the price of one.
+truncated at 3 sigma, tempered by a third, as neighbouring bins are not independent (`lhdmap.landmarks.distinct`). What a fit
+tells against another wall of the kind is taken off: so what is not known counts for nothing, and so does a tunnel outside the
+map. From bin to bin each cost moves on by one place; where strips meet, the cheapest of those that lead in goes on: so all ways
+through the graph are tried at the price of one.
 """
 
 from __future__ import annotations
@@ -19,8 +20,6 @@ from lhdmap.landmarks.distinct import TEMPER, TRUNCATED
 from lhdmap.localization.strips import Strips
 from lhdmap.messages import FloatArray
 
-_OUTSIDE_CHI2 = 5.0
-"""Of a tunnel that is not in the map: the least that unmapped ones had in rough walls, where walls tell it at all."""
 _APART_M, _APART_RAD = 2.0, 0.35
 _LEVEL_M = 4.0
 _PLACES = 5
@@ -48,7 +47,7 @@ class PlaceOnStrips(NamedTuple):
 
 
 class Costs:
-    """What each place of the strips costs a live profile; `outside` (nats): what a tunnel that is not in the map would.
+    """What each place of the strips costs a live profile, nats: 0 is what a tunnel costs that is not in the map.
 
     `weights` (3,): of the channels.
     """
@@ -60,15 +59,13 @@ class Costs:
             np.where(known, one, other).astype(np.float32) for one, other in ((live.values, 0.0), (live.variances, 1.0))
         )
         scaled = (0.5 * TEMPER * weights).astype(np.float32)
-        outside = np.cumsum((scaled[:, None] * known).sum(axis=0) * (_OUTSIDE_CHI2 - 1.0))
-        self.outside = float(outside[-1])
         self._map, self._live = (strips.values, strips.variances, strips.known), (values, variances, known)
         self._bins = max(int(known[:2].sum()), 1)
         ways = strips.starts, strips.before, strips.before_starts
-        self._costs, self._chosen = _slide(*self._map, scaled, *self._live, *ways, outside.astype(np.float32))
-        least = min(float(self._costs.min()), self.outside)
+        self._costs, self._chosen = _slide(*self._map, strips.evidence, scaled, *self._live, *ways)
+        least = min(float(self._costs.min()), 0.0)
         self._mass = np.exp(least - self._costs.astype(np.float64))
-        self._all_mass = float(self._mass.sum()) + len(self._costs) * math.exp(least - self.outside)
+        self._all_mass = float(self._mass.sum()) + len(self._costs) * math.exp(least)
 
     def likeliest(self, count: int = _PLACES) -> list[PlaceOnStrips]:
         """Return the likeliest places, best first, each at one of its own."""
@@ -104,21 +101,20 @@ class Costs:
         return PlaceOnStrips(place, cost, squares / max(number, 1), number / self._bins, probability)
 
 
-@nb.njit(cache=True, nogil=True, fastmath={"nnan", "ninf", "nsz", "contract"})
-def _add(costs, values, variances, known, live):  # type: ignore[no-untyped-def]
+@nb.njit(cache=True, nogil=True, error_model="numpy", fastmath={"nnan", "ninf", "nsz", "contract"})
+def _add(costs, values, variances, known, evidence, live):  # type: ignore[no-untyped-def]
     """Add to the costs of places (n,) what one channel of a live bin (value, variance, weight) costs there."""
     at, variance, weight = live
-    truncated, one = np.float32(TRUNCATED), np.float32(1.0)
+    truncated = np.float32(TRUNCATED)
     for b in range(costs.shape[0]):
         d = values[b] - at
-        x = d * d / (variances[b] + variance)
-        x = min(x, truncated)
-        costs[b] += weight * known[b] * (x - one)
+        x = known[b] * d * d / (variances[b] + variance)
+        costs[b] += weight * (min(x, truncated) - evidence[b])
 
 
 @nb.njit(cache=True, nogil=True)
 def _slide(  # type: ignore[no-untyped-def]
-    values, variances, known, weights, live, live_variances, live_known, starts, before, before_starts, outside
+    values, variances, known, evidence, weights, live, live_variances, live_known, starts, before, before_starts
 ):
     """Return the cost (B,) of each place for the last bin, and which strip each was entered from: (J, S), -1 from outside."""
     count, strips, bins = live.shape[1], len(starts) - 1, values.shape[1]
@@ -128,7 +124,7 @@ def _slide(  # type: ignore[no-untyped-def]
         for s in range(strips):
             low, high = starts[s], starts[s + 1]
             if j > 0:
-                first = outside[j - 1] if before_starts[s] == before_starts[s + 1] else np.float32(np.inf)
+                first = np.float32(0.0) if before_starts[s] == before_starts[s + 1] else np.float32(np.inf)
                 for k in range(before_starts[s], before_starts[s + 1]):
                     entered = old[starts[before[k] + 1] - 1]
                     if entered < first:
@@ -138,10 +134,11 @@ def _slide(  # type: ignore[no-untyped-def]
             for c in range(3):
                 if not live_known[c, j]:
                     continue
+                here = slice(low, high)
                 _add(
-                    new[low:high], values[c, low:high], variances[c, low:high], known[c, low:high],
+                    *(new[here], values[c, here], variances[c, here], known[c, here], evidence[c, here]),
                     (live[c, j], live_variances[c, j], weights[c]),
-                )  # fmt: skip
+                )
         old, new = new, old
     return old, chosen
 

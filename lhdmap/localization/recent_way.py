@@ -15,6 +15,7 @@ import numpy as np
 from lhdmap.geometry import se2
 from lhdmap.landmarks.distinct import channels
 from lhdmap.landmarks.profile import profile_of
+from lhdmap.landmarks.scans import near
 from lhdmap.landmarks.settings import LandmarkSettings
 from lhdmap.landmarks.surface import fused
 from lhdmap.localization.placing import LiveProfile
@@ -22,8 +23,8 @@ from lhdmap.messages import FloatArray
 from lhdmap.topology.driven import arc_m
 
 _EVERY_M = 0.1
-_BLOCK_M = 1.0
-_PROFILE_RANGE_M = 8.0  # hits nearer than this: far ones graze the walls
+_BLOCK_M = 4.0  # hits are averaged over so much travel at a time
+_RANGE_M = 9.0  # of the machine's centre: farther hits graze the walls
 _AHEAD_M, _BEHIND_M = 3.0, 7.0  # of wall that is seen beyond the way: as far as the rear scanner and a little more
 _OFF_M = 0.7  # beside its former way by this much: another way
 
@@ -59,8 +60,7 @@ class RecentWay:
             return
         self._taken_m = self._travelled_m
         self._go_on(forward < 0.0)
-        near = points[np.hypot(points[:, 0], points[:, 1]) < _PROFILE_RANGE_M + _BEHIND_M]
-        self._fresh.append(se2.transform(self._pose, near))
+        self._fresh.append(se2.transform(self._pose, near(points, _RANGE_M, self._settings.centre_m)))
         if self._travelled_m - self._block_m >= _BLOCK_M:
             self._block_m = self._travelled_m
             self._blocks.append(self._fused_fresh())
@@ -77,8 +77,8 @@ class RecentWay:
         elif here[0] < way[0][0]:
             way.appendleft(here)
         else:
-            near = min(way, key=lambda one: abs(one[0] - here[0]))
-            if math.dist(near[1][:2], here[1][:2]) > _OFF_M:
+            same = min(way, key=lambda one: abs(one[0] - here[0]))
+            if math.dist(same[1][:2], here[1][:2]) > _OFF_M:
                 self._way = deque(one for one in way if (one[0] > here[0] if back else one[0] < here[0]))
                 self._go_on(back)
         while self._way[-1][0] - self._way[0][0] > self._window_m:
@@ -110,14 +110,12 @@ class RecentWay:
         thinned: FloatArray = points[np.sort(first)]
         return thinned
 
-    def snapshot(self) -> Window:
-        """Return what a search needs, so that it may run beside what goes on here."""
+    def snapshot(self, within_m: float = math.inf) -> Window:
+        """Return what a search needs, of the way within some travel of the machine; it may run beside what goes on here."""
         points, counts = self.cells()
-        return Window(points, counts, np.array([pose[:2] for _, pose in self._way]), self._axis(), self.length_m)
-
-    def _axis(self) -> tuple[FloatArray, FloatArray]:
-        """Return the poses (3,) of the machine at both ends of the way."""
-        return self._way[0][1], self._way[-1][1]
+        way = [one for one in self._way if abs(one[0] - self._ahead_m) <= within_m]
+        ends = way[0][1], way[-1][1]
+        return Window(points, counts, np.array([pose[:2] for _, pose in way]), ends, way[-1][0] - way[0][0])
 
 
 class Window(NamedTuple):
@@ -129,8 +127,8 @@ class Window(NamedTuple):
     ends: tuple[FloatArray, FloatArray]
     length_m: float
 
-    def profile(self, settings: LandmarkSettings) -> LiveProfile:
-        """Return the profile of its walls."""
+    def profile(self, settings: LandmarkSettings, noise: float) -> LiveProfile:
+        """Return the profile of its walls; `noise`: see `channels`."""
         behind, ahead = self.ends
         first = se2.compose(behind, np.array([-_BEHIND_M, 0.0, 0.0]))[:2]
         last = se2.compose(ahead, np.array([_AHEAD_M, 0.0, 0.0]))[:2]
@@ -138,6 +136,6 @@ class Window(NamedTuple):
         profile = profile_of(self.points, self.counts, way, arc_m(way), settings)
         if not len(profile.at_m):
             return LiveProfile(np.zeros((3, 0)), np.zeros((3, 0)), np.zeros(3))
-        values, variances = channels(profile, settings.profile_m)
+        values, variances = channels(profile, settings.profile_m, noise)
         line = np.array([*profile.line_m[-1], profile.heading_rad[-1]], dtype=float)
         return LiveProfile(values.T, variances.T, line)

@@ -37,9 +37,10 @@ FIND, CONFIRM, CHECK = "find", "confirm", "check"
 class Candidate(NamedTuple):
     """A place where the machine may be: pose (3,) in `map`, height of the floor, node (id).
 
-    `probability`: of it against all others and against not being in the map; `chi2`: reduced, of its walls; `gap` (nats): how
-    much less likely the best other place is, negative where that one is better; `support`: share of hits that agree with the
-    fused walls once refined, NaN where it was not.
+    `probability`: of it against all others and against not being in the map; `chi2`: reduced, of its walls; `evidence` (nats):
+    what its walls tell for it, against other ones of the kind; `gap` (nats): how much less likely the best other place is, or
+    none in the map, negative where that is better; `support`: share of hits that agree with the fused walls once refined, NaN
+    where it was not.
     """
 
     pose: FloatArray
@@ -47,6 +48,7 @@ class Candidate(NamedTuple):
     node: str
     probability: float
     chi2: float
+    evidence: float
     gap: float
     support: float
 
@@ -55,7 +57,8 @@ class Search(NamedTuple):
     """What one search said, at `stamp_ns` after `travelled_m`, of the walls of the last `window_m`.
 
     `purpose`: `find` a place, `confirm` the one on trial, `check` the one that is tracked. `candidates`: best first. `refused`:
-    why the best one is not believed, empty where it is. `claimed`: what it said of the place that is on trial or tracked.
+    why the best one is not believed, empty where it is. `claimed`: what it said of the place that is on trial or tracked;
+    `denied`: why the machine is not there, empty where it may be.
     """
 
     stamp_ns: int
@@ -65,23 +68,12 @@ class Search(NamedTuple):
     candidates: tuple[Candidate, ...]
     refused: str
     claimed: Candidate | None = None
+    denied: str = ""
 
     @property
     def confirms(self) -> bool:
-        """Whether it believes in the place that was claimed, or cannot tell of it at all."""
-        return not self.candidates or (not self.refused and self._is_claimed)
-
-    @property
-    def contradicts(self) -> bool:
-        """Whether it believes in another place than the one that was claimed."""
-        return bool(self.candidates) and not self.refused and not self._is_claimed
-
-    @property
-    def _is_claimed(self) -> bool:
-        if self.claimed is None:
-            return False
-        off = se2.between(self.claimed.pose, self.candidates[0].pose)
-        return math.hypot(off[0], off[1]) < _SAME_M and abs(off[2]) < _SAME_RAD
+        """Whether it believes in the place that was claimed, or cannot tell of any."""
+        return not self.candidates or not (self.refused or self.denied)
 
 
 class Question(NamedTuple):
@@ -107,32 +99,40 @@ class GlobalSearch:
     def answer(self, asked: Question) -> Search:
         """Search the whole map."""
         window, said = asked.window, Search(*asked[:2], asked.window.length_m, asked.purpose, (), "no walls in reach")
-        live = window.profile(self._landmarks)
+        live = window.profile(self._landmarks, self._strips.noise)
         if not len(self._strips.poses) or not np.isfinite(live.values[:2]).any():
             return said
         costs = Costs(self._strips, live, self._weights)
         T_line_base = se2.compose(se2.inverse(live.line), asked.T_odom_base)
         places = costs.likeliest()
-        rivals = [min([costs.outside, *(other.cost for other in places if other is not one)]) for one in places]
+        rivals = [min([0.0, *(other.cost for other in places if other is not one)]) for one in places]
         candidates = [
             self._candidate(one, rival - one.cost, T_line_base) for one, rival in zip(places, rivals, strict=True)
         ]
         refused = self._refused(places[0], candidates[0], window.length_m)
         if not refused:
             candidates[0] = self._refined(candidates[0], window, asked.T_odom_base)
-        claimed = None
-        if asked.claimed is not None:
-            line = se2.compose(asked.claimed[:3], se2.inverse(T_line_base))
-            place = costs.at(line, asked.claimed[3])
-            if place is not None:
-                gap = min(costs.outside, places[0].cost) - place.cost
-                claimed = self._candidate(place, gap, T_line_base)._replace(pose=asked.claimed[:3])
-        return said._replace(candidates=tuple(candidates), refused=refused, claimed=claimed)
+        said = said._replace(candidates=tuple(candidates), refused=refused)
+        return said if asked.claimed is None else self._judged(said, costs, asked.claimed, T_line_base)
+
+    def _judged(self, said: Search, costs: Costs, claimed: FloatArray, T_line_base: FloatArray) -> Search:
+        """Add what is said of a place (4,) that is claimed."""
+        best, own = said.candidates[0], None
+        place = costs.at(se2.compose(claimed[:3], se2.inverse(T_line_base)), claimed[3])
+        denied = ""
+        if place is not None:
+            own = self._candidate(place, min(-best.evidence, 0.0) - place.cost, T_line_base)._replace(pose=claimed[:3])
+            if own.evidence < -self._settings.gap:
+                denied = f"other walls than there, {-own.evidence:.0f} nats"
+        off = se2.between(claimed[:3], best.pose)
+        if not said.refused and (math.hypot(off[0], off[1]) > _SAME_M or abs(off[2]) > _SAME_RAD):
+            denied = f"it is at {best.pose[0]:.1f}, {best.pose[1]:.1f}"
+        return said._replace(claimed=own, denied=denied)
 
     def _candidate(self, place: PlaceOnStrips, gap: float, T_line_base: FloatArray) -> Candidate:
         pose = se2.compose(self._strips.poses[place.place], T_line_base)
         height, node = float(self._strips.heights_m[place.place]), self._strips.node_at(place.place)
-        return Candidate(pose, height, node, place.probability, place.chi2, gap, math.nan)
+        return Candidate(pose, height, node, place.probability, place.chi2, -place.cost, gap, math.nan)
 
     def _refused(self, place: PlaceOnStrips, best: Candidate, window_m: float) -> str:
         """Return why the best place is not believed."""

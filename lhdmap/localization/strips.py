@@ -14,6 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
+from scipy.ndimage import median_filter
 
 from lhdmap.geometry import se2
 from lhdmap.landmarks.distinct import channels
@@ -29,6 +30,8 @@ _BEYOND_M = 8.0  # of way beside a strip, for its mid line's sake
 _OPEN_M = 6.0  # beyond an end of the map: unknown walls, so that a window that reaches out of it is not lost
 _NEAR_M = 40.0
 _LEAST_M = 2.0
+_ANOTHER_DRIVE, _LEAST_NOISE, _MOST_NOISE = 2.0, 0.1, 4.0
+_MAD = 1.4826
 
 Port = tuple[str, int, bool]
 """Tunnel, its end (0 or 1), whether the way leads out of the tunnel there."""
@@ -37,12 +40,13 @@ Port = tuple[str, int, bool]
 class Strip(NamedTuple):
     """One way along walls: `values`, `variances` (3, n) of `channels`, mid line `poses` (n, 3) and `heights_m` in `map`.
 
-    `enters`, `leaves`: ports, None at an end of the map.
+    `evidence` (3, n): what a bin tells where it fits, nats. `enters`, `leaves`: ports, None at an end of the map.
     """
 
     node: str
     values: FloatArray
     variances: FloatArray
+    evidence: FloatArray
     poses: FloatArray
     heights_m: FloatArray
     enters: Port | None
@@ -52,20 +56,22 @@ class Strip(NamedTuple):
 class Strips(NamedTuple):
     """All strips one after the other, B bins: float32 (3, B) but for what says otherwise.
 
-    `values` are 0 where not `known` (0 or 1). `poses` (B, 3), `heights_m` (B,); `starts` (S + 1,): first bin of each strip; those
+    `known`: 0 or 1; `values`, `evidence` are 0 where not. `poses` (B, 3), `heights_m` (B,); `starts` (S + 1,): first bins; those
     that lead into strip s: `before[before_starts[s] : before_starts[s + 1]]`, none where it begins at an end of the map.
-    `nodes` (S,): ids.
+    `nodes` (S,): ids. `noise`: factor of the variance that is not due to the walls' slope (`channels`), for live profiles, too.
     """
 
     values: Float32Array
     variances: Float32Array
     known: Float32Array
+    evidence: Float32Array
     poses: FloatArray
     heights_m: FloatArray
     starts: npt.NDArray[np.int64]
     before: npt.NDArray[np.int64]
     before_starts: npt.NDArray[np.int64]
     nodes: tuple[str, ...]
+    noise: float
 
     def node_at(self, place: int) -> str:
         """Return the node of a bin."""
@@ -76,11 +82,14 @@ def strips_of(topology: TopologicalMap, landmarks: Landmarks, settings: Landmark
     """Return the strips of a map's walls; none where no tunnel has any."""
     walls = _Walls(topology, landmarks)
     one_way = [*_tunnels(topology, walls, settings), *_crossings(topology, walls, settings)]
-    return _joined([*one_way, *map(_turned, one_way)])
+    return _joined([*one_way, *map(_turned, one_way)], walls.noise)
 
 
 class _Walls:
-    """Fused walls of nodes in `map`."""
+    """Fused walls of nodes in `map`.
+
+    `noise`: what halves of nodes' own scans tell of the variances of their profiles.
+    """
 
     def __init__(self, topology: TopologicalMap, landmarks: Landmarks) -> None:
         self._cells = {
@@ -91,6 +100,9 @@ class _Walls:
             for node, surface in landmarks.surfaces.items()
             if node in topology.nodes
         }
+        chi2 = [surface.quality.chi2 for surface in landmarks.surfaces.values() if surface.quality.chi2 > 0.0]
+        told = _ANOTHER_DRIVE * float(np.percentile(chi2, 75.0)) if chi2 else 1.0
+        self.noise = min(max(told, _LEAST_NOISE), _MOST_NOISE)
 
     def __contains__(self, node: str) -> bool:
         return node in self._cells
@@ -121,9 +133,9 @@ def _tunnels(topology: TopologicalMap, walls: _Walls, settings: LandmarkSettings
         rows = _between(profile, _on(line, at, first), _on(line, at, last))
         enters = (tunnel.id, 0, False) if joined[0] else None
         leaves = (tunnel.id, 1, True) if joined[1] else None
-        strip = _strip(tunnel.id, profile, rows, settings, enters, leaves)
+        strip = _strip(tunnel.id, profile, rows, settings, walls.noise)
         heights = np.interp(profile.at_m[rows], at, line[:, 2])
-        yield _opened(strip._replace(heights_m=heights), settings)
+        yield _opened(strip._replace(heights_m=heights, enters=enters, leaves=leaves), settings)
 
 
 def _crossings(topology: TopologicalMap, walls: _Walls, settings: LandmarkSettings) -> Iterator[Strip]:
@@ -139,8 +151,9 @@ def _crossings(topology: TopologicalMap, walls: _Walls, settings: LandmarkSettin
             way = np.concatenate([tail[::-1], _curve(p.pose, q.pose), head])
             profile = profile_of(*walls.near(nodes, way), way, arc_m(way), settings)
             rows = _between(profile, cut_a, cut_b)
-            strip = _strip(node.id, profile, rows, settings, (a.id, end_a, True), (b.id, end_b, False))
-            yield strip._replace(heights_m=np.full(len(strip.poses), node.T_map_node[2]))
+            strip = _strip(node.id, profile, rows, settings, walls.noise)
+            heights = np.full(len(strip.poses), node.T_map_node[2])
+            yield strip._replace(heights_m=heights, enters=(a.id, end_a, True), leaves=(b.id, end_b, False))
 
 
 def _access(topology: TopologicalMap, node: Intersection) -> list[AccessPoint]:
@@ -206,12 +219,29 @@ def _between(profile: Profile, first: FloatArray, last: FloatArray) -> slice:
     return slice(near[0], max(near[1], near[0]))
 
 
-def _strip(
-    node: str, profile: Profile, rows: slice, settings: LandmarkSettings, enters: Port | None, leaves: Port | None
-) -> Strip:
-    values, variances = channels(profile, settings.profile_m)
+def _strip(node: str, profile: Profile, rows: slice, settings: LandmarkSettings, noise: float) -> Strip:
+    values, variances = channels(profile, settings.profile_m, noise)
+    evidence = _evidence(values, variances, settings)
     poses = np.column_stack([profile.line_m.astype(float), profile.heading_rad.astype(float)])[rows]
-    return Strip(node, values[rows].T, variances[rows].T, poses, np.zeros(len(poses)), enters, leaves)
+    columns = values[rows].T, variances[rows].T, evidence[rows].T
+    return Strip(node, *columns, poses, np.zeros(len(poses)), None, None)
+
+
+def _evidence(values: FloatArray, variances: FloatArray, settings: LandmarkSettings) -> FloatArray:
+    """Return (n, 3) what a fit tells: 1, which the right place itself costs, and the log of the variances' ratio.
+
+    That is, of two walls of this kind over that of one wall seen twice.
+    """
+    size = max(round(2.0 * settings.smooth_m / settings.profile_m), 1)
+    out = np.full(values.shape, np.nan)
+    for channel in range(3):
+        known = np.isfinite(values[:, channel])
+        if known.any():
+            wall = np.interp(np.arange(len(known)), np.flatnonzero(known), values[known, channel])
+            off = wall - median_filter(wall, size=size, mode="nearest")
+            spread = (_MAD * float(np.median(np.abs(off)))) ** 2
+            out[:, channel] = 1.0 + np.log1p(spread / variances[:, channel])
+    return out
 
 
 def _opened(strip: Strip, settings: LandmarkSettings) -> Strip:
@@ -227,6 +257,7 @@ def _opened(strip: Strip, settings: LandmarkSettings) -> Strip:
     return strip._replace(
         values=np.pad(strip.values, beside, constant_values=np.nan),
         variances=np.pad(strip.variances, beside, constant_values=np.nan),
+        evidence=np.pad(strip.evidence, beside, constant_values=np.nan),
         poses=np.concatenate(poses),
         heights_m=np.pad(strip.heights_m, (before, after), mode="edge"),
     )
@@ -234,17 +265,19 @@ def _opened(strip: Strip, settings: LandmarkSettings) -> Strip:
 
 def _turned(strip: Strip) -> Strip:
     """Return a strip the other way round: left is right, and a turn is against its sign."""
-    values, variances = strip.values[[1, 0, 2], ::-1].copy(), strip.variances[[1, 0, 2], ::-1]
-    values[2] *= -1.0
+    values, variances, evidence = (one[[1, 0, 2], ::-1] for one in (strip.values, strip.variances, strip.evidence))
+    values = values * np.array([[1.0], [1.0], [-1.0]])
     poses = strip.poses[::-1] + np.array([0.0, 0.0, math.pi])
-    return Strip(strip.node, values, variances, poses, strip.heights_m[::-1], _back(strip.leaves), _back(strip.enters))
+    return Strip(
+        strip.node, values, variances, evidence, poses, strip.heights_m[::-1], _back(strip.leaves), _back(strip.enters)
+    )
 
 
 def _back(port: Port | None) -> Port | None:
     return None if port is None else (port[0], port[1], not port[2])
 
 
-def _joined(strips: list[Strip]) -> Strips:
+def _joined(strips: list[Strip], noise: float) -> Strips:
     strips = [strip for strip in strips if len(strip.poses)]
     leaving: dict[Port, list[int]] = {}
     for number, strip in enumerate(strips):
@@ -253,15 +286,18 @@ def _joined(strips: list[Strip]) -> Strips:
     before = [leaving.get(strip.enters, []) if strip.enters is not None else [] for strip in strips]
     values = np.concatenate([np.zeros((3, 0)), *(strip.values for strip in strips)], axis=1)
     variances = np.concatenate([np.zeros((3, 0)), *(strip.variances for strip in strips)], axis=1)
+    evidence = np.concatenate([np.zeros((3, 0)), *(strip.evidence for strip in strips)], axis=1)
     known = np.isfinite(values) & np.isfinite(variances)
     return Strips(
         np.where(known, values, 0.0).astype(np.float32),
         np.where(known, variances, 1.0).astype(np.float32),
         known.astype(np.float32),
+        np.where(known, evidence, 0.0).astype(np.float32),
         np.concatenate([np.zeros((0, 3)), *(strip.poses for strip in strips)]),
         np.concatenate([np.zeros(0), *(strip.heights_m for strip in strips)]),
         np.cumsum([0, *(len(strip.poses) for strip in strips)]),
         np.array([one for leads in before for one in leads], dtype=np.int64),
         np.cumsum([0, *map(len, before)]),
         tuple(strip.node for strip in strips),
+        noise,
     )

@@ -96,7 +96,7 @@ class Localizer:
         # What lies beyond the map does not count: no loop is closed, no pile looked for.
         settings = replace(settings, pile=replace(settings.pile, method="off"))
         self._settings = settings.localization
-        self.pipeline = MappingPipeline(settings, machine, cloud=False, on_step=self._take)
+        self.pipeline = MappingPipeline(settings, machine, cloud=False, on_step=self.take)
         self._walls, self._placer = MapWalls(known.topology, known.landmarks), Placer(known.topology)
         search = known.search(self._walls, settings)
         self.world = WorldChanges(known.topology, known.sheets, self._walls)
@@ -152,7 +152,7 @@ class Localizer:
         height = float(start[3]) if len(start) > 3 else 0.0
         return Tracker(self._walls, self._settings, start[:3], np.diag(std**2), height)
 
-    def _take(self, stamp_ns: int, step: OdometryStep, odometry: PlanarOdometry) -> None:
+    def take(self, stamp_ns: int, step: OdometryStep, odometry: PlanarOdometry) -> None:
         """Take what the odometry says of a front scan."""
         began = time.perf_counter()
         self._began_ns = stamp_ns if self._began_ns is None else self._began_ns
@@ -250,7 +250,7 @@ class Localizer:
             self.withheld += bool(said.candidates)
         elif said.purpose == CONFIRM and said.confirms:
             self._status, self._trial = TRACKING, None
-        elif said.purpose == CONFIRM or said.contradicts:
+        elif said.purpose == CONFIRM or said.denied:
             self._drop()
 
     def _try(self, found: Candidate) -> None:

@@ -9,11 +9,10 @@ from typing import NamedTuple
 
 import numpy as np
 from lhdmap.geometry import se2
-from lhdmap.landmarks.model import Landmarks, NodeSurface
-from lhdmap.landmarks.quality import quality_of
+from lhdmap.landmarks.build import node_surface
+from lhdmap.landmarks.model import Landmarks
 from lhdmap.landmarks.scans import NodeScan
 from lhdmap.landmarks.settings import LandmarkSettings
-from lhdmap.landmarks.surface import fused, placed
 from lhdmap.messages import FloatArray
 from lhdmap.pipeline.localize import KnownMap
 from lhdmap.topology.model import UNEXPLORED, TopologicalMap, Tunnel
@@ -103,8 +102,7 @@ def taught(kind: str, seed: int) -> Taught:
             for k, (pose, where) in enumerate(zip(poses, taken, strict=True))
         ]
         frame = np.array([*taken[0, :2], 0.0, taken[0, 2]])
-        cells = fused([placed(scan, frame, _SETTINGS) for scan in scans], _SETTINGS.cell_m)
-        surfaces[name] = NodeSurface(cells, quality_of(cells, scans, frame, _SETTINGS), None)
+        surfaces[name] = node_surface(scans, frame, _SETTINGS, tunnel=True)
         line = np.column_stack([taken[::3, :2], np.zeros(len(taken[::3]))])
         tunnels.append(Tunnel(name, name, (UNEXPLORED, UNEXPLORED), line, np.full((len(line), 2), 2.2), frame))
         true.append(poses)
