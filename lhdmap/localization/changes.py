@@ -28,7 +28,7 @@ CAME, WENT = "came", "went"
 _EVERY_M = 0.5
 _NEW_M, _GONE_M = 0.2, 0.4  # from all walls of the map: nearer is roughness at another height
 _HEIGHT = 0.1  # a metre of height is as far as so many in plan: walls of another level are not near
-_LEVEL_M = 4.0
+_LEVEL_M, _CELL_M, _SURE_VIEWS = 4.0, 0.2, 3
 _CROSSED_M = np.arange(0.4, 3.01, 0.1)  # before a hit, where the wall that is gone may have stood
 _SAME_M, _DRIFT = 0.5, 0.02  # of a place that is found again, from the one that the odometry led to
 _FARTHEST_LOST_M = 60.0
@@ -65,21 +65,60 @@ class Seen(NamedTuple):
     height_m: float
 
 
+class _NewCells:
+    """Cells of 0.2 m in which something new was seen, and from how many places."""
+
+    def __init__(self) -> None:
+        self._views: dict[int, int] = {}
+        self._sure = np.zeros(0, np.int64)
+
+    def add(self, points: FloatArray, height_m: float) -> None:
+        """Count the new hits (N, 2) of one view."""
+        for key in np.unique(_cell_keys(points, height_m)).tolist():
+            self._views[key] = self._views.get(key, 0) + 1
+            if self._views[key] == _SURE_VIEWS:
+                self._sure = np.append(self._sure, key)
+
+    def has(self, points: FloatArray, height_m: float) -> npt.NDArray[np.bool_]:
+        """Return which points (N, 2) are in cells that are surely new, or beside one."""
+        found = np.zeros(len(points), bool)
+        if len(self._sure):
+            for shift in ((0.0, 0.0), (_CELL_M, 0.0), (-_CELL_M, 0.0), (0.0, _CELL_M), (0.0, -_CELL_M)):
+                found |= np.isin(_cell_keys(points + shift, height_m), self._sure)
+        return found
+
+
+def _cell_keys(points: FloatArray, height_m: float) -> npt.NDArray[np.int64]:
+    cells = np.floor(points / _CELL_M).astype(np.int64) + (1 << 19)
+    keys: npt.NDArray[np.int64] = (round(height_m / _LEVEL_M) << 44) + (cells[:, 0] << 22) + cells[:, 1]
+    return keys
+
+
 class WorldChanges:
     """Takes what a machine sees, with its place; tells what has changed at any time. Its memory grows with the map alone."""
 
     def __init__(self, topology: TopologicalMap, sheets: list[Sheet], walls: MapWalls) -> None:
         self._sheets, self._along = sheets, Along(topology)
         self._tree = KDTree(walls.cells() * [1.0, 1.0, _HEIGHT])
-        self._taken_m = -math.inf
+        self._taken_m, self._new = -math.inf, _NewCells()
         self._apart: list[Seen] = []
         self._lost_m: float | None = None  # way at which the place was lost
         self._was_right = False
 
     def update(
-        self, stamp_ns: int, travelled_m: float, place: tuple[FloatArray, float], points: FloatArray, *, known: bool
+        self,
+        stamp_ns: int,
+        travelled_m: float,
+        place: tuple[FloatArray, float],
+        points: FloatArray,
+        *,
+        known: bool,
+        holds: bool,
     ) -> None:
-        """Take hits (N, 2) in the machine's frame at a place (pose (3,), height); `known`: whether it is sure."""
+        """Take hits (N, 2) in the machine's frame at a place (pose (3,), height); `known`: whether it is sure.
+
+        `holds`: whether the walls agree with it in this very scan: then what contradicts them is new, not a sign of another place.
+        """
         if travelled_m - self._taken_m < _EVERY_M or not len(points):
             return
         self._taken_m = travelled_m
@@ -87,10 +126,16 @@ class WorldChanges:
         if known:
             self._settle()
             self._along.add(seen)
+            if holds:
+                self._new.add(seen.points[seen.kinds == 1], seen.height_m)
             return
         self._lost_m = travelled_m if self._lost_m is None else self._lost_m
         if travelled_m - self._lost_m < _FARTHEST_LOST_M:
             self._apart.append(seen)
+
+    def stands_in(self, pose: FloatArray, height_m: float, points: FloatArray) -> npt.NDArray[np.bool_]:
+        """Return which hits (N, 2) in the machine's frame are of something that surely was not there when the map was made."""
+        return self._new.has(se2.transform(pose, points), height_m)
 
     def found(self, travelled_m: float, carried: FloatArray, pose: FloatArray) -> None:
         """Say that a lost place may be found at `pose` (3,), while the odometry has led to `carried` (3,)."""

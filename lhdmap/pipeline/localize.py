@@ -39,6 +39,7 @@ from lhdmap.topology.files import read_topology
 from lhdmap.topology.model import TopologicalMap
 from lhdmap.topology.sheet import Sheet, read_sheets
 
+_LEAST_LEFT = 0.1  # of the hits must be of walls that the map has, or nothing corrects the place
 _LEAST_SUPPORT = 0.35  # where a node's own scans tell of none
 
 
@@ -165,18 +166,30 @@ class Localizer:
         source, points = "", np.zeros((0, 2))
         if step.processed:
             points, front = self._hits(odometry)
-            self._finder.add(step.T_odom_base, points)
-            source = self._correct(points, front)
+            told, told_front = self._of_the_map(points, front)
+            self._finder.add(step.T_odom_base, told)
+            source = self._correct(told, told_front) if len(told) > _LEAST_LEFT * len(points) else "odometry"
             self._judge()
             self._look_around(stamp_ns, step)
             if self._status == TRACKING and self.first_fix is None:
                 self.first_fix = ((stamp_ns - self._began_ns) * 1e-9, self._travelled_m)
         self.rows.append(self._row(stamp_ns, step, source, 1e3 * (time.perf_counter() - began)))
-        if (
-            self._tracker is not None and self._status in (TRACKING, LOST) and len(points)
-        ):  # the place does not wait for it
-            place, known = (self._tracker.pose, self._tracker.height_m), self._status == TRACKING
-            self.world.update(stamp_ns, self._travelled_m, place, points, known=known)
+        self._set_against_the_map(stamp_ns, points)  # the place has not waited for it
+
+    def _set_against_the_map(self, stamp_ns: int, points: FloatArray) -> None:
+        """Note what is not as in the map, where the place is known, or was until a moment ago."""
+        tracker, known = self._tracker, self._status == TRACKING
+        if tracker is not None and (known or self._status == LOST):
+            holds = bool(self._supports) and self._supports[-1] >= self._wanted_support()
+            place = tracker.pose, tracker.height_m
+            self.world.update(stamp_ns, self._travelled_m, place, points, known=known, holds=holds)
+
+    def _of_the_map(self, points: FloatArray, front: int) -> tuple[FloatArray, int]:
+        """Return the hits without those of what surely came since the map was made: they say nothing of the place."""
+        if self._tracker is None or self._status != TRACKING:
+            return points, front
+        kept = ~self.world.stands_in(self._tracker.pose, self._tracker.height_m, points)
+        return points[kept], int(kept[:front].sum())
 
     def _hits(self, odometry: PlanarOdometry) -> tuple[FloatArray, int]:
         """Return hits (N, 2) of both scanners near the machine, thinned, and how many are the front one's."""
@@ -204,12 +217,16 @@ class Localizer:
         """Decide by the support whether the place still holds."""
         if self._tracker is None or self._status == LOST or not self._supports:
             return
-        place = self._placer.at(self._tracker.pose, self._tracker.height_m, 1.0)
-        least = self._walls.quality(place.node).support_least
-        wanted = (least if math.isfinite(least) else _LEAST_SUPPORT) - self._settings.support_drop
-        holds = float(np.mean(self._supports)) >= max(wanted, 0.15)
+        holds = float(np.mean(self._supports)) >= self._wanted_support()
         if not holds and len(self._supports) == self._supports.maxlen:
             self._drop()
+
+    def _wanted_support(self) -> float:
+        """Return the share of hits that must agree with the walls where the machine is."""
+        assert self._tracker is not None  # noqa: S101  # asked where there is one
+        place = self._placer.at(self._tracker.pose, self._tracker.height_m, 1.0)
+        least = self._walls.quality(place.node).support_least
+        return max((least if math.isfinite(least) else _LEAST_SUPPORT) - self._settings.support_drop, 0.15)
 
     def _drop(self) -> None:
         """Give a place up: a trial that failed, or one that was lost."""
