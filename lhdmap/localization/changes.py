@@ -149,6 +149,10 @@ class WorldChanges:
             self._along.add(seen)
         self._lost_m, self._apart, self._was_right = None, [], False
 
+    def walls(self) -> FloatArray:
+        """Return the map's walls (M, 3): x, y, height of the floor."""
+        return self._tree.data / [1.0, 1.0, _HEIGHT]
+
     def changes(self) -> list[Change]:
         """Return the changed stretches, those that began first in front."""
         found = [_change(one) for one in stretches(self._along)]

@@ -39,6 +39,7 @@ from lhdmap.topology.files import read_topology
 from lhdmap.topology.model import TopologicalMap
 from lhdmap.topology.sheet import Sheet, read_sheets
 
+_HITS_ABOVE_M = 1.0  # hits are flat: where they are shown over the floor
 _LEAST_LEFT = 0.1  # of the hits must be of walls that the map has, or nothing corrects the place
 _LEAST_SUPPORT = 0.35  # where a node's own scans tell of none
 
@@ -114,7 +115,12 @@ class Localizer:
         self.withheld, self.lost_stretches = 0, 0
         self.first_fix: tuple[float, float] | None = None  # seconds, metres
         self._began_ns: int | None = None
+        self._stamp_ns = 0
         self.rows: list[Row] = []
+        self.reasons: list[tuple[int, str]] = []  # when a place was given up, and why
+        self.newest: tuple[int, FloatArray] | None = (
+            None  # stamp and hits (N, 3) in `map` of the newest scan with a place
+        )
 
     @property
     def searches(self) -> list[Search]:
@@ -156,6 +162,7 @@ class Localizer:
     def take(self, stamp_ns: int, step: OdometryStep, odometry: PlanarOdometry) -> None:
         """Take what the odometry says of a front scan."""
         began = time.perf_counter()
+        self._stamp_ns = stamp_ns
         self._began_ns = stamp_ns if self._began_ns is None else self._began_ns
         if self._before is not None:
             moved = se2.between(self._before, step.T_odom_base)
@@ -179,6 +186,9 @@ class Localizer:
     def _set_against_the_map(self, stamp_ns: int, points: FloatArray) -> None:
         """Note what is not as in the map, where the place is known, or was until a moment ago."""
         tracker, known = self._tracker, self._status == TRACKING
+        if tracker is not None and len(points):
+            in_map = se2.transform(tracker.pose, points)
+            self.newest = stamp_ns, np.column_stack([in_map, np.full(len(in_map), tracker.height_m + _HITS_ABOVE_M)])
         if tracker is not None and (known or self._status == LOST):
             holds = bool(self._supports) and self._supports[-1] >= self._wanted_support()
             place = tracker.pose, tracker.height_m
@@ -219,7 +229,8 @@ class Localizer:
             return
         holds = float(np.mean(self._supports)) >= self._wanted_support()
         if not holds and len(self._supports) == self._supports.maxlen:
-            self._drop()
+            mean, wanted = float(np.mean(self._supports)), self._wanted_support()
+            self._drop(f"the map's walls agree with {mean:.0%} of the hits, {wanted:.0%} were wanted")
 
     def _wanted_support(self) -> float:
         """Return the share of hits that must agree with the walls where the machine is."""
@@ -228,8 +239,9 @@ class Localizer:
         least = self._walls.quality(place.node).support_least
         return max((least if math.isfinite(least) else _LEAST_SUPPORT) - self._settings.support_drop, 0.15)
 
-    def _drop(self) -> None:
+    def _drop(self, why: str) -> None:
         """Give a place up: a trial that failed, or one that was lost."""
+        self.reasons.append((self._stamp_ns, why))
         self._supports.clear()
         self._probability = 0.0
         self._finder.again()
@@ -268,7 +280,7 @@ class Localizer:
         elif said.purpose == CONFIRM and said.confirms:
             self._status, self._trial = TRACKING, None
         elif said.purpose == CONFIRM or said.denied:
-            self._drop()
+            self._drop("a second search does not say the same" if self._trial else "a search speaks against the place")
 
     def _try(self, found: Candidate) -> None:
         std = np.array([0.1, 0.1, math.radians(1.0)])
