@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import ExitStack
-from itertools import pairwise
 from pathlib import Path
 from typing import NamedTuple
 
@@ -28,7 +27,7 @@ PAUSE_S = 10.0
 _SHARED_S = 1.0  # parts of one recording share no more time than this
 _RANGE_M, _BEAMS = 20.0, 300
 _REACH, _LEAST_SUPPORT = np.array([1.5, 0.35]), 0.5
-_FOREVER_NS = 1 << 62
+_FOREVER_NS, _MARGIN_NS = 1 << 62, 1_000_000_000  # other sensors may begin before the first scan
 _GRID = SearchGrid(0.15, 0.05)
 
 
@@ -89,19 +88,20 @@ def _recordings(opened: Sequence[_Log]) -> list[list[_Log]]:
 def _parted(recording: list[_Log], front: str) -> list[Drive]:
     """Return the drives of logs that follow each other: parted at pauses after which the scan is another."""
     paths = tuple(one.path for one in recording)
-    begins = [0, *_moved_at(recording, front), _FOREVER_NS]
-    if len(begins) == 2:
+    pauses = list(_moved_in(recording, front))
+    if not pauses:
         return [Drive(paths)]
     drives = []
-    for first, until in pairwise(begins):
+    begins, ends = [0, *(after - _MARGIN_NS for _, after in pauses)], [*(before + _MARGIN_NS for before, _ in pauses)]
+    for first, until in zip(begins, [*ends, _FOREVER_NS], strict=True):
         own = tuple(one.path for one in recording if one.start_ns < until and one.end_ns >= first)
         whole = all(first <= one.start_ns and one.end_ns < until for one in recording if one.path in own)
         drives.append(Drive(own, None if whole else (first, until)))
     return drives
 
 
-def _moved_at(recording: list[_Log], front: str) -> Iterator[int]:
-    """Yield the log times at which the machine is somewhere else after a pause."""
+def _moved_in(recording: list[_Log], front: str) -> Iterator[tuple[int, int]]:
+    """Yield the log times of the last scan before and the first after each pause in which the machine was moved."""
     before: tuple[int, LaserScan] | None = None
     for one in recording:
         if not one.has_front or (one.end_ns - one.start_ns < PAUSE_S * 1e9 and len(recording) == 1):
@@ -110,7 +110,7 @@ def _moved_at(recording: list[_Log], front: str) -> Iterator[int]:
             if not isinstance(scan, LaserScan):
                 continue
             if before is not None and logged_ns - before[0] > PAUSE_S * 1e9 and not same_place(before[1], scan):
-                yield logged_ns
+                yield before[0], logged_ns
             before = logged_ns, scan
 
 
@@ -129,6 +129,7 @@ def _points(scan: LaserScan) -> FloatArray:
     ranges = np.asarray(scan.ranges_m, dtype=float)
     angles = scan.angle_min_rad + scan.angle_increment_rad * np.arange(len(ranges))
     near = np.isfinite(ranges) & (ranges > scan.range_min_m) & (ranges < _RANGE_M)
-    points = np.column_stack([ranges * np.cos(angles), ranges * np.sin(angles), np.zeros(len(ranges))])[near]
+    ranges, angles = ranges[near], angles[near]
+    points = np.column_stack([ranges * np.cos(angles), ranges * np.sin(angles), np.zeros(len(ranges))])
     thinned: FloatArray = points[:: max(len(points) // _BEAMS, 1)]
     return thinned
