@@ -25,7 +25,7 @@ _SHOWN_FROM = 0.02  # of probability
 def drawn_map(data: LocalizationData, rows: Sequence[Row]) -> str:
     """Return the map with the way, the places that searches found, and what has changed, as a data URI."""
     lines = [tunnel.line_m for tunnel in data.topology.tunnels]
-    figure = charts.new_figure(charts.plan_height_in(np.vstack(lines)) + 0.6 if lines else 5.0)
+    figure = charts.new_figure(charts.plan_height_in(np.vstack(lines)) + 0.8 if lines else 5.0)
     axes = figure.add_subplot()
     for sheet in data.sheets:
         draw_free_space(axes, sheet)
@@ -46,7 +46,7 @@ def drawn_map(data: LocalizationData, rows: Sequence[Row]) -> str:
         x, y = tunnel.line_m[len(tunnel.line_m) // 2, :2]
         axes.text(x, y, tunnel.name, fontsize=7, ha="center")
     axes.set(xlabel="x, m", ylabel="y, m", aspect="equal")
-    charts.legend_above(axes, 6)
+    charts.legend_above(axes, 4)
     return charts.svg_uri(figure)
 
 
