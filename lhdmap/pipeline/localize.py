@@ -280,7 +280,7 @@ class Localizer:
         elif said.purpose == CONFIRM and said.confirms:
             self._status, self._trial = TRACKING, None
         elif said.purpose == CONFIRM or said.denied:
-            self._drop("a second search does not say the same" if self._trial else "a search speaks against the place")
+            self._drop(said.denied or said.refused or "a search finds another place")
 
     def _try(self, found: Candidate) -> None:
         std = np.array([0.1, 0.1, math.radians(1.0)])

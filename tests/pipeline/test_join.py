@@ -14,6 +14,7 @@ from lhdmap.mapfolder import MapFolder
 from lhdmap.messages import FloatArray
 from lhdmap.pipeline.build import BuildRequest
 from lhdmap.pipeline.join import build_drives
+from lhdmap.simulation.planar import world_from_polylines
 from lhdmap.topology.files import read_topology
 
 from tests.update.drives import BRANCH_M, DEEP_M, first_way, mine, north_way, write_drive
@@ -103,3 +104,20 @@ def test_another_mine_is_refused_with_both_names(logs: tuple[Path, Path], tmp_pa
     with pytest.raises(InputError, match=r"other\.mcap.*east\.mcap"):
         build_drives(BuildRequest([logs[0], other], tmp_path / "map"))
     assert not list(tmp_path.glob("map*"))
+
+
+def test_where_two_places_look_alike_nothing_is_joined(tmp_path: Path) -> None:
+    """A drift whose walls repeat each 30 m: a second drive over 24 m of it may be in one place or the other."""
+    rng = np.random.default_rng(6)
+    waves, phases = rng.integers(2, 40, 30), rng.uniform(0.0, 2.0 * np.pi, (2, 30))
+    x = np.arange(-60.0, 130.0, 0.05)
+    rough = [np.sin(2.0 * np.pi * waves * x[:, None] / 30.0 + one).sum(axis=1) * 0.12 / np.sqrt(15.0) for one in phases]
+    walls = [np.column_stack([x, side * 2.2 + noise]) for side, noise in zip((1.0, -1.0), rough, strict=True)]
+    world = world_from_polylines(walls, np.zeros((1, 3)))
+    ways = [
+        np.column_stack([at, np.zeros((len(at), 2))])
+        for at in (np.arange(0.0, 75.0, 0.15), np.arange(33.0, 57.0, 0.15))
+    ]
+    logs = [write_drive(tmp_path / f"{k}.mcap", world, way, k) for k, way in enumerate(ways, 1)]
+    with pytest.raises(InputError, match=r"2\.mcap.*1\.mcap.*two places"):
+        build_drives(BuildRequest(logs, tmp_path / "map"))
