@@ -21,12 +21,13 @@ from lhdmap.localization.strips import Strips
 from lhdmap.messages import FloatArray
 
 _APART_M, _APART_RAD = 2.0, 0.35
+_DIRECTION_RAD = 1.0
 _LEVEL_M = 4.0
 _PLACES = 5
 
 
 class LiveProfile(NamedTuple):
-    """Channels of the last metres: `values`, `variances` (3, J), NaN where not known; `line` (3,): last bin's pose in `odom`."""
+    """Channels of the last metres: `values`, `variances` (3, J), NaN where not known; `line` (J, 2): the mid line in `odom`."""
 
     values: FloatArray
     variances: FloatArray
@@ -78,24 +79,33 @@ class Costs:
             left[same] = np.inf
         return found
 
+    def path(self, place: int) -> npt.NDArray[np.int64]:
+        """Return the place of each live bin (J,) where the last one is at `place`; -1 outside the map."""
+        path: npt.NDArray[np.int64] = _path(place, self._strips.starts, self._chosen)
+        return path
+
     def at(self, line: FloatArray, height_m: float) -> PlaceOnStrips | None:
-        """Return the best place about a pose (3,) of the live profile's last bin; None where the map has no walls there."""
-        near = np.flatnonzero(self.near(line, height_m))
+        """Return the best place about a pose (3,) of the live profile's last bin; None where the map has no walls there.
+
+        Of its heading the direction counts alone: at its end a mid line may turn.
+        """
+        near = np.flatnonzero(self.near(line, height_m, _DIRECTION_RAD))
         if not len(near):
             return None
         best = int(near[self._costs[near].argmin()])
         return self._told(best, self.near(self._strips.poses[best], height_m))
 
-    def near(self, pose: FloatArray, height_m: float) -> npt.NDArray[np.bool_]:
+    def near(self, pose: FloatArray, height_m: float, turn_rad: float = _APART_RAD) -> npt.NDArray[np.bool_]:
         """Return which places (B,) are about a pose (3,)."""
         apart = np.abs(self._strips.poses - pose)
         turn = np.abs((apart[:, 2] + math.pi) % (2.0 * math.pi) - math.pi)
         level = np.abs(self._strips.heights_m - height_m) < _LEVEL_M
-        same: npt.NDArray[np.bool_] = (apart[:, 0] ** 2 + apart[:, 1] ** 2 < _APART_M**2) & (turn < _APART_RAD) & level
+        same: npt.NDArray[np.bool_] = (apart[:, 0] ** 2 + apart[:, 1] ** 2 < _APART_M**2) & (turn < turn_rad) & level
         return same
 
     def _told(self, place: int, same: npt.NDArray[np.bool_]) -> PlaceOnStrips:
-        squares, number = _compared(place, *self._map, *self._live, self._strips.starts, self._chosen)
+        walls, live = self._map, self._live
+        squares, number = _compared(self.path(place), *walls, *live)
         probability = float(self._mass[same].sum()) / self._all_mass
         cost = float(self._costs[place])
         return PlaceOnStrips(place, cost, squares / max(number, 1), number / self._bins, probability)
@@ -144,22 +154,31 @@ def _slide(  # type: ignore[no-untyped-def]
 
 
 @nb.njit(cache=True, nogil=True)
-def _compared(  # type: ignore[no-untyped-def]
-    place, values, variances, known, live, live_variances, live_known, starts, chosen
-):
-    """Return the sum of the truncated squares of both walls along the way that ends at a place, and of how many bins."""
+def _path(place, starts, chosen):  # type: ignore[no-untyped-def]
+    """Return where each live bin (J,) lies where the last one is at `place`; -1 outside the map."""
+    out = np.full(chosen.shape[0], -1, np.int64)
     strip = np.searchsorted(starts, place, side="right") - 1
-    total, number, b = 0.0, 0, place
-    for j in range(live.shape[1] - 1, -1, -1):
-        for c in range(2):
-            if live_known[c, j] and known[c, b] > 0.0:
-                d = values[c, b] - live[c, j]
-                total += min(d * d / (variances[c, b] + live_variances[c, j]), TRUNCATED)
-                number += 1
+    b = place
+    for j in range(chosen.shape[0] - 1, -1, -1):
+        out[j] = b
         if b == starts[strip]:
             strip = chosen[j, strip]
             if strip < 0:
                 break
             b = starts[strip + 1]
         b -= 1
+    return out
+
+
+@nb.njit(cache=True, nogil=True)
+def _compared(path, values, variances, known, live, live_variances, live_known):  # type: ignore[no-untyped-def]
+    """Return the sum of the truncated squares of both walls along a path (J,), and of how many bins."""
+    total, number = 0.0, 0
+    for j in range(path.shape[0]):
+        b = path[j]
+        for c in range(2):
+            if b >= 0 and live_known[c, j] and known[c, b] > 0.0:
+                d = values[c, b] - live[c, j]
+                total += min(d * d / (variances[c, b] + live_variances[c, j]), TRUNCATED)
+                number += 1
     return total, number

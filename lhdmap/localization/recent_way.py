@@ -135,7 +135,6 @@ class Window(NamedTuple):
         way = np.vstack([first, self.way, last])
         profile = profile_of(self.points, self.counts, way, arc_m(way), settings)
         if not len(profile.at_m):
-            return LiveProfile(np.zeros((3, 0)), np.zeros((3, 0)), np.zeros(3))
+            return LiveProfile(np.zeros((3, 0)), np.zeros((3, 0)), np.zeros((0, 2)))
         values, variances = channels(profile, settings.profile_m, noise)
-        line = np.array([*profile.line_m[-1], profile.heading_rad[-1]], dtype=float)
-        return LiveProfile(values.T, variances.T, line)
+        return LiveProfile(values.T, variances.T, profile.line_m.astype(float))

@@ -11,10 +11,11 @@ import math
 from typing import NamedTuple
 
 import numpy as np
+import numpy.typing as npt
 
 from lhdmap.geometry import se2
 from lhdmap.landmarks.settings import LandmarkSettings
-from lhdmap.localization.placing import Costs, PlaceOnStrips
+from lhdmap.localization.placing import Costs, LiveProfile, PlaceOnStrips
 from lhdmap.localization.recent_way import Window
 from lhdmap.localization.settings import LocalizationSettings
 from lhdmap.localization.strips import Strips
@@ -27,7 +28,10 @@ from lhdmap.scan_matching.surface_map import SurfaceMap
 _AROUND = [(x, y, math.radians(turn)) for x in (-0.4, 0.0, 0.4) for y in (-0.5, 0.0, 0.5) for turn in (-7.0, 0.0, 7.0)]
 """Of the profile's place in bends, measured: it may be 0.3 m off across and 5 degrees in heading."""
 _FEW_HITS, _HITS = 150, 600
-_LOOSE = np.diag([1.0 / 1.0**2, 1.0 / 1.0**2, 1.0 / math.radians(5.0) ** 2])
+_PROFILE_STD = np.array([0.1, 0.3, math.radians(3.0)])
+"""Of the profile's place, measured: along smooth walls it is far better than a match of hits."""
+_LAID_M = 6.0  # of the mid line to each side of the machine
+_KAPPA = 10.0  # hits that are neighbours share the map's errors
 _LEAST_COMPARED = 0.5
 _SAME_M, _SAME_RAD = 1.0, math.radians(10.0)
 
@@ -103,25 +107,30 @@ class GlobalSearch:
         if not len(self._strips.poses) or not np.isfinite(live.values[:2]).any():
             return said
         costs = Costs(self._strips, live, self._weights)
-        T_line_base = se2.compose(se2.inverse(live.line), asked.T_odom_base)
         places = costs.likeliest()
         rivals = [min([0.0, *(other.cost for other in places if other is not one)]) for one in places]
         candidates = [
-            self._candidate(one, rival - one.cost, T_line_base) for one, rival in zip(places, rivals, strict=True)
+            self._candidate(one, rival - one.cost, self._machine(costs.path(one.place), live, asked.T_odom_base))
+            for one, rival in zip(places, rivals, strict=True)
         ]
         refused = self._refused(places[0], candidates[0], window.length_m)
         if not refused:
             candidates[0] = self._refined(candidates[0], window, asked.T_odom_base)
         said = said._replace(candidates=tuple(candidates), refused=refused)
-        return said if asked.claimed is None else self._judged(said, costs, asked.claimed, T_line_base)
+        return said if asked.claimed is None else self._judged(said, costs, asked.claimed, asked, live)
 
-    def _judged(self, said: Search, costs: Costs, claimed: FloatArray, T_line_base: FloatArray) -> Search:
+    def _judged(
+        self, said: Search, costs: Costs, claimed: FloatArray, asked: Question, live: LiveProfile
+    ) -> Search:
         """Add what is said of a place (4,) that is claimed."""
         best, own = said.candidates[0], None
-        place = costs.at(se2.compose(claimed[:3], se2.inverse(T_line_base)), claimed[3])
+        T_map_odom = se2.compose(claimed[:3], se2.inverse(asked.T_odom_base))
+        ahead = live.line[-1] - live.line[-2]
+        line = np.array([*live.line[-1], math.atan2(ahead[1], ahead[0])])
+        place = costs.at(se2.compose(T_map_odom, line), claimed[3])
         denied = ""
         if place is not None:
-            own = self._candidate(place, min(-best.evidence, 0.0) - place.cost, T_line_base)._replace(pose=claimed[:3])
+            own = self._candidate(place, min(-best.evidence, 0.0) - place.cost, claimed[:3])
             if own.evidence < -self._settings.gap:
                 denied = f"other walls than there, {-own.evidence:.0f} nats"
         off = se2.between(claimed[:3], best.pose)
@@ -129,8 +138,15 @@ class GlobalSearch:
             denied = f"it is at {best.pose[0]:.1f}, {best.pose[1]:.1f}"
         return said._replace(claimed=own, denied=denied)
 
-    def _candidate(self, place: PlaceOnStrips, gap: float, T_line_base: FloatArray) -> Candidate:
-        pose = se2.compose(self._strips.poses[place.place], T_line_base)
+    def _machine(self, path: npt.NDArray[np.int64], live: LiveProfile, T_odom_base: FloatArray) -> FloatArray:
+        """Return the machine's pose (3,) in `map`: the mid line about it is laid onto that of the path (J,), rigidly."""
+        apart = np.hypot(*(live.line - T_odom_base[:2]).T)
+        near = (path >= 0) & (apart <= max(_LAID_M, float(apart[path >= 0].min()) + _LAID_M))
+        T_map_odom = _laid(live.line[near], self._strips.poses[path[near], :2])
+        pose: FloatArray = se2.compose(T_map_odom, T_odom_base)
+        return pose
+
+    def _candidate(self, place: PlaceOnStrips, gap: float, pose: FloatArray) -> Candidate:
         height, node = float(self._strips.heights_m[place.place]), self._strips.node_at(place.place)
         return Candidate(pose, height, node, place.probability, place.chi2, -place.cost, gap, math.nan)
 
@@ -151,19 +167,36 @@ class GlobalSearch:
         near = local[np.hypot(local[:, 0], local[:, 1]) < self._settings.range_m]
         walls, origin = self._walls.around(np.array([*found.pose[:2], found.height_m]))
         shift = np.array([origin[0], origin[1], 0.0])
-        coarse = _matched(walls, near[:: max(len(near) // _FEW_HITS, 1)], found.pose - shift, _AROUND)
-        best = _matched(walls, near[:: max(len(near) // _HITS, 1)], coarse.pose, [(0.0, 0.0, 0.0)])
+        prior = _prior(found.pose - shift)
+        coarse = _matched(walls, near[:: max(len(near) // _FEW_HITS, 1)], prior, found.pose - shift, _AROUND)
+        best = _matched(walls, near[:: max(len(near) // _HITS, 1)], prior, coarse.pose, [(0.0, 0.0, 0.0)])
         return found._replace(pose=best.pose + shift, support=float(best.support))
 
 
+def _laid(points: FloatArray, onto: FloatArray) -> FloatArray:
+    """Return the rigid motion (3,) that lays points (N, 2) onto others, least squares."""
+    middle, target = points.mean(axis=0), onto.mean(axis=0)
+    (x, y), (u, v) = (points - middle).T, (onto - target).T
+    turn = math.atan2(float((x * v - y * u).sum()), float((x * u + y * v).sum()))
+    c, s = math.cos(turn), math.sin(turn)
+    return np.array([target[0] - c * middle[0] + s * middle[1], target[1] - s * middle[0] - c * middle[1], turn])
+
+
+def _prior(pose: FloatArray) -> Prior:
+    """Return how well the profile knows a pose (3,), against hits that are taken for independent."""
+    c, s = math.cos(pose[2]), math.sin(pose[2])
+    R = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+    return Prior(pose, R @ np.diag(_KAPPA / _PROFILE_STD**2) @ R.T)
+
+
 def _matched(
-    walls: SurfaceMap, points: FloatArray, pose: FloatArray, starts: list[tuple[float, float, float]]
+    walls: SurfaceMap, points: FloatArray, prior: Prior, pose: FloatArray, starts: list[tuple[float, float, float]]
 ) -> Match:
     """Return the best of the matches of points (N, 2) from starts (x, y, turn in the machine's axes) about a pose (3,)."""
     hits = Hits(np.column_stack([points, np.zeros(len(points))]), len(points), layered=False)
     found = []
     for offset in starts:
         start = se2.compose(pose, np.array(offset))
-        found.append(match(walls, hits, Prior(start, _LOOSE), start, OTHER_VISIT))
+        found.append(match(walls, hits, prior, start, OTHER_VISIT))
     best: Match = max(found, key=lambda one: one.support)
     return best
