@@ -4,6 +4,10 @@ from __future__ import annotations
 
 import math
 from collections import deque
+from collections.abc import Callable
+
+import numpy as np
+import numpy.typing as npt
 
 from lhdmap.geometry import se2
 from lhdmap.landmarks.settings import LandmarkSettings
@@ -43,9 +47,18 @@ class Finder:
         self._asked_m = -math.inf
 
     def ask(
-        self, purpose: str, stamp_ns: int, travelled_m: float, T_odom_base: FloatArray, claimed: FloatArray | None
+        self,
+        purpose: str,
+        stamp_ns: int,
+        travelled_m: float,
+        T_odom_base: FloatArray,
+        claimed: FloatArray | None,
+        came: Callable[[FloatArray], npt.NDArray[np.bool_]] | None = None,
     ) -> None:
-        """Begin a search if one is due; `claimed` (4,): place x, y, yaw, height that is on trial or tracked."""
+        """Begin a search if one is due; `claimed` (4,): place x, y, yaw, height that is on trial or tracked.
+
+        `came`: tells which hits (N, 2) in `odom` are of what came since the map was made; they are left out.
+        """
         finding_m = max(self._settings.search_every_m, _GROWS * self._way.length_m)
         every_m = {FIND: finding_m, CHECK: self._settings.check_every_m, CONFIRM: 0.0}[purpose]
         # Standing still tells nothing new.
@@ -53,6 +66,9 @@ class Finder:
             return
         self._asked_m = travelled_m
         window = self._way.snapshot(_CHECKED_M if purpose == CHECK else math.inf)
+        if came is not None:
+            kept = ~came(window.points)
+            window = window._replace(points=window.points[kept], counts=window.counts[kept])
         self._thread.ask(Question(stamp_ns, travelled_m, purpose, window, T_odom_base.copy(), claimed))
 
     def answer(self, stamp_ns: int, T_odom_base: FloatArray) -> Search | None:

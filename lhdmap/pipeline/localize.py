@@ -11,6 +11,7 @@ import math
 import time
 from collections import deque
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from types import TracebackType
 from typing import NamedTuple, Self
@@ -263,7 +264,11 @@ class Localizer:
             return
         tracker = None if self._purpose == FIND else self._tracker
         claimed = None if tracker is None else np.append(tracker.pose, tracker.height_m)
-        self._finder.ask(self._purpose, stamp_ns, self._travelled_m, step.T_odom_base, claimed)
+        came = None
+        if self._status == TRACKING and tracker is not None:
+            T_map_odom = se2.compose(tracker.pose, se2.inverse(step.T_odom_base))
+            came = partial(self.world.stands_in, T_map_odom, tracker.height_m)
+        self._finder.ask(self._purpose, stamp_ns, self._travelled_m, step.T_odom_base, claimed, came)
 
     @property
     def _purpose(self) -> str:
