@@ -25,10 +25,11 @@ from lhdmap.topology.sheet import FREE, OCCUPIED, UNKNOWN, Sheet
 
 CAME, WENT = "came", "went"
 """Kinds of a change: something stands in what was free; a wall is not there any more."""
-_EVERY_M = 0.5
+_EVERY_M = 0.3
 _NEW_M, _GONE_M = 0.2, 0.4  # from all walls of the map: nearer is roughness at another height
 _HEIGHT = 0.1  # a metre of height is as far as so many in plan: walls of another level are not near
-_LEVEL_M, _CELL_M, _SURE_VIEWS = 4.0, 0.2, 3
+_LEVEL_M, _CELL_M, _SURE_VIEWS = 4.0, 0.2, 2
+_AROUND = np.array([(x << 22) + y for x in range(-2, 3) for y in range(-2, 3)], dtype=np.int64)
 _CROSSED_M = np.arange(0.4, 3.01, 0.1)  # before a hit, where the wall that is gone may have stood
 _SAME_M, _DRIFT = 0.5, 0.02  # of a place that is found again, from the one that the odometry led to
 _FARTHEST_LOST_M = 60.0
@@ -66,7 +67,7 @@ class Seen(NamedTuple):
 
 
 class _NewCells:
-    """Cells of 0.2 m in which something new was seen, and from how many places."""
+    """Cells of 0.2 m in which something new was seen, from how many places, and those around the ones that are sure."""
 
     def __init__(self) -> None:
         self._views: dict[int, int] = {}
@@ -74,17 +75,19 @@ class _NewCells:
 
     def add(self, points: FloatArray, height_m: float) -> None:
         """Count the new hits (N, 2) of one view."""
-        for key in np.unique(_cell_keys(points, height_m)).tolist():
+        keys = np.unique(_cell_keys(points, height_m))
+        for key in keys.tolist():
             self._views[key] = self._views.get(key, 0) + 1
-            if self._views[key] == _SURE_VIEWS:
-                self._sure = np.append(self._sure, key)
+        sure = keys[[self._views[key] == _SURE_VIEWS for key in keys.tolist()]]
+        self._sure = np.union1d(self._sure, (sure[:, None] + _AROUND).ravel())
 
     def has(self, points: FloatArray, height_m: float) -> npt.NDArray[np.bool_]:
-        """Return which points (N, 2) are in cells that are surely new, or beside one."""
-        found = np.zeros(len(points), bool)
-        if len(self._sure):
-            for shift in ((0.0, 0.0), (_CELL_M, 0.0), (-_CELL_M, 0.0), (0.0, _CELL_M), (0.0, -_CELL_M)):
-                found |= np.isin(_cell_keys(points + shift, height_m), self._sure)
+        """Return which points (N, 2) are in cells that are surely new, or near one: some hits of a nearer wall are not new."""
+        if not len(self._sure):
+            return np.zeros(len(points), np.bool_)
+        keys = _cell_keys(points, height_m)
+        at = np.minimum(np.searchsorted(self._sure, keys), len(self._sure) - 1)
+        found: npt.NDArray[np.bool_] = self._sure[at] == keys
         return found
 
 

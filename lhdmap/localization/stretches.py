@@ -19,8 +19,8 @@ if TYPE_CHECKING:
 
 _BIN_M, _SECTORS = 0.5, 16
 _HEIGHT = 2.0  # a metre of height is as far as so many in plan
-_MOST_SHARE, _FEWEST_VIEWS, _FEWEST_HITS = 0.5, 3, 8
-_LEAST_M, _GAP_BINS = 1.0, 2
+_MOST_SHARE, _FEWEST_VIEWS, _FEWEST_HITS = 0.5, 5, 8
+_LEAST_M, _GAP_BINS = 1.0, 4
 _SIDES = ("left", "right")
 
 

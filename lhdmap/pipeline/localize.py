@@ -41,7 +41,7 @@ from lhdmap.topology.model import TopologicalMap
 from lhdmap.topology.sheet import Sheet, read_sheets
 
 _HITS_ABOVE_M = 1.0  # hits are flat: where they are shown over the floor
-_LEAST_LEFT = 0.1  # of the hits must be of walls that the map has, or nothing corrects the place
+_LEAST_LEFT = 0.25  # of the hits must be of walls that the map has, or nothing corrects the place
 _LEAST_SUPPORT = 0.35  # where a node's own scans tell of none
 
 
