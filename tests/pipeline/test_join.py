@@ -10,14 +10,15 @@ import pytest
 from lhdmap.cli.main import main
 from lhdmap.errors import InputError
 from lhdmap.geometry import se2
+from lhdmap.logs.writer import LogWriter
 from lhdmap.mapfolder import MapFolder
 from lhdmap.messages import FloatArray
 from lhdmap.pipeline.build import BuildRequest
 from lhdmap.pipeline.join import build_drives
-from lhdmap.simulation.planar import world_from_polylines
+from lhdmap.simulation.planar import PlanarScanner, simulate_scans, world_from_polylines
 from lhdmap.topology.files import read_topology
 
-from tests.update.drives import BRANCH_M, DEEP_M, first_way, mine, north_way, write_drive
+from tests.update.drives import BRANCH_M, DEEP_M, RATE_HZ, first_way, mine, north_way, write_drive
 
 LEAST_KEYS = {"map", "scans", "scans_processed", "duration_s", "distance_m", "degenerate_share", "closures", "pile"}
 
@@ -104,6 +105,33 @@ def test_another_mine_is_refused_with_both_names(logs: tuple[Path, Path], tmp_pa
     with pytest.raises(InputError, match=r"other\.mcap.*east\.mcap"):
         build_drives(BuildRequest([logs[0], other], tmp_path / "map"))
     assert not list(tmp_path.glob("map*"))
+
+
+def write_with_pause(path: Path, first: FloatArray, second: FloatArray, *, other: int | None = None) -> Path:
+    """A log of one drive, a pause of a minute, and another one; `other`: the second is in another mine of this seed."""
+    with LogWriter(path) as writer:
+        for world, way, at_s in (
+            (mine(branch=True), first, 0.0),
+            (mine(branch=True, seed=other or 4), second, 100.0),
+        ):
+            for scan in simulate_scans(world, way, PlanarScanner(270.0, max_range_m=30.0), RATE_HZ, 5):
+                writer.write("/lidar/front/scan", scan._replace(stamp_ns=scan.stamp_ns + round(at_s * 1e9)))
+    return path
+
+
+def test_a_log_in_which_the_machine_was_moved_is_one_map(tmp_path: Path) -> None:
+    log = write_with_pause(tmp_path / "moved.mcap", first_way(), north_way())
+    result = build_drives(BuildRequest([log], tmp_path / "map"))
+    assert result.summary["drives"] == 2
+    assert errors(result.folder, first_way(), north_way()).max() < 0.3
+    assert [Path(one["path"]).name for one in MapFolder.open(result.folder).info["sources"]] == ["moved.mcap"]
+
+
+def test_a_log_whose_parts_cannot_be_joined_is_one_drive_with_a_warning(tmp_path: Path) -> None:
+    log = write_with_pause(tmp_path / "moved.mcap", first_way()[:200], north_way()[:200], other=77)
+    result = build_drives(BuildRequest([log], tmp_path / "map"))
+    assert "drives" not in result.summary
+    assert any("seems to be in another place" in text for text in result.warnings)
 
 
 def test_where_two_places_look_alike_nothing_is_joined(tmp_path: Path) -> None:
