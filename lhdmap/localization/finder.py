@@ -68,6 +68,11 @@ class Finder:
             claimed=said.claimed and said.claimed._replace(pose=se2.compose(said.claimed.pose, moved)),
         )
 
+    @property
+    def waited_s(self) -> float:
+        """How long searches have been waited for: nothing does on a running machine."""
+        return self._thread.waited_s
+
     def close(self) -> None:
         """End the thread."""
         self._thread.close()

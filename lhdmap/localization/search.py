@@ -119,9 +119,7 @@ class GlobalSearch:
         said = said._replace(candidates=tuple(candidates), refused=refused)
         return said if asked.claimed is None else self._judged(said, costs, asked.claimed, asked, live)
 
-    def _judged(
-        self, said: Search, costs: Costs, claimed: FloatArray, asked: Question, live: LiveProfile
-    ) -> Search:
+    def _judged(self, said: Search, costs: Costs, claimed: FloatArray, asked: Question, live: LiveProfile) -> Search:
         """Add what is said of a place (4,) that is claimed."""
         best, own = said.candidates[0], None
         T_map_odom = se2.compose(claimed[:3], se2.inverse(asked.T_odom_base))

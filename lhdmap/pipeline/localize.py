@@ -152,7 +152,7 @@ class Localizer:
 
     def take(self, stamp_ns: int, step: OdometryStep, odometry: PlanarOdometry) -> None:
         """Take what the odometry says of a front scan."""
-        began = time.perf_counter()
+        began, waited_s = time.perf_counter(), self._finder.waited_s
         self._began_ns = stamp_ns if self._began_ns is None else self._began_ns
         if self._before is not None:
             moved = se2.between(self._before, step.T_odom_base)
@@ -169,7 +169,9 @@ class Localizer:
             self._look_around(stamp_ns, step)
             if self._status == TRACKING and self.first_fix is None:
                 self.first_fix = ((stamp_ns - self._began_ns) * 1e-9, self._travelled_m)
-        self.rows.append(self._row(stamp_ns, step, source, 1e3 * (time.perf_counter() - began)))
+        self.rows.append(
+            self._row(stamp_ns, step, source, 1e3 * (time.perf_counter() - began - self._finder.waited_s + waited_s))
+        )
 
     def _hits(self, odometry: PlanarOdometry) -> tuple[FloatArray, int]:
         """Return hits (N, 2) of both scanners near the machine, thinned, and how many are the front one's."""

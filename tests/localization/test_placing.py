@@ -20,7 +20,9 @@ STEP_M = 0.1
 def walls(seed: int, bins: int = BINS) -> FloatArray:
     """Return left and right wall and turn (3, n)."""
     rng = np.random.default_rng(seed)
-    return np.array([2.0, 2.0, 0.0])[:, None] + np.array([SPREAD, SPREAD, 0.02])[:, None] * rng.standard_normal((3, bins))
+    return np.array([2.0, 2.0, 0.0])[:, None] + np.array([SPREAD, SPREAD, 0.02])[:, None] * rng.standard_normal(
+        (3, bins)
+    )
 
 
 def strips(*values: FloatArray, before: tuple[tuple[int, ...], ...] | None = None) -> Strips:
