@@ -14,7 +14,7 @@ from lhdmap.localization.settings import LocalizationSettings
 from lhdmap.messages import FloatArray
 
 _CHECKED_M = 12.0  # what lies farther back says nothing of a machine that was moved since
-_GROWS = 0.2  # a search needs so much more wall than the one before
+_GROWS = 0.1  # a search needs so much more wall than the one before
 _KEPT = 20_000  # searches: of a day; older ones are forgotten
 
 

@@ -10,7 +10,7 @@ from concurrent.futures import Future, ThreadPoolExecutor
 
 from lhdmap.localization.search import GlobalSearch, Question, Search
 
-_ANSWER_NS = 300_000_000
+_ANSWER_NS = 200_000_000
 
 
 class SearchThread:
