@@ -18,7 +18,7 @@ from lhdmap.localization.settings import LocalizationSettings
 from lhdmap.messages import FloatArray
 
 _CHECKED_M = 12.0  # what lies farther back says nothing of a machine that was moved since
-_GROWS = 0.2  # a search needs so much more wall than the one before
+_GROWS = 0.1  # a search needs so much more wall than the one before
 _KEPT = 20_000  # searches: of a day; older ones are forgotten
 
 
@@ -83,6 +83,11 @@ class Finder:
             candidates=tuple(one._replace(pose=se2.compose(one.pose, moved)) for one in said.candidates),
             claimed=said.claimed and said.claimed._replace(pose=se2.compose(said.claimed.pose, moved)),
         )
+
+    @property
+    def waited_s(self) -> float:
+        """How long searches have been waited for: nothing does on a running machine."""
+        return self._thread.waited_s
 
     def close(self) -> None:
         """End the thread."""

@@ -162,7 +162,7 @@ class Localizer:
 
     def take(self, stamp_ns: int, step: OdometryStep, odometry: PlanarOdometry) -> None:
         """Take what the odometry says of a front scan."""
-        began = time.perf_counter()
+        began, waited_s = time.perf_counter(), self._finder.waited_s
         self._stamp_ns = stamp_ns
         self._began_ns = stamp_ns if self._began_ns is None else self._began_ns
         if self._before is not None:
@@ -181,7 +181,9 @@ class Localizer:
             self._look_around(stamp_ns, step)
             if self._status == TRACKING and self.first_fix is None:
                 self.first_fix = ((stamp_ns - self._began_ns) * 1e-9, self._travelled_m)
-        self.rows.append(self._row(stamp_ns, step, source, 1e3 * (time.perf_counter() - began)))
+        self.rows.append(
+            self._row(stamp_ns, step, source, 1e3 * (time.perf_counter() - began - self._finder.waited_s + waited_s))
+        )
         self._set_against_the_map(stamp_ns, points)  # the place has not waited for it
 
     def _set_against_the_map(self, stamp_ns: int, points: FloatArray) -> None:

@@ -13,7 +13,7 @@ from lhdmap.localization.search_thread import SearchThread
 
 _NONE = np.zeros((0, 2))
 WINDOW = Window(_NONE, np.zeros(0), _NONE, (np.zeros(3), np.zeros(3)), 0.0)
-DUE_NS = 300_000_000
+DUE_NS = 200_000_000
 
 
 def asked(stamp_ns: int = 0) -> Question:
