@@ -1,6 +1,6 @@
 """What has changed in the world since the map was made: where the hits of a drive contradict the map, though its place is known.
 
-Each half metre of travel the hits are set against the map: one in the map's free room, away from all walls, is of something new
+Each 0.3 m of travel the hits are set against the map: one in the map's free room, away from all walls, is of something new
 (a parked machine, a pile, a wall that came nearer); one behind a wall of the map tells that the wall is gone. Both are counted
 along the tunnels, each side by itself; a stretch is changed where they are most of what was seen there, from several places. What
 walks by is seen too shortly for that. While the machine is lost, what it sees is kept apart, and counts where the place that is
@@ -31,6 +31,7 @@ _HEIGHT = 0.1  # a metre of height is as far as so many in plan: walls of anothe
 _LEVEL_M, _CELL_M, _SURE_VIEWS = 4.0, 0.2, 2
 _AROUND = np.array([(x << 22) + y for x in range(-2, 3) for y in range(-2, 3)], dtype=np.int64)
 _CROSSED_M = np.arange(0.4, 3.01, 0.1)  # before a hit, where the wall that is gone may have stood
+_KEPT_M = 100.0  # of travel
 _SAME_M, _DRIFT = 0.5, 0.02  # of a place that is found again, from the one that the odometry led to
 _FARTHEST_LOST_M = 60.0
 
@@ -67,14 +68,21 @@ class Seen(NamedTuple):
 
 
 class _NewCells:
-    """Cells of 0.2 m in which something new was seen, from how many places, and those around the ones that are sure."""
+    """Cells of 0.2 m in which something new was seen, from how many places, and those around the ones that are sure.
+
+    What was seen more than some 100 m of travel ago is forgotten: what moves would come to cover all of the floor in a day.
+    """
 
     def __init__(self) -> None:
         self._views: dict[int, int] = {}
-        self._sure = np.zeros(0, np.int64)
+        self._sure = self._before = np.zeros(0, np.int64)
+        self._since_m = 0.0
 
-    def add(self, points: FloatArray, height_m: float) -> None:
+    def add(self, travelled_m: float, points: FloatArray, height_m: float) -> None:
         """Count the new hits (N, 2) of one view."""
+        if travelled_m - self._since_m > _KEPT_M:
+            self._since_m, self._views = travelled_m, {}
+            self._sure, self._before = np.zeros(0, np.int64), self._sure
         keys = np.unique(_cell_keys(points, height_m))
         for key in keys.tolist():
             self._views[key] = self._views.get(key, 0) + 1
@@ -83,11 +91,10 @@ class _NewCells:
 
     def has(self, points: FloatArray, height_m: float) -> npt.NDArray[np.bool_]:
         """Return which points (N, 2) are in cells that are surely new, or near one: some hits of a nearer wall are not new."""
-        if not len(self._sure):
-            return np.zeros(len(points), np.bool_)
-        keys = _cell_keys(points, height_m)
-        at = np.minimum(np.searchsorted(self._sure, keys), len(self._sure) - 1)
-        found: npt.NDArray[np.bool_] = self._sure[at] == keys
+        keys, found = _cell_keys(points, height_m), np.zeros(len(points), np.bool_)
+        for sure in (self._sure, self._before):
+            if len(sure):
+                found |= sure[np.minimum(np.searchsorted(sure, keys), len(sure) - 1)] == keys
         return found
 
 
@@ -130,7 +137,7 @@ class WorldChanges:
             self._settle()
             self._along.add(seen)
             if holds:
-                self._new.add(seen.points[seen.kinds == 1], seen.height_m)
+                self._new.add(travelled_m, seen.points[seen.kinds == 1], seen.height_m)
             return
         self._lost_m = travelled_m if self._lost_m is None else self._lost_m
         if travelled_m - self._lost_m < _FARTHEST_LOST_M:

@@ -141,3 +141,16 @@ def test_where_the_scan_does_not_hold_nothing_is_learnt() -> None:
         pose = np.array([at, 0.0, 0.0])
         changes.update(round(1e9 * at), at, (pose, 0.0), seen_from(pose, walls), known=True, holds=False)
     assert not changes.stands_in(pose, 0.0, seen_from(pose, walls)).any()
+
+
+def test_what_came_is_forgotten_after_some_way() -> None:
+    """A person here and one there would else come to cover the floor; the report keeps what was seen."""
+    changes, walls = world(), [*SIDES, *box(30.0, 38.0, 0.9, 2.1)]
+    driven(changes, walls, 20.0, 30.0)
+    pose = np.array([31.0, 0.0, 0.0])
+    hits = seen_from(pose, walls)
+    far = seen_from(np.array([70.0, 0.0, 0.0]), SIDES)
+    for travelled in (150.0, 300.0):
+        changes.update(0, travelled, (np.array([70.0, 0.0, 0.0]), 0.0), far, known=True, holds=True)
+    assert not changes.stands_in(pose, 0.0, hits).any()
+    assert len(changes.changes()) == 1
