@@ -139,6 +139,7 @@ def _write_shown(
         landmark_settings=request.settings.landmarks,
         sheets=made.topology.sheets,
         diagnostics=made.diagnostics(),
+        drives=len(made.built),
         warnings=warnings,
         settings_text=settings_toml(request.settings),
         provenance={"log": ", ".join(name_of(path) for path in dict.fromkeys(made.logs))},
