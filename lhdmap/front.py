@@ -115,10 +115,10 @@ def build_map(
     force: bool = False,
     helper: bool = False,
 ) -> Map:
-    """Build the map of one drive and return it: `lhdmap build-map` as a function, which prints nothing.
+    """Build the map of one drive, or of several that overlap: `lhdmap build-map` as a function, which prints nothing.
 
     Args:
-        log: log file or bag folder; a list of several is one drive.
+        log: log file or bag folder; a list of several: parts of one drive, or drives that overlap.
         out: the map folder to make; without it `NAME_map` beside the log. A folder that exists is refused.
         settings: what differs from the defaults: `{"odometry.method": "range_flow"}`, `{"odometry": {"method": "range_flow"}}`,
             or a TOML file (`lhdmap config` prints all settings with their units).
@@ -136,7 +136,7 @@ def build_map(
         KeyboardInterrupt: Ctrl-C; what was finished is in `out` + `.partial`.
     """
     from lhdmap.pipeline.build import BuildRequest
-    from lhdmap.pipeline.build import build_map as build
+    from lhdmap.pipeline.join import build_drives
 
     logs = _logs(log)
     request = BuildRequest(
@@ -149,7 +149,7 @@ def build_map(
         helper=helper,
         force=force,
     )
-    return open_map(build(request).folder)
+    return open_map(build_drives(request).folder)
 
 
 def open_map(path: AnyPath) -> Map:

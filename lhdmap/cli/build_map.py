@@ -15,7 +15,11 @@ from lhdmap.names import beside
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options of `lhdmap build-map`."""
     parser.add_argument(
-        "logs", nargs="+", type=Path, metavar="LOG", help="log file or bag folder; several are one drive"
+        "logs",
+        nargs="+",
+        type=Path,
+        metavar="LOG",
+        help="log or bag folder; several: parts of one drive, or drives that overlap",
     )
     add_output(parser, "map folder to make (default: LOG_map beside the log)")
     add_settings(parser)
@@ -41,7 +45,8 @@ def run(arguments: argparse.Namespace, console: Console) -> int:
     """Build the map and print where it is."""
     from lhdmap.config import load_settings
     from lhdmap.machine import load_machine
-    from lhdmap.pipeline.build import BuildRequest, build_map
+    from lhdmap.pipeline.build import BuildRequest
+    from lhdmap.pipeline.join import build_drives
 
     request = BuildRequest(
         logs=arguments.logs,
@@ -55,7 +60,7 @@ def run(arguments: argparse.Namespace, console: Console) -> int:
         force=arguments.force,
         edits=arguments.edits,
     )
-    result = build_map(request)
+    result = build_drives(request)
     for text in result.warnings:
         console.warn(text)
     console.result(result.summary | {"warnings": result.warnings}, summary_text(result.summary))

@@ -75,7 +75,9 @@ def node_surface(
     scans: Sequence[NodeScan], T_map_node: FloatArray, settings: LandmarkSettings, *, tunnel: bool
 ) -> NodeSurface:
     """Return the fused walls of a node from its scans, in order along it; a tunnel's with the profile."""
-    cells = fused([placed(scan, T_map_node, settings) for scan in scans], settings.cell_m)
+    cells = fused(
+        [placed(scan, T_map_node, settings) for scan in scans], settings.cell_m, [scan.height_m for scan in scans]
+    )
     quality = quality_of(cells, scans, T_map_node, settings)
     if not tunnel:
         return NodeSurface(cells, quality, None)

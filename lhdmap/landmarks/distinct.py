@@ -20,7 +20,7 @@ APART_M = 2.0
 """A place nearer than this is no other place."""
 _TURN_M, _TURN_STD_RAD = 2.0, 0.005
 _SLOPE_M, _BASE_M = 0.05, 0.005
-_TRUNCATED, _TEMPER = 9.0, 1.0 / 3.0
+TRUNCATED, TEMPER = 9.0, 1.0 / 3.0
 _LEAST_M = 0.5
 
 Stretches = list[tuple[float, float]]
@@ -38,7 +38,7 @@ def gaps(profile: Profile, settings: LandmarkSettings) -> Float32Array:
         smooth_bins = settings.smooth_m / settings.profile_m
         weights = np.array([1.0, 1.0, 1.0 / smooth_bins])
         apart = round(APART_M / settings.profile_m)
-        values, variances = _channels(profile, settings.profile_m)
+        values, variances = channels(profile, settings.profile_m)
         _slide(values, variances, weights, window, apart, best)
         best[: window // 2] = best[window // 2]
         best[n - window + window // 2 + 1 :] = best[n - window + window // 2]
@@ -49,12 +49,12 @@ def reduced_chi2(one: Profile, other: Profile, settings: LandmarkSettings) -> fl
     """Return the mean of the truncated squared differences of two profiles of one tunnel over their variance; NaN without any."""
     if min(len(one.at_m), len(other.at_m)) < 2:
         return float("nan")
-    (a, a_var), (b, b_var) = (_channels(profile, settings.profile_m) for profile in (one, other))
+    (a, a_var), (b, b_var) = (channels(profile, settings.profile_m) for profile in (one, other))
     inside = (one.at_m >= other.at_m.min()) & (one.at_m <= other.at_m.max())
     b, b_var = (
         np.column_stack([np.interp(one.at_m, other.at_m, column) for column in columns.T[:2]]) for columns in (b, b_var)
     )
-    x = np.minimum((a[:, :2] - b) ** 2 / (a_var[:, :2] + b_var), _TRUNCATED)[inside]
+    x = np.minimum((a[:, :2] - b) ** 2 / (a_var[:, :2] + b_var), TRUNCATED)[inside]
     return float(x[np.isfinite(x)].mean()) if np.isfinite(x).any() else float("nan")
 
 
@@ -67,14 +67,17 @@ def not_distinctive(at_m: Float32Array, gap: Float32Array, least: float) -> Stre
     return [one for one in found if one[1] - one[0] >= _LEAST_M]
 
 
-def _channels(profile: Profile, step_m: float) -> tuple[FloatArray, FloatArray]:
-    """Return values and variances (P, 3): left and right wall, turn of the mid line; NaN where not known."""
+def channels(profile: Profile, step_m: float, noise: float = 1.0) -> tuple[FloatArray, FloatArray]:
+    """Return values and variances (P, 3): left and right wall, turn of the mid line; NaN where not known.
+
+    `noise`: factor of what of the walls' variance is not due to their slope.
+    """
     values, variances = [], []
     for wall, variance in ((profile.left_m, profile.left_var), (profile.right_m, profile.right_var)):
         distance = wall.astype(np.float64)
         slope = np.abs(np.gradient(distance, step_m))
         values.append(distance)
-        variances.append(variance + (slope * _SLOPE_M) ** 2 + 0.5 * _BASE_M**2)
+        variances.append(noise * (variance + 0.5 * _BASE_M**2) + (slope * _SLOPE_M) ** 2)
     half = max(round(0.5 * _TURN_M / step_m), 1)
     heading, turn = profile.heading_rad.astype(np.float64), np.full(len(profile.at_m), np.nan)
     if len(heading) > 2 * half:
@@ -94,8 +97,8 @@ def _cost(values, variances, weights, a, b, turned):  # type: ignore[no-untyped-
         d = values[a, channel] - theirs
         x = d * d / (variances[a, channel] + variances[b, other])
         if x == x:
-            total += weights[channel] * (min(x, _TRUNCATED) - 1.0)
-    return 0.5 * _TEMPER * total
+            total += weights[channel] * (min(x, TRUNCATED) - 1.0)
+    return 0.5 * TEMPER * total
 
 
 @nb.njit(cache=True, nogil=True)

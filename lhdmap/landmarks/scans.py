@@ -18,13 +18,15 @@ class NodeScan(NamedTuple):
     """One stored cloud: the hits of both scanners, joined in the machine's level base frame.
 
     `node`: id of the tunnel or intersection. `at_m`: distance along the node's line (tunnels), or along the drive within it
-    (intersections). `T_map_base` (3,): x, y, yaw. `points_m` (N, 2): hits, without those of the machine itself.
+    (intersections). `T_map_base` (3,): x, y, yaw. `points_m` (N, 2): hits, without those of the machine itself. `height_m`: of the
+    floor in `map`; a tunnel may wind above itself.
     """
 
     node: str
     at_m: float
     T_map_base: FloatArray
     points_m: FloatArray
+    height_m: float = 0.0
 
 
 class Cloud(NamedTuple):
@@ -45,9 +47,9 @@ def checked(scan: NodeScan) -> NodeScan:
     points = np.asarray(scan.points_m, dtype=np.float64)
     if pose.shape != (3,) or points.ndim != 2 or points.shape[1] != 2:
         raise InputError(f"scan in {scan.node}: pose {pose.shape}, points {points.shape}; (3,) and (N, 2) were wanted")
-    if not (math.isfinite(scan.at_m) and np.isfinite(pose).all()):
+    if not (math.isfinite(scan.at_m) and math.isfinite(scan.height_m) and np.isfinite(pose).all()):
         raise InputError(f"scan in {scan.node}: its place {scan.at_m} m or pose {pose.tolist()} is not a number")
-    return NodeScan(scan.node, float(scan.at_m), pose, points[np.isfinite(points).all(axis=1)])
+    return NodeScan(scan.node, float(scan.at_m), pose, points[np.isfinite(points).all(axis=1)], float(scan.height_m))
 
 
 def ordered(scans: Sequence[NodeScan]) -> list[NodeScan]:

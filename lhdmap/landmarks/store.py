@@ -5,6 +5,7 @@
 | `points`, `offsets`, `poses_node`, `node`, `at_m`, `threshold`, `delta`, `radius`, `key` | as in `Landmarks` |
 | `similarity_<node>` | of each tunnel |
 | `surface_node` (n,), `surface_offsets` (n + 1,), `surface_points`, `surface_counts`, `surface_cell_m` | fused walls by node |
+| `surface_height_dm` | of each cell, the floor's height in `map`, dm; not in older maps |
 | `surface_quality` (n, 8) | `Quality`, in the order of its fields |
 | `profile_node` (t,), `profile_offsets` (t + 1,), `profile_<field>` | `Profile` of each tunnel, one after the other |
 """
@@ -26,6 +27,7 @@ from lhdmap.landmarks.quality import Quality
 from lhdmap.landmarks.surface import Cells
 
 Arrays = Mapping[str, npt.NDArray[Any]]
+_HEIGHTS_DM = np.iinfo(np.int16).min, np.iinfo(np.int16).max
 _MATRIX = "similarity_"
 _OF_LANDMARKS = ("poses_node", "node", "at_m", "threshold", "delta", "radius", "key")
 _NEEDED = (
@@ -55,11 +57,17 @@ def _surface_arrays(surfaces: Mapping[str, NodeSurface]) -> dict[str, npt.NDArra
         "surface_offsets": _offsets([len(one.counts) for one in cells]),
         "surface_points": np.concatenate([np.zeros((0, 2), np.float32), *(one.points_m for one in cells)]),
         "surface_counts": np.concatenate([np.zeros(0, np.uint16), *(one.counts for one in cells)]),
+        "surface_height_dm": np.concatenate([np.zeros(0, np.int16), *map(_height_dm, cells)]),
         "surface_cell_m": np.array([one.cell_m for one in cells]),
         "surface_quality": np.array([one.quality for one in surfaces.values()]).reshape(-1, len(Quality._fields)),
         "profile_node": np.array(list(profiles), dtype=np.str_),
         "profile_offsets": _offsets([len(one.at_m) for one in profiles.values()]),
     } | {f"profile_{name}": np.concatenate(column) for name, column in zip(Profile._fields, columns, strict=True)}
+
+
+def _height_dm(cells: Cells) -> npt.NDArray[np.int16]:
+    heights = np.zeros(len(cells.counts)) if cells.heights_m is None else cells.heights_m
+    return np.clip(np.round(10.0 * heights), *_HEIGHTS_DM).astype(np.int16)
 
 
 def _offsets(lengths: list[int]) -> npt.NDArray[np.int64]:
@@ -119,7 +127,8 @@ def _surfaces(arrays: Arrays) -> dict[str, NodeSurface]:
     for number, node in enumerate(arrays["surface_node"]):
         rows = slice(cuts[number], cuts[number + 1])
         cell_m = float(arrays["surface_cell_m"][number])
-        cells = Cells(arrays["surface_points"][rows], arrays["surface_counts"][rows], cell_m)
+        heights = arrays["surface_height_dm"][rows] * np.float32(0.1) if "surface_height_dm" in arrays else None
+        cells = Cells(arrays["surface_points"][rows], arrays["surface_counts"][rows], cell_m, heights)
         quality = Quality(*arrays["surface_quality"][number].tolist())
         surfaces[str(node)] = NodeSurface(cells, quality, profiles.get(str(node)))
     return surfaces

@@ -6,6 +6,7 @@ Hits are averaged in cells of 5 cm in the node's frame; only cells with hits are
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -18,32 +19,46 @@ from lhdmap.landmarks.settings import LandmarkSettings
 from lhdmap.messages import Float32Array, FloatArray
 from lhdmap.scan_matching.surface_map import SurfaceMap, empty_map, insert_all
 
+_BAND_M = 3.0  # of height: hits seen from floors of one band share a cell
+_BAND_M = 3.0  # of height: hits seen from floors of one band share a cell
 _LEAST_CELLS, _MOST_CELLS, _MARGIN_CELLS = 256, 4096, 32
 _WEIGHED_HITS = 16  # more hits than this make a cell no surer
 _MOST_COUNT = np.iinfo(np.uint16).max
 
 
 class Cells(NamedTuple):
-    """Averaged hits in the node's frame: `points_m` (M, 2) float32, `counts` (M,) uint16, ordered by cell of `cell_m`."""
+    """Averaged hits in the node's frame: `points_m` (M, 2) float32, `counts` (M,) uint16, ordered by cell of `cell_m`.
+
+    `heights_m` (M,) float32: of the floor in `map` where they were seen from; None in maps that do not tell it.
+    """
 
     points_m: Float32Array
     counts: npt.NDArray[np.uint16]
     cell_m: float
+    heights_m: Float32Array | None = None
 
 
-def fused(placed: list[FloatArray], cell_m: float) -> Cells:
-    """Return the averaged hits of clouds (N, 2) that are in one frame; whatever order they come in."""
+def fused(placed: list[FloatArray], cell_m: float, heights_m: Sequence[float] | None = None) -> Cells:
+    """Return the averaged hits of clouds (N, 2) that are in one frame; whatever order they come in.
+
+    `heights_m`: of the floor that each cloud was seen from: cells of floors that are far apart in height stay apart.
+    """
     points = np.concatenate([np.zeros((0, 2)), *placed])
-    keys = np.floor(points / cell_m).astype(np.int64)
-    order = np.lexsort((points[:, 1], points[:, 0], keys[:, 1], keys[:, 0]))
-    keys, points = keys[order], points[order]
+    of_cloud = [0.0] * len(placed) if heights_m is None else heights_m
+    heights = np.repeat(np.asarray(of_cloud, dtype=float), [len(one) for one in placed])
+    keys = np.column_stack([np.floor(points / cell_m), np.floor(heights / _BAND_M)]).astype(np.int64)
+    order = np.lexsort((points[:, 1], points[:, 0], keys[:, 2], keys[:, 1], keys[:, 0]))
+    keys, points, heights = keys[order], points[order], heights[order]
     starts = np.flatnonzero(np.r_[True, (np.diff(keys, axis=0) != 0).any(axis=1)]) if len(points) else np.zeros(0, int)
     counts = np.diff(np.r_[starts, len(points)])
     # summed about the cell, so that places far from the node's origin are as exact as near ones
-    corners = keys * cell_m
+    corners = keys[:, :2] * cell_m
     offsets = np.add.reduceat(points - corners, starts, axis=0) if len(starts) else np.zeros((0, 2))
     means = corners[starts] + offsets / counts[:, None]
-    return Cells(means.astype(np.float32), np.minimum(counts, _MOST_COUNT).astype(np.uint16), cell_m)
+    mean_heights = None
+    if heights_m is not None:
+        mean_heights = ((np.add.reduceat(heights, starts) if len(starts) else np.zeros(0)) / counts).astype(np.float32)
+    return Cells(means.astype(np.float32), np.minimum(counts, _MOST_COUNT).astype(np.uint16), cell_m, mean_heights)
 
 
 def placed(scan: NodeScan, T_map_node: FloatArray, settings: LandmarkSettings) -> FloatArray:

@@ -1,128 +1,200 @@
-"""Where on the whole map: the walls of the last metres are laid over the map's in all headings and shifts (`lhdmap.update.place`).
+"""Where on the whole map: the wall profile of the last metres is laid over all ways through it (`lhdmap.localization.placing`).
 
-The best places are refined against the fused walls and judged by support. A place is proposed when the second best is worse by a
-margin; it counts once the tracker that was started there has kept its support for some metres.
+The best place is believed when the next one, or a tunnel that is not in the map, is less likely by a gap over the reduced χ²
+(the variances are too sure beside niches and bends). Then it is refined against the fused walls. It counts once a tracker that was
+started there has kept its support for some metres, and a second search says the same.
 """
 
 from __future__ import annotations
 
 import math
-from collections import deque
 from typing import NamedTuple
 
 import numpy as np
+import numpy.typing as npt
 
 from lhdmap.geometry import se2
+from lhdmap.landmarks.settings import LandmarkSettings
+from lhdmap.localization.placing import Costs, LiveProfile, PlaceOnStrips
+from lhdmap.localization.recent_way import Window
 from lhdmap.localization.settings import LocalizationSettings
+from lhdmap.localization.strips import Strips
 from lhdmap.localization.walls import MapWalls
 from lhdmap.messages import FloatArray
 from lhdmap.scan_matching.matching import Hits, Match, Prior, match
 from lhdmap.scan_matching.submap import OTHER_VISIT
 from lhdmap.scan_matching.surface_map import SurfaceMap
-from lhdmap.topology.sheet import Sheet
-from lhdmap.update.place import Candidate, WallSearch
 
-_EVERY_M = 0.5
-# The overlay hardly tells where along a straight tunnel one is: its walls are as wide as its cells.
-_ALONG = [(x, 0.0, 0.0) for x in np.arange(-5.2, 5.3, 0.8).tolist()]
-_AROUND = [(0.0, y, math.radians(a)) for y in (-0.4, 0.0, 0.4) for a in (-2.0, 0.0, 2.0)]
-_FEW_HITS = 150
-_LOOSE = np.diag([1.0 / 1.0**2, 1.0 / 1.0**2, 1.0 / math.radians(5.0) ** 2])
-_HITS = 600
+_AROUND = [(x, y, math.radians(turn)) for x in (-0.4, 0.0, 0.4) for y in (-0.5, 0.0, 0.5) for turn in (-7.0, 0.0, 7.0)]
+"""Of the profile's place in bends, measured: it may be 0.3 m off across and 5 degrees in heading."""
+_FEW_HITS, _HITS = 150, 600
+_PROFILE_STD = np.array([0.1, 0.3, math.radians(3.0)])
+"""Of the profile's place, measured: along smooth walls it is far better than a match of hits."""
+_LAID_M = 6.0  # of the mid line to each side of the machine
+_KAPPA = 10.0  # hits that are neighbours share the map's errors
+_LEAST_COMPARED = 0.5
+_SAME_M, _SAME_RAD = 1.0, math.radians(10.0)
+
+FIND, CONFIRM, CHECK = "find", "confirm", "check"
 
 
-class Found(NamedTuple):
-    """A place (3,) of the machine now, its support, the height of its level, how much better than the next (share)."""
+class Candidate(NamedTuple):
+    """A place where the machine may be: pose (3,) in `map`, height of the floor, node (id).
+
+    `probability`: of it against all others and against not being in the map; `chi2`: reduced, of its walls; `evidence` (nats):
+    what its walls tell for it, against other ones of the kind; `gap` (nats): how much less likely the best other place is, or
+    none in the map, negative where that is better; `support`: share of hits that agree with the fused walls once refined, NaN
+    where it was not.
+    """
 
     pose: FloatArray
-    support: float
     height_m: float
-    margin: float
+    node: str
+    probability: float
+    chi2: float
+    evidence: float
+    gap: float
+    support: float
 
 
-class RecentWay:
-    """The hits of the last metres in the odometry's frame."""
+class Search(NamedTuple):
+    """What one search said, at `stamp_ns` after `travelled_m`, of the walls of the last `window_m`.
 
-    def __init__(self, window_m: float) -> None:
-        self._window_m = window_m
-        self._parts: deque[tuple[float, FloatArray]] = deque()
-        self._last_m = -math.inf
+    `purpose`: `find` a place, `confirm` the one on trial, `check` the one that is tracked. `candidates`: best first. `refused`:
+    why the best one is not believed, empty where it is. `claimed`: what it said of the place that is on trial or tracked;
+    `denied`: why the machine is not there, empty where it may be.
+    """
 
-    def add(self, travelled_m: float, T_odom_base: FloatArray, points: FloatArray) -> None:
-        """Take the hits (N, 2) of a scan in the machine's frame."""
-        if travelled_m - self._last_m < _EVERY_M:
-            return
-        self._last_m = travelled_m
-        self._parts.append((travelled_m, se2.transform(T_odom_base, points)))
-        while travelled_m - self._parts[0][0] > self._window_m:
-            self._parts.popleft()
+    stamp_ns: int
+    travelled_m: float
+    window_m: float
+    purpose: str
+    candidates: tuple[Candidate, ...]
+    refused: str
+    claimed: Candidate | None = None
+    denied: str = ""
 
     @property
-    def length_m(self) -> float:
-        """Way that the hits are of."""
-        return self._parts[-1][0] - self._parts[0][0] if self._parts else 0.0
+    def confirms(self) -> bool:
+        """Whether it believes in the place that was claimed, or cannot tell of any."""
+        return not self.candidates or not (self.refused or self.denied)
 
-    def walls(self) -> FloatArray:
-        """Return the hits (N, 2), thinned to cells of 0.2 m."""
-        points = np.concatenate([np.zeros((0, 2)), *(part for _, part in self._parts)])
-        _, first = np.unique(np.floor(points / 0.2).astype(np.int64), axis=0, return_index=True)
-        thinned: FloatArray = points[np.sort(first)]
-        return thinned
+
+class Question(NamedTuple):
+    """What a search is asked: purpose, last walls, pose (3,) in `odom`; `claimed` (4,): x, y, yaw, height in `map`."""
+
+    stamp_ns: int
+    travelled_m: float
+    purpose: str
+    window: Window
+    T_odom_base: FloatArray
+    claimed: FloatArray | None
 
 
 class GlobalSearch:
-    """Searches a map's sheets."""
+    """Searches the strips of a map."""
 
-    def __init__(self, sheets: list[Sheet], walls: MapWalls, settings: LocalizationSettings) -> None:
-        self._searches = [WallSearch(sheet) for sheet in sheets]
-        self._walls, self._settings = walls, settings
+    def __init__(
+        self, strips: Strips, walls: MapWalls, settings: LocalizationSettings, landmarks: LandmarkSettings
+    ) -> None:
+        self._strips, self._walls, self._settings, self._landmarks = strips, walls, settings, landmarks
+        self._weights = np.array([1.0, 1.0, landmarks.profile_m / landmarks.smooth_m])
 
-    def places(self, way: RecentWay, T_odom_base: FloatArray) -> list[Found]:
-        """Return the likeliest places of the machine, the best first, each at a place of its own."""
-        points = way.walls()
-        if len(points) < 50:
-            return []
-        candidates = [(one, search.sheet) for search in self._searches for one in search.best(points, 6)]
-        candidates.sort(key=lambda pair: -pair[0].score)
-        found: list[Found] = []
-        for candidate, sheet in candidates[:8]:
-            refined = self._refined(candidate, sheet, points, T_odom_base)
-            if refined is not None and not any(_same(refined.pose, other.pose) for other in found):
-                found.append(refined)
-        found.sort(key=lambda one: -one.support)
-        second = found[1].support if len(found) > 1 else 0.0
-        return [
-            one._replace(margin=1.0 - second / max(one.support, 1e-9)) if k == 0 else one for k, one in enumerate(found)
+    def answer(self, asked: Question) -> Search:
+        """Search the whole map."""
+        window, said = asked.window, Search(*asked[:2], asked.window.length_m, asked.purpose, (), "no walls in reach")
+        live = window.profile(self._landmarks, self._strips.noise)
+        if not len(self._strips.poses) or not np.isfinite(live.values[:2]).any():
+            return said
+        costs = Costs(self._strips, live, self._weights)
+        places = costs.likeliest()
+        rivals = [min([0.0, *(other.cost for other in places if other is not one)]) for one in places]
+        candidates = [
+            self._candidate(one, rival - one.cost, self._machine(costs.path(one.place), live, asked.T_odom_base))
+            for one, rival in zip(places, rivals, strict=True)
         ]
+        refused = self._refused(places[0], candidates[0], window.length_m)
+        if not refused:
+            candidates[0] = self._refined(candidates[0], window, asked.T_odom_base)
+        said = said._replace(candidates=tuple(candidates), refused=refused)
+        return said if asked.claimed is None else self._judged(said, costs, asked.claimed, asked, live)
 
-    def _refined(self, candidate: Candidate, sheet: Sheet, points: FloatArray, T_odom_base: FloatArray) -> Found | None:
-        """Match the walls of the last metres as one scan, from several starts around a candidate."""
-        local = se2.transform(se2.inverse(T_odom_base), points)
-        near = local[np.hypot(local[:, 0], local[:, 1]) < 40.0]
-        near = near[:: max(len(near) // _HITS, 1)]
-        few = near[:: max(len(near) // _FEW_HITS, 1)]
-        pose = se2.compose(candidate.T_map_drive, T_odom_base)
-        walls, origin = self._walls.around(np.array([pose[0], pose[1], sheet.height_m]))
-        local_pose = pose - np.array([origin[0], origin[1], 0.0])
-        coarse = _matched(walls, few, local_pose, _ALONG)
-        best = _matched(walls, near, coarse.pose, _AROUND)
-        if best.support <= 0.0:
-            return None
-        return Found(best.pose + np.array([origin[0], origin[1], 0.0]), float(best.support), sheet.height_m, 0.0)
+    def _judged(self, said: Search, costs: Costs, claimed: FloatArray, asked: Question, live: LiveProfile) -> Search:
+        """Add what is said of a place (4,) that is claimed."""
+        best, own = said.candidates[0], None
+        T_map_odom = se2.compose(claimed[:3], se2.inverse(asked.T_odom_base))
+        ahead = live.line[-1] - live.line[-2]
+        line = np.array([*live.line[-1], math.atan2(ahead[1], ahead[0])])
+        place = costs.at(se2.compose(T_map_odom, line), claimed[3])
+        denied = ""
+        if place is not None:
+            own = self._candidate(place, min(-best.evidence, 0.0) - place.cost, claimed[:3])
+            if own.evidence < -self._settings.gap:
+                denied = f"other walls than there, {-own.evidence:.0f} nats"
+        off = se2.between(claimed[:3], best.pose)
+        if not said.refused and (math.hypot(off[0], off[1]) > _SAME_M or abs(off[2]) > _SAME_RAD):
+            denied = f"it is at {best.pose[0]:.1f}, {best.pose[1]:.1f}"
+        return said._replace(claimed=own, denied=denied)
+
+    def _machine(self, path: npt.NDArray[np.int64], live: LiveProfile, T_odom_base: FloatArray) -> FloatArray:
+        """Return the machine's pose (3,) in `map`: the mid line about it is laid onto that of the path (J,), rigidly."""
+        apart = np.hypot(*(live.line - T_odom_base[:2]).T)
+        near = (path >= 0) & (apart <= max(_LAID_M, float(apart[path >= 0].min()) + _LAID_M))
+        T_map_odom = _laid(live.line[near], self._strips.poses[path[near], :2])
+        pose: FloatArray = se2.compose(T_map_odom, T_odom_base)
+        return pose
+
+    def _candidate(self, place: PlaceOnStrips, gap: float, pose: FloatArray) -> Candidate:
+        height, node = float(self._strips.heights_m[place.place]), self._strips.node_at(place.place)
+        return Candidate(pose, height, node, place.probability, place.chi2, -place.cost, gap, math.nan)
+
+    def _refused(self, place: PlaceOnStrips, best: Candidate, window_m: float) -> str:
+        """Return why the best place is not believed."""
+        if window_m < self._settings.search_m:
+            return f"{window_m:.1f} m of way are too few"
+        if place.compared < _LEAST_COMPARED:
+            return f"{place.compared:.0%} of the walls are in the map"
+        told = best.gap / max(best.chi2, 1.0)
+        if told <= self._settings.gap:
+            return f"the next place is less likely by {told:.0f} of {self._settings.gap:.0f} nats"
+        return ""
+
+    def _refined(self, found: Candidate, window: Window, T_odom_base: FloatArray) -> Candidate:
+        """Match the walls about the machine as one scan, from several starts around a place."""
+        local = se2.transform(se2.inverse(T_odom_base), window.points)
+        near = local[np.hypot(local[:, 0], local[:, 1]) < self._settings.range_m]
+        walls, origin = self._walls.around(np.array([*found.pose[:2], found.height_m]))
+        shift = np.array([origin[0], origin[1], 0.0])
+        prior = _prior(found.pose - shift)
+        coarse = _matched(walls, near[:: max(len(near) // _FEW_HITS, 1)], prior, found.pose - shift, _AROUND)
+        best = _matched(walls, near[:: max(len(near) // _HITS, 1)], prior, coarse.pose, [(0.0, 0.0, 0.0)])
+        return found._replace(pose=best.pose + shift, support=float(best.support))
+
+
+def _laid(points: FloatArray, onto: FloatArray) -> FloatArray:
+    """Return the rigid motion (3,) that lays points (N, 2) onto others, least squares."""
+    middle, target = points.mean(axis=0), onto.mean(axis=0)
+    (x, y), (u, v) = (points - middle).T, (onto - target).T
+    turn = math.atan2(float((x * v - y * u).sum()), float((x * u + y * v).sum()))
+    c, s = math.cos(turn), math.sin(turn)
+    return np.array([target[0] - c * middle[0] + s * middle[1], target[1] - s * middle[0] - c * middle[1], turn])
+
+
+def _prior(pose: FloatArray) -> Prior:
+    """Return how well the profile knows a pose (3,), against hits that are taken for independent."""
+    c, s = math.cos(pose[2]), math.sin(pose[2])
+    R = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+    return Prior(pose, R @ np.diag(_KAPPA / _PROFILE_STD**2) @ R.T)
 
 
 def _matched(
-    walls: SurfaceMap, points: FloatArray, pose: FloatArray, starts: list[tuple[float, float, float]]
+    walls: SurfaceMap, points: FloatArray, prior: Prior, pose: FloatArray, starts: list[tuple[float, float, float]]
 ) -> Match:
     """Return the best of the matches of points (N, 2) from starts (x, y, turn in the machine's axes) about a pose (3,)."""
     hits = Hits(np.column_stack([points, np.zeros(len(points))]), len(points), layered=False)
     found = []
     for offset in starts:
         start = se2.compose(pose, np.array(offset))
-        found.append(match(walls, hits, Prior(start, _LOOSE), start, OTHER_VISIT))
+        found.append(match(walls, hits, prior, start, OTHER_VISIT))
     best: Match = max(found, key=lambda one: one.support)
     return best
-
-
-def _same(a: FloatArray, b: FloatArray) -> bool:
-    return math.hypot(a[0] - b[0], a[1] - b[1]) < 3.0 and abs(math.remainder(a[2] - b[2], 2.0 * math.pi)) < 0.35

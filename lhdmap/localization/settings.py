@@ -31,19 +31,27 @@ class LocalizationSettings:
     )
     support_scans: int = setting(5, minimum=1, maximum=50, doc="... over so many scans.")
     search_m: float = setting(
-        8.0,
+        5.0,
         unit="m",
         minimum=2.0,
         maximum=60.0,
-        doc="Travel that a search over the whole map begins with, and between two.",
+        source="measured: with less, places are taken for others",
+        doc="Way that a search over the whole map needs at least.",
     )
-    window_m: float = setting(30.0, unit="m", minimum=5.0, maximum=100.0, doc="Way whose hits a search uses at most.")
-    margin: float = setting(
-        0.12,
-        minimum=0.01,
-        maximum=1.0,
+    search_every_m: float = setting(
+        1.0, unit="m", minimum=0.2, maximum=20.0, doc="Travel between two searches, where the place is not known."
+    )
+    check_every_m: float = setting(
+        5.0, unit="m", minimum=1.0, maximum=100.0, doc="Travel between two searches, where it is tracked."
+    )
+    window_m: float = setting(40.0, unit="m", minimum=5.0, maximum=100.0, doc="Way whose walls a search uses at most.")
+    gap: float = setting(
+        30.0,
+        unit="nats",
+        minimum=5.0,
+        maximum=1000.0,
         source="measured",
-        doc="By what share the second best place must be worse than the best one, for a search to be believed.",
+        doc="How much less likely the next best place must be, over the reduced chi-square, for a search to be believed.",
     )
     confirm_m: float = setting(
         3.0,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import heapq
+import math
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import ExitStack
 from operator import itemgetter
@@ -34,8 +35,8 @@ class LogSource:
     After entering, `roles` says which topic plays which role (of all files together), `start_ns` and `end_ns` which log
     times are covered, `survey` what was found in a quick look: sensors that say nothing have lost their roles.
     `warnings` and `damage` fill while reading. `force`: a log that the survey calls unusable is used nevertheless. `survey`: of
-    the same log, where it was opened before: it is not looked through again. `needs_scanner`: a log without
-    one is refused.
+    the same log, where it was opened before: it is not looked through again. `needs_scanner`: a log without one is refused.
+    `window_ns`: only what was logged from the first to before the second time.
     """
 
     def __init__(
@@ -46,6 +47,7 @@ class LogSource:
         force: bool = False,
         survey: Survey | None = None,
         needs_scanner: bool = True,
+        window_ns: tuple[int, int] | None = None,
     ) -> None:
         listed = [paths] if isinstance(paths, (str, Path)) else list(paths)
         if not listed:
@@ -56,6 +58,7 @@ class LogSource:
         self._force = force
         self._needs_scanner = needs_scanner
         self._known = survey
+        self._window_ns = window_ns
         self.survey = Survey()
         self._readers: list[LogReader] = []
         self._stack = ExitStack()
@@ -116,12 +119,14 @@ class LogSource:
     @property
     def start_ns(self) -> int | None:
         """Log time of the first message."""
-        return min((reader.start_ns for reader in self._readers if reader.start_ns is not None), default=None)
+        start = min((reader.start_ns for reader in self._readers if reader.start_ns is not None), default=None)
+        return start if start is None or self._window_ns is None else max(start, self._window_ns[0])
 
     @property
     def end_ns(self) -> int | None:
         """Log time of the last message."""
-        return max((reader.end_ns for reader in self._readers if reader.end_ns is not None), default=None)
+        end = max((reader.end_ns for reader in self._readers if reader.end_ns is not None), default=None)
+        return end if end is None or self._window_ns is None else min(end, self._window_ns[1])
 
     @property
     def duration_s(self) -> float:
@@ -168,7 +173,10 @@ class LogSource:
             for reader in self._readers
         ]
         merged = streams[0] if len(streams) == 1 else heapq.merge(*streams, key=itemgetter(1))
-        for topic, _, raw in merged:
+        first_ns, until_ns = self._window_ns or (-math.inf, math.inf)
+        for topic, logged_ns, raw in merged:
+            if not first_ns <= logged_ns < until_ns:
+                continue
             message = self.survey.repaired(topic, raw)
             if message is not None:
                 yield wanted[topic], message

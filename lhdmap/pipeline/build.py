@@ -22,6 +22,7 @@ from lhdmap.mapfolder import Diagnostics, MapFolderWriter
 from lhdmap.messages import Message
 from lhdmap.movement.costs import connection_times
 from lhdmap.outputs import free_folder
+from lhdmap.pile.result import PileReport
 from lhdmap.pipeline.beside import Beside, HelperDied, Here
 from lhdmap.pipeline.cost import CompileClock, Spent, cost, peak_memory_mib
 from lhdmap.pipeline.given import GROUND_TRUTH, given_rows
@@ -55,7 +56,7 @@ class BuildRequest:
     `helper`: whether a second process may look for the pile, record and report; what comes out is the same.
     `edits`: TOML file with a user's changes of the topology.
     `force`: replace a map folder that is there, and try a log that the survey calls unusable. `recorded_as`: names of logs in
-    `map.json`, where they are moved later.
+    `map.json`, where they are moved later. `window_ns`: only what was logged between these times.
     """
 
     logs: Sequence[Path]
@@ -69,22 +70,29 @@ class BuildRequest:
     force: bool = False
     edits: Path | None = None
     recorded_as: Mapping[Path, Path] = field(default_factory=dict)
+    window_ns: tuple[int, int] | None = None
 
     @property
     def inputs(self) -> Inputs:
         """What the map is made of."""
         name = self.target.name
-        return Inputs(self.logs, self.settings, self.topics, name, self.poses, self.force, load_edits(self.edits))
+        edits = load_edits(self.edits)
+        return Inputs(self.logs, self.settings, self.topics, name, self.poses, self.force, edits, self.window_ns)
 
 
 @dataclass(frozen=True, slots=True)
 class BuildResult:
-    """What came of it: the folder, the figures of `build-map --json`, the final trajectory."""
+    """What came of it: the folder, the figures of `build-map --json`, the final trajectory.
+
+    `said`: when the operator began to name a node, and the name; `pile`: what was looked for and found.
+    """
 
     folder: Path
     summary: dict[str, Any]
     warnings: list[str]
     trajectory: Trajectory
+    said: Sequence[tuple[int, str]] = ()
+    pile: PileReport | None = None
 
 
 def build_map(request: BuildRequest) -> BuildResult:
@@ -101,7 +109,7 @@ def build_map(request: BuildRequest) -> BuildResult:
     given = given_rows(request.poses, request.logs, request.topics) if request.poses else None
     with (
         compiling,
-        LogSource(list(request.logs), request.topics, force=request.force) as source,
+        LogSource(list(request.logs), request.topics, force=request.force, window_ns=request.window_ns) as source,
         MapFolderWriter(request.target, force=request.force, inputs=request.logs) as folder,
     ):
         hashes, pool = _hash_in_background(request.logs)
@@ -132,9 +140,10 @@ def build_map(request: BuildRequest) -> BuildResult:
         own = Spent(peak_memory_mib(), compiling.seconds)
         figures = outcome.summary | cost(started, outcome.duration_s, own, beside)  # one for page, map.json and screen
         fill_in_cost(folder.path / "report.html", figures)
-        info = RunInfo(request.logs, _options(request), figures, outcome.warnings, _frames(request))
+        info = RunInfo(request.logs, options_of(request), figures, outcome.warnings, frames_of(request))
         path = folder.complete(info, known)
-    return BuildResult(path, figures | {"map": str(path)}, outcome.warnings, final)
+    said, pile = pipeline.said, outcome.pile
+    return BuildResult(path, figures | {"map": str(path)}, outcome.warnings, final, said, pile)
 
 
 def _stamped(rows: _Stamped, stamps_of: Callable[[Any], Any]) -> _Stamped:
@@ -226,7 +235,7 @@ def _entry(request: BuildRequest, path: Path, entry: Future[dict[str, Any]]) -> 
     return entry.result() | {"path": str(request.recorded_as.get(path, path))}
 
 
-def _options(request: BuildRequest) -> dict[str, Any]:
+def options_of(request: BuildRequest) -> dict[str, Any]:
     """Return the settings, and what else the request says of how the map was made."""
     poses = Path(request.poses) if request.poses and request.poses != GROUND_TRUTH else None
     return {
@@ -241,5 +250,6 @@ def _options(request: BuildRequest) -> dict[str, Any]:
     }
 
 
-def _frames(request: BuildRequest) -> dict[str, str]:
+def frames_of(request: BuildRequest) -> dict[str, str]:
+    """Return what is to be said of the frames beside what holds for each map."""
     return {"map": "that of the given poses"} if request.poses else {}

@@ -102,10 +102,11 @@ def identify_along(
     settings: Settings,
     machine: Machine | None,
     topics: Mapping[str, str] | None = None,
+    window_ns: tuple[int, int] | None = None,
 ) -> PileReport:
     """Run the pile stage alone, on poses that are known: given ones, or those of a map whose loops were closed."""
     watch = PileWatch(settings, _GIVEN_POSES)
-    for scan in placed_along(rows, logs, settings, machine, topics):
+    for scan in placed_along(rows, logs, settings, machine, topics, window_ns):
         watch.update(scan)
     return watch.report()
 
@@ -116,11 +117,12 @@ def placed_along(
     settings: Settings,
     machine: Machine | None,
     topics: Mapping[str, str] | None = None,
+    window_ns: tuple[int, int] | None = None,
 ) -> Iterator[PlacedScan]:
     """Yield the front scans with where they were taken, on poses that are known; scans without a pose are left out."""
     track, mounts, sweep_times = FinalTrack(rows), Mounts(machine), SweepTimes()
     boxes = own_boxes(machine, settings.integration.body_margin_m)
-    with LogSource(list(logs), topics) as source:
+    with LogSource(list(logs), topics, window_ns=window_ns) as source:
         for _, message in source.messages([role for role in ("tf_static", "front") if role in source.roles]):
             if isinstance(message, Mount):
                 mounts.update(message)

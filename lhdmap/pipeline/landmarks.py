@@ -17,6 +17,7 @@ from lhdmap.topology.model import TopologicalMap
 
 _WITHIN_M = 8.0  # a view farther from all nodes is of a room that has none
 _EVERY_M = 1.0
+_HEIGHT = 2.0  # a metre of height is as far as so many in plan: a tunnel may wind above itself
 _LEVEL_M = 2.5  # of height over the floor up to which hits are walls and not the roof
 
 
@@ -49,9 +50,9 @@ def node_scans(topology: TopologicalMap, seen: Seen) -> list[NodeScan]:
         before, last = node, view.travelled_m
         if node in lines:
             line, along = lines[node]
-            at_m = float(along[np.linalg.norm(line[:, :2] - pose[:2], axis=1).argmin()])
+            at_m = float(along[np.linalg.norm((line - pose[:3]) * [1.0, 1.0, _HEIGHT], axis=1).argmin()])
         else:
             at_m = travelled[node]
         hits = view.hits_m
-        scans.append(NodeScan(node, at_m, pose[[0, 1, 3]], hits[hits[:, 2] < _LEVEL_M, :2]))
+        scans.append(NodeScan(node, at_m, pose[[0, 1, 3]], hits[hits[:, 2] < _LEVEL_M, :2], float(pose[2])))
     return scans

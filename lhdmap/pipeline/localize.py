@@ -1,16 +1,18 @@
 """`Localizer`: messages in, where the machine is on a map out; the same object for a log and for a running machine.
 
 messages -> MappingPipeline (odometry alone) -> steps -> Tracker against the map's walls
--> GlobalSearch where the place is not known, or lost
+-> Finder: searches in a thread of their own where the place is not known, or lost, and checks of the one that is tracked
 """
 
 from __future__ import annotations
 
+import copy
 import math
 import time
 from collections import deque
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from types import TracebackType
 from typing import NamedTuple, Self
@@ -21,9 +23,12 @@ from lhdmap.config import Settings
 from lhdmap.geometry import se2
 from lhdmap.landmarks.model import Landmarks
 from lhdmap.landmarks.store import read_landmarks
+from lhdmap.localization.changes import WorldChanges
+from lhdmap.localization.finder import Finder
 from lhdmap.localization.place_on_map import Placer
 from lhdmap.localization.rows import CANDIDATE, LOST, NOWHERE, TRACKING, UNKNOWN, Row
-from lhdmap.localization.search import Found, GlobalSearch, RecentWay
+from lhdmap.localization.search import CHECK, CONFIRM, FIND, Candidate, GlobalSearch, Search
+from lhdmap.localization.strips import strips_of
 from lhdmap.localization.tracker import Tracker
 from lhdmap.localization.walls import MapWalls
 from lhdmap.machine import Machine
@@ -36,6 +41,8 @@ from lhdmap.topology.files import read_topology
 from lhdmap.topology.model import TopologicalMap
 from lhdmap.topology.sheet import Sheet, read_sheets
 
+_HITS_ABOVE_M = 1.0  # hits are flat: where they are shown over the floor
+_LEAST_LEFT = 0.25  # of the hits must be of walls that the map has, or nothing corrects the place
 _LEAST_SUPPORT = 0.35  # where a node's own scans tell of none
 
 
@@ -52,6 +59,11 @@ class KnownMap(NamedTuple):
         folder = MapFolder.open(path)
         sheets = read_sheets(folder.file("free_space.npz"))
         return cls(read_topology(path), read_landmarks(folder.file("landmarks.npz")), sheets)
+
+    def search(self, walls: MapWalls, settings: Settings) -> GlobalSearch:
+        """Return what searches it, with walls of its own: it works in a thread of its own."""
+        strips = strips_of(self.topology, self.landmarks, settings.landmarks)
+        return GlobalSearch(strips, copy.copy(walls), settings.localization, settings.landmarks)
 
 
 class Where(NamedTuple):
@@ -79,17 +91,16 @@ Listener = Callable[[int, OdometryStep, PlanarOdometry], None]
 
 @dataclass(slots=True)
 class _Trial:
-    """A place under trial: since where on the way, and the support since."""
+    """A place under trial: since where on the way."""
 
     since_m: float
-    margin: float
-    supports: list[float] = field(default_factory=list)
 
 
 class Localizer:
     """Takes messages by role in time order; `rows` is what it said of each front scan, `where` the newest.
 
-    `start` (4,): x, y, yaw (rad) and height about where the machine begins; None: it is searched for. A context manager.
+    `start` (4,): x, y, yaw (rad) and height about where the machine begins; None: it is searched for. `live`: a running machine,
+    where nothing waits for a search; of a log each is waited for, so that the rows are the same each time. A context manager.
     """
 
     def __init__(
@@ -99,14 +110,17 @@ class Localizer:
         machine: Machine | None = None,
         start: FloatArray | None = None,
         listener: Listener | None = None,
+        *,
+        live: bool = False,
     ) -> None:
         # What lies beyond the map does not count: no loop is closed, no pile looked for.
         settings = replace(settings, pile=replace(settings.pile, method="off"))
         self._settings = settings.localization
-        self.pipeline = MappingPipeline(settings, machine, cloud=False, on_step=self._take)
+        self.pipeline = MappingPipeline(settings, machine, cloud=False, on_step=self.take)
         self._walls, self._placer = MapWalls(known.topology, known.landmarks), Placer(known.topology)
-        self._search = GlobalSearch(known.sheets, self._walls, self._settings)
-        self._way = RecentWay(self._settings.window_m)
+        search = known.search(self._walls, settings)
+        self.world = WorldChanges(known.topology, known.sheets, self._walls)
+        self._finder = Finder(search, self._settings, settings.landmarks, waits=not live)
         self._tracker = None if start is None else self._started(start)
         self._turnable = start is not None  # a waypoint's heading is its node's: the machine may face the other way
         self._status = UNKNOWN if start is None else TRACKING
@@ -114,13 +128,23 @@ class Localizer:
         self._supports: deque[float] = deque(maxlen=self._settings.support_scans)
         self._before: FloatArray | None = None
         self._listener = listener
-        self._travelled_m = self._searched_m = 0.0
+        self._travelled_m = 0.0
         self._probability = 0.0 if start is None else 1.0
         self._information = 0.0
         self.withheld, self.lost_stretches = 0, 0
         self.first_fix: tuple[float, float] | None = None  # seconds, metres
         self._began_ns: int | None = None
+        self._stamp_ns = 0
         self.rows: list[Row] = []
+        self.reasons: list[tuple[int, str]] = []  # when a place was given up, and why
+        self.newest: tuple[int, FloatArray] | None = (
+            None  # stamp and hits (N, 3) in `map` of the newest scan with a place
+        )
+
+    @property
+    def searches(self) -> list[Search]:
+        """What each search over the map said: places, their probabilities, and why none was believed."""
+        return list(self._finder.searches)
 
     def __enter__(self) -> Self:
         return self
@@ -129,6 +153,7 @@ class Localizer:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         """Let go of what is held."""
+        self._finder.close()
         self.pipeline.__exit__(kind, error, trace)
 
     def update(self, role: str, message: Message) -> None:
@@ -162,9 +187,10 @@ class Localizer:
         height = float(start[3]) if len(start) > 3 else 0.0
         return Tracker(self._walls, self._settings, start[:3], np.diag(std**2), height)
 
-    def _take(self, stamp_ns: int, step: OdometryStep, odometry: PlanarOdometry) -> None:
+    def take(self, stamp_ns: int, step: OdometryStep, odometry: PlanarOdometry) -> None:
         """Take what the odometry says of a front scan."""
-        began = time.perf_counter()
+        began, waited_s = time.perf_counter(), self._finder.waited_s
+        self._stamp_ns = stamp_ns
         self._began_ns = stamp_ns if self._began_ns is None else self._began_ns
         if self._before is not None:
             moved = se2.between(self._before, step.T_odom_base)
@@ -172,16 +198,40 @@ class Localizer:
             if self._tracker is not None:
                 self._tracker.predict(moved, step.error.covariance if step.processed else np.zeros((3, 3)))
         self._before = step.T_odom_base.copy()
-        source = ""
+        source, points = "", np.zeros((0, 2))
         if step.processed:
             points, front = self._hits(odometry)
-            self._way.add(self._travelled_m, step.T_odom_base, points)
-            source = self._correct(points, front)
-            self._judge(stamp_ns)
-            self._look_around(step)
-        self.rows.append(self._row(stamp_ns, step, source, 1e3 * (time.perf_counter() - began)))
+            told, told_front = self._of_the_map(points, front)
+            self._finder.add(step.T_odom_base, told)
+            source = self._correct(told, told_front) if len(told) > _LEAST_LEFT * len(points) else "odometry"
+            self._judge()
+            self._look_around(stamp_ns, step)
+            if self._status == TRACKING and self.first_fix is None:
+                self.first_fix = ((stamp_ns - self._began_ns) * 1e-9, self._travelled_m)
+        self.rows.append(
+            self._row(stamp_ns, step, source, 1e3 * (time.perf_counter() - began - self._finder.waited_s + waited_s))
+        )
+        self._set_against_the_map(stamp_ns, points)  # the place has not waited for it
         if self._listener is not None:
             self._listener(stamp_ns, step, odometry)
+
+    def _set_against_the_map(self, stamp_ns: int, points: FloatArray) -> None:
+        """Note what is not as in the map, where the place is known, or was until a moment ago."""
+        tracker, known = self._tracker, self._status == TRACKING
+        if tracker is not None and len(points):
+            in_map = se2.transform(tracker.pose, points)
+            self.newest = stamp_ns, np.column_stack([in_map, np.full(len(in_map), tracker.height_m + _HITS_ABOVE_M)])
+        if tracker is not None and (known or self._status == LOST):
+            holds = bool(self._supports) and self._supports[-1] >= self._wanted_support()
+            place = tracker.pose, tracker.height_m
+            self.world.update(stamp_ns, self._travelled_m, place, points, known=known, holds=holds)
+
+    def _of_the_map(self, points: FloatArray, front: int) -> tuple[FloatArray, int]:
+        """Return the hits without those of what surely came since the map was made: they say nothing of the place."""
+        if self._tracker is None or self._status != TRACKING:
+            return points, front
+        kept = ~self.world.stands_in(self._tracker.pose, self._tracker.height_m, points)
+        return points[kept], int(kept[:front].sum())
 
     def _hits(self, odometry: PlanarOdometry) -> tuple[FloatArray, int]:
         """Return hits (N, 2) of both scanners near the machine, thinned, and how many are the front one's."""
@@ -205,27 +255,28 @@ class Localizer:
         self._information = said.information_along
         return "walls" if said.support > 0.0 else "odometry"
 
-    def _judge(self, stamp_ns: int) -> None:
-        """Decide by the support whether the place still holds, or holds at last."""
+    def _judge(self) -> None:
+        """Decide by the support whether the place still holds."""
         if self._tracker is None or self._status == LOST or not self._supports:
             return
+        holds = float(np.mean(self._supports)) >= self._wanted_support()
+        if not holds and len(self._supports) == self._supports.maxlen:
+            mean, wanted = float(np.mean(self._supports)), self._wanted_support()
+            self._drop(f"the map's walls agree with {mean:.0%} of the hits, {wanted:.0%} were wanted")
+
+    def _wanted_support(self) -> float:
+        """Return the share of hits that must agree with the walls where the machine is."""
+        assert self._tracker is not None  # noqa: S101  # asked where there is one
         place = self._placer.at(self._tracker.pose, self._tracker.height_m, 1.0)
         least = self._walls.quality(place.node).support_least
-        wanted = (least if math.isfinite(least) else _LEAST_SUPPORT) - self._settings.support_drop
-        holds = float(np.mean(self._supports)) >= max(wanted, 0.15)
-        if not holds and len(self._supports) == self._supports.maxlen:
-            self._drop()
-        elif self._trial is not None and self._travelled_m - self._trial.since_m >= self._settings.confirm_m:
-            self._status, self._trial = TRACKING, None
-            self._probability = 1.0
-        if self._status == TRACKING and self.first_fix is None and self._began_ns is not None:
-            self.first_fix = ((stamp_ns - self._began_ns) * 1e-9, self._travelled_m)
+        return max((least if math.isfinite(least) else _LEAST_SUPPORT) - self._settings.support_drop, 0.15)
 
-    def _drop(self) -> None:
+    def _drop(self, why: str) -> None:
         """Give a place up: a trial that failed, or one that was lost."""
+        self.reasons.append((self._stamp_ns, why))
         self._supports.clear()
         self._probability = 0.0
-        self._searched_m = self._travelled_m - self._settings.search_m + 1.0  # search again soon
+        self._finder.again()
         if self._trial is not None:
             self.withheld += 1
             self._trial, self._tracker = None, None
@@ -233,28 +284,48 @@ class Localizer:
             return
         self.lost_stretches += 1
         self._status = LOST
-        self._way = RecentWay(self._settings.window_m)  # what was seen before may be of another place
+        self._finder.forget()
 
-    def _look_around(self, step: OdometryStep) -> None:
-        """Search the whole map, where the place is not known and the machine has moved on since the last search."""
-        wanted_m = min(self._settings.search_m, self._settings.window_m - 1.0)
-        if self._status not in (UNKNOWN, LOST) or self._way.length_m < wanted_m:
+    def _look_around(self, stamp_ns: int, step: OdometryStep) -> None:
+        """Take over what a search has said, and begin the next one that is due."""
+        said = self._finder.answer(stamp_ns, step.T_odom_base)
+        if said is not None and said.purpose == self._purpose:
+            self._take_over(said)
+        if self._trial is not None and self._travelled_m - self._trial.since_m < self._settings.confirm_m:
             return
-        if self._travelled_m - self._searched_m < self._settings.search_m:
-            return
-        self._searched_m = self._travelled_m
-        found = self._search.places(self._way, step.T_odom_base)
-        if not found or found[0].margin < self._settings.margin:
-            self.withheld += bool(found)
-            return
-        self._try(found[0])
+        tracker = None if self._purpose == FIND else self._tracker
+        claimed = None if tracker is None else np.append(tracker.pose, tracker.height_m)
+        came = None
+        if self._status == TRACKING and tracker is not None:
+            T_map_odom = se2.compose(tracker.pose, se2.inverse(step.T_odom_base))
+            came = partial(self.world.stands_in, T_map_odom, tracker.height_m)
+        self._finder.ask(self._purpose, stamp_ns, self._travelled_m, step.T_odom_base, claimed, came)
 
-    def _try(self, found: Found) -> None:
+    @property
+    def _purpose(self) -> str:
+        return {TRACKING: CHECK, CANDIDATE: CONFIRM}.get(self._status, FIND)
+
+    def _take_over(self, said: Search) -> None:
+        """Try the place that was found, keep or drop the one on trial, drop the tracked one that is contradicted."""
+        if said.claimed is not None:
+            self._probability = said.claimed.probability
+        if said.purpose == FIND and not said.refused:
+            self._try(said.candidates[0])
+        elif said.purpose == FIND:
+            self.withheld += bool(said.candidates)
+        elif said.purpose == CONFIRM and said.confirms:
+            self._status, self._trial = TRACKING, None
+        elif said.purpose == CONFIRM or said.denied:
+            self._drop(said.denied or said.refused or "a search finds another place")
+
+    def _try(self, found: Candidate) -> None:
         std = np.array([0.1, 0.1, math.radians(1.0)])
         height = self._placer.height_m(found.pose[0], found.pose[1], found.height_m)
+        if self._tracker is not None:
+            self.world.found(self._travelled_m, self._tracker.pose, found.pose)
         self._tracker = Tracker(self._walls, self._settings, found.pose, np.diag(std**2), height)
-        self._trial = _Trial(self._travelled_m, found.margin)
-        self._status, self._probability = CANDIDATE, min(max(found.margin, 0.0), 1.0)
+        self._trial = _Trial(self._travelled_m)
+        self._status, self._probability = CANDIDATE, found.probability
         self._supports.clear()
 
     def _row(self, stamp_ns: int, step: OdometryStep, source: str, latency_ms: float) -> Row:

@@ -13,6 +13,8 @@ import numpy as np
 from lhdmap.config import Settings, settings_table
 from lhdmap.errors import InputError
 from lhdmap.geometry import se3
+from lhdmap.localization.changes import Change
+from lhdmap.localization.episodes import episodes
 from lhdmap.localization.rows import TRACKING, Row, columns
 from lhdmap.logs.source import LogSource
 from lhdmap.machine import Machine
@@ -22,8 +24,12 @@ from lhdmap.pipeline.build import Progress
 from lhdmap.pipeline.localize import KnownMap, Localizer
 from lhdmap.pipeline.mounts import machine_of
 from lhdmap.pipeline.outcome import ROLES_READ
+from lhdmap.report.localization_data import LocalizationData
 from lhdmap.report.localization_page import write_localization_report
+from lhdmap.report.localization_recording import record_localization
+from lhdmap.report.recording import RecordingWriter
 from lhdmap.runfolder import RunFolderWriter, RunInfo
+from lhdmap.topology.model import TopologicalMap
 from lhdmap.trajectory import Trajectory, write_tum
 
 KIND = "localization"
@@ -63,26 +69,59 @@ def localize(request: LocalizeRequest) -> LocalizeResult:
     inputs = [request.map, *request.logs]
     free_folder(request.target, force=request.force, inputs=inputs)
     known = KnownMap.read(request.map)
-    with LogSource(list(request.logs), request.topics, force=request.force) as source:
-        with Localizer(known, request.settings, machine_of(source, request.machine), request.start) as localizer:
-            messages = source.messages([role for role in ROLES_READ if role in source.roles])
-            for role, message in request.progress(messages, source.duration_s) if request.progress else messages:
-                localizer.update(role, message)
-            localizer.finish()
-        told = [*source.warnings, *source.damage, *localizer.pipeline.warnings]
-    if not localizer.rows:
-        raise InputError(f"{request.logs[0]}: no usable scan in it; lhdmap doctor tells what is wrong")
-    summary = summary_of(localizer)
-    with RunFolderWriter(KIND, request.target, force=request.force, inputs=inputs) as folder:
+    with (
+        RunFolderWriter(KIND, request.target, force=request.force, inputs=inputs) as folder,
+        LogSource(list(request.logs), request.topics, force=request.force) as source,
+    ):
+        machine = machine_of(source, request.machine)
+        drawn = folder.path / "recording.rrd"
+        with RecordingWriter(drawn, request.target.name, source.start_ns or 0, request.settings.recording) as recording:
+            localizer = _localized(request, known, source, machine, recording)
+            told = [*source.warnings, *source.damage, *localizer.pipeline.warnings]
+            if not localizer.rows:
+                raise InputError(f"{request.logs[0]}: no usable scan in it; lhdmap doctor tells what is wrong")
+            summary = summary_of(localizer)
+            changes = localizer.world.changes()
+            table = changes_table(changes, known.topology, request)
+            data = LocalizationData(
+                request.target.name,
+                known.topology,
+                known.sheets,
+                localizer.world.walls(),
+                localizer.rows,
+                localizer.searches,
+                changes,
+                episodes(localizer.rows, localizer.reasons),
+                summary,
+                told,
+                localizer.pipeline.records.articulation(),
+                table["update"] or "",
+            )
+            record_localization(recording, data, machine or Machine())
+        folder.finished(drawn)
         folder.write_table("localization.parquet", columns(localizer.rows))
         write_tum(folder.path / "localization.tum", trajectory_of(localizer.rows))
         folder.finished(folder.path / "localization.tum")
-        drawn = request.target.name, known.topology, known.sheets
-        write_localization_report(folder.path / "report.html", drawn, localizer.rows, summary, told)
+        folder.write_json("changes.json", table)
+        write_localization_report(folder.path / "report.html", data)
         folder.finished(folder.path / "report.html")
         options = {**settings_table(request.settings), "request": {"map": str(request.map.resolve())}}
         path = folder.complete(RunInfo(request.logs, options, summary, told))
     return LocalizeResult(path, summary | {"warnings": told}, localizer.rows)
+
+
+def _localized(
+    request: LocalizeRequest, known: KnownMap, source: LogSource, machine: Machine | None, recording: RecordingWriter
+) -> Localizer:
+    """Send the log through a localizer; scans that have a place are recorded."""
+    with Localizer(known, request.settings, machine, request.start) as localizer:
+        messages = source.messages([role for role in ROLES_READ if role in source.roles])
+        for role, message in request.progress(messages, source.duration_s) if request.progress else messages:
+            localizer.update(role, message)
+            if localizer.newest is not None:
+                recording.add_scan(*localizer.newest)
+        localizer.finish()
+    return localizer
 
 
 def summary_of(localizer: Localizer) -> dict[str, Any]:
@@ -96,6 +135,7 @@ def summary_of(localizer: Localizer) -> dict[str, Any]:
         "first_fix_m": None if first is None else first[1],
         "lost_stretches": localizer.lost_stretches,
         "false_fix_guard": localizer.withheld,
+        "changes": len(localizer.world.changes()),
         "latency_ms": {"median": float(np.median(latencies)), "p99": float(np.quantile(latencies, 0.99))},
     }
 
@@ -107,3 +147,24 @@ def trajectory_of(rows: Sequence[Row]) -> Trajectory:
     positions = np.array([[row.x_m, row.y_m, row.z_m] for row in kept]).reshape(-1, 3)
     yaw = np.array([row.yaw_rad for row in kept])
     return Trajectory(stamps, positions, se3.quaternions_from_rpy(np.zeros(len(kept)), np.zeros(len(kept)), yaw))
+
+
+def changes_table(changes: Sequence[Change], topology: TopologicalMap, request: LocalizeRequest) -> dict[str, Any]:
+    """Return what is not as in the map as JSON values, and the command that takes it over."""
+    names = {node.id: node.name for node in topology.nodes.values()}
+    listed = [{"name": names.get(one.node, ""), **_rounded(one._asdict())} for one in changes]
+    command = " ".join(["lhdmap update-map", str(request.map), *map(str, request.logs)]) if changes else None
+    return {"changes": listed, "update": command}
+
+
+def _rounded(values: Mapping[str, Any]) -> dict[str, Any]:
+    """Return values with millimetres, NaN as null."""
+
+    def told(value: Any) -> Any:
+        if isinstance(value, tuple):
+            return [told(one) for one in value]
+        if isinstance(value, float):
+            return round(value, 3) if math.isfinite(value) else None
+        return value
+
+    return {key: told(value) for key, value in values.items()}

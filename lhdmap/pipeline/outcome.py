@@ -57,7 +57,10 @@ _HOLE_S, _HOLE_M = 1.0, 2.0
 
 
 class Inputs(NamedTuple):
-    """What a map is made of: logs, settings, topics by role, title of the map, given poses; whether bad logs are tried."""
+    """What a map is made of: logs, settings, topics by role, title of the map, given poses; whether bad logs are tried.
+
+    `window_ns`: only what was logged between these times.
+    """
 
     logs: Sequence[Path]
     settings: Settings
@@ -66,6 +69,7 @@ class Inputs(NamedTuple):
     poses: str = ""
     force: bool = False
     edits: TopologyEdits = NO_EDITS
+    window_ns: tuple[int, int] | None = None
 
 
 class Ways(NamedTuple):
@@ -185,7 +189,9 @@ class Outcome:
         if stage is not None and not self.ways.moved:
             with contextlib.suppress(HelperDied):  # looked for anew below, and told of when the report is written
                 return self.pipeline.path.moved(stage.report())
-        return identify_along(self.ways.rows, inputs.logs, inputs.settings, self.pipeline.machine, inputs.topics)
+        return identify_along(
+            self.ways.rows, inputs.logs, inputs.settings, self.pipeline.machine, inputs.topics, inputs.window_ns
+        )
 
     def _topology(self, beside: Executor) -> tuple[Topology | None, Future[Landmarks] | None]:
         """Return the topological map, None where it is not wanted or no planar scanner saw the drift, and landmarks to come."""
@@ -252,7 +258,9 @@ def integrate_again(
     sweeps = SweepIntegration(inputs.settings, pipeline.machine, pipeline.mounts, None)
     wheels = WheelOdometry(inputs.settings.wheels, pipeline.machine or Machine())
     track, times, sweep_times = FinalTrack(rows), map(int, pipeline.records.times_ns), SweepTimes()
-    with LogSource(list(inputs.logs), inputs.topics, force=inputs.force, survey=survey) as source:
+    with LogSource(
+        list(inputs.logs), inputs.topics, force=inputs.force, survey=survey, window_ns=inputs.window_ns
+    ) as source:
         for role, message in source.messages(
             [role for role in ("front", "rear", "points", "joints") if role in source.roles]
         ):

@@ -50,7 +50,7 @@ class FinalPath:
     def moved(self, report: PileReport) -> PileReport:
         """Return a pile that was measured on the odometry's path as it lies on the final one."""
         correction = self.correction()
-        return report if correction is None else moved_report(report, partial(_motion_at, correction))
+        return report if correction is None else moved_report(report, partial(motion_at, correction))
 
     def _advance(self, moves: Moves, until_ns: int) -> None:
         """Take over the odometry's poses up to a time, moved as the final nodes around them are."""
@@ -61,7 +61,8 @@ class FinalPath:
         self._used, self._moves = self._used + len(rows.times_ns), len(moves)
 
 
-def _motion_at(correction: Correction, time_ns: int) -> FloatArray:
+def motion_at(correction: Correction, time_ns: int) -> FloatArray:
+    """Return the planar motion (3,) of what was measured at a time."""
     at = int(np.searchsorted(correction.times_ns, time_ns))
     motion: FloatArray = correction.T_map_odom[min(at, len(correction.T_map_odom) - 1)]
     return motion

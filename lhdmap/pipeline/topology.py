@@ -27,7 +27,7 @@ def seen_of(pipeline: MappingPipeline, rows: Rows) -> Seen:
         resample(rows, times).poses[:, _PLANAR_AND_HEIGHT],
         rows.poses[chosen][:, _PLANAR_AND_HEIGHT],
         path_ns,
-        _said_at(pipeline.said, path_ns),
+        said_at(pipeline.said, path_ns),
         pipeline.machine,
     )
 
@@ -53,8 +53,8 @@ def each_step(rows: Rows) -> npt.NDArray[np.int64]:
     return np.unique(np.append(first, len(rows.times_ns) - 1))
 
 
-def _said_at(said: Sequence[tuple[int, str]], times_ns: npt.NDArray[np.int64]) -> list[str]:
-    """Return what was said last at each of these times."""
+def said_at(said: Sequence[tuple[int, str]], times_ns: npt.NDArray[np.int64]) -> list[str]:
+    """Return what was said last (when, what) at each of these times, empty before the first."""
     if not said:
         return [""] * len(times_ns)
     began = np.array([time_ns for time_ns, _ in said], dtype=np.int64)

@@ -6,44 +6,33 @@ drive -> its own map -> placed in the map (all headings and shifts) -> fitted sc
 
 from __future__ import annotations
 
-import contextlib
-import shutil
-import tempfile
 import warnings
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from lhdmap.config import Settings, settings_table
-from lhdmap.errors import InputError, LhdmapWarning, UsageError, unmark_kept
-from lhdmap.integration.cloud import Cloud
-from lhdmap.integration.cloud_io import read_cloud
-from lhdmap.interrupts import before_interrupt
+from lhdmap.errors import InputError, LhdmapWarning, UsageError
 from lhdmap.machine import Machine
-from lhdmap.mapfolder import MapFolder, MapFolderWriter
+from lhdmap.mapfolder import MapFolderWriter
 from lhdmap.messages import FloatArray
 from lhdmap.names import name_of
 from lhdmap.outputs import free_folder
 from lhdmap.pipeline.build import BuildRequest, Progress, build_map
 from lhdmap.pipeline.landmarks import landmarks_for, with_stretches
-from lhdmap.pipeline.topology import each_step
-from lhdmap.pipeline.track import Rows
-from lhdmap.pipeline.update_files import Made, joined, later, write_version
+from lhdmap.pipeline.taught import TaughtMap, path_of, scratch
+from lhdmap.pipeline.update_files import Made, joined, write_version
 from lhdmap.provenance import file_entry
 from lhdmap.runfolder import RunInfo
 from lhdmap.smoothing.smoother import Correction
 from lhdmap.topology.build import Seen, topology_of
 from lhdmap.topology.edits import TopologyEdits, load_edits
-from lhdmap.topology.files import read_topology
 from lhdmap.topology.lookup import Lookup
 from lhdmap.topology.model import TopologicalMap
-from lhdmap.topology.sheet import Sheet, read_sheets
 from lhdmap.topology.views import View
-from lhdmap.topology.views_file import read_views
 from lhdmap.trajectory import Trajectory
 from lhdmap.update import fit, merge
 from lhdmap.update.difference import difference
@@ -52,7 +41,6 @@ from lhdmap.update.place import placings
 _NEWER_WEIGHT = 4  # of what was seen later
 _ALIKE = 0.7  # of the share of scans that fit where it is best
 _NAMED_WITHIN_M = 3.0
-_PAUSE_NS = 1_000_000_000
 _OVERLAP = "{}: its times are those of the map's drives, too; in the new version they are {:.0f} s later"
 
 
@@ -85,52 +73,6 @@ class UpdateResult:
     warnings: list[str]
 
 
-@dataclass(frozen=True, slots=True)
-class _Map:
-    """What is read of a map folder."""
-
-    folder: MapFolder
-    trajectory: Trajectory
-    views: list[View]
-    sheets: list[Sheet]
-    topology: TopologicalMap
-    cloud: Cloud
-    later_ns: int = 0
-
-    @classmethod
-    def read(cls, path: Path) -> _Map:
-        """Read a map folder; raises InputError where something is missing that `build-map` writes today."""
-        folder = MapFolder.open(path)
-        return cls(
-            folder,
-            folder.trajectory(),
-            read_views(folder.file("views.npz")),
-            read_sheets(folder.file("free_space.npz")),
-            read_topology(path),
-            read_cloud(folder.file("cloud.ply")),
-        )
-
-    def after(self, other: _Map) -> _Map:
-        """Return this map with its times moved behind those of another one, where both overlap: each time has one pose."""
-        first, last = (int(self.trajectory.stamps_ns[row]) for row in (0, -1))
-        if first > int(other.trajectory.stamps_ns[-1]) or last < int(other.trajectory.stamps_ns[0]):
-            return self
-        by_ns = int(other.trajectory.stamps_ns[-1]) + _PAUSE_NS - first
-        stamps = None if self.cloud.stamps_ns is None else self.cloud.stamps_ns + by_ns
-        return replace(
-            self,
-            trajectory=later(self.trajectory, by_ns),
-            views=[view._replace(time_ns=view.time_ns + by_ns) for view in self.views],
-            cloud=replace(self.cloud, stamps_ns=stamps),
-            later_ns=by_ns,
-        )
-
-    @property
-    def seen(self) -> fit.Seen:
-        """Views and their poses."""
-        return fit.Seen(self.views, merge.view_poses(self.trajectory, self.views))
-
-
 def update_map(request: UpdateRequest) -> UpdateResult:
     """Add a drive to a map and write the new version.
 
@@ -142,15 +84,15 @@ def update_map(request: UpdateRequest) -> UpdateResult:
     if request.target.resolve() == request.map.resolve():
         raise UsageError(f"{request.target}: a new version is a folder of its own; name another one with -o")
     free_folder(request.target, force=request.force, inputs=inputs)
-    edits, known = load_edits(request.edits), _Map.read(request.map)
-    with _scratch() as scratch:
-        drive_folder = scratch / "drive"
+    edits, known = load_edits(request.edits), TaughtMap.read(request.map)
+    with scratch() as alone:
+        drive_folder = alone / "drive"
         built = build_map(
             BuildRequest(
                 request.logs, drive_folder, request.settings, request.topics, request.machine, request.progress
             )
         )
-        drive = _Map.read(drive_folder).after(known)
+        drive = TaughtMap.read(drive_folder).after(known.trajectory)
         if drive.later_ns:
             built.warnings.append(_OVERLAP.format(name_of(request.logs[0]), drive.later_ns * 1e-9))
         correction = _in_the_map(known, drive, request)
@@ -158,20 +100,7 @@ def update_map(request: UpdateRequest) -> UpdateResult:
             return _written(folder, request, edits, known, drive, correction, built.warnings)
 
 
-@contextlib.contextmanager
-def _scratch() -> Iterator[Path]:
-    """Give a folder that is gone afterwards, whatever happens; nothing in it counts as kept."""
-    with tempfile.TemporaryDirectory(prefix="lhdmap_drive_") as name:
-        folder = Path(name)
-        try:
-            with before_interrupt(lambda: shutil.rmtree(folder, ignore_errors=True)):
-                yield folder
-        except BaseException as error:
-            unmark_kept(error, folder)
-            raise
-
-
-def _in_the_map(known: _Map, drive: _Map, request: UpdateRequest) -> Correction:
+def _in_the_map(known: TaughtMap, drive: TaughtMap, request: UpdateRequest) -> Correction:
     """Return how the drive is to be moved into the map's frame."""
     log, smoothing = request.logs[0], request.settings.smoothing
     places = placings(known.sheets, drive.sheets[0], request.start)
@@ -200,8 +129,8 @@ def _written(
     folder: MapFolderWriter,
     request: UpdateRequest,
     edits: TopologyEdits,
-    known: _Map,
-    drive: _Map,
+    known: TaughtMap,
+    drive: TaughtMap,
     correction: Correction,
     remarks: list[str],
 ) -> UpdateResult:
@@ -248,11 +177,11 @@ def _written(
     return UpdateResult(folder.complete(info), version, table, remarks)
 
 
-def _seen(known: _Map, drive: _Map, moved: Trajectory, request: UpdateRequest) -> tuple[list[View], Seen]:
+def _seen(known: TaughtMap, drive: TaughtMap, moved: Trajectory, request: UpdateRequest) -> tuple[list[View], Seen]:
     """Return the views of both, and what the topology is made of: names stay, the newer views tell more."""
     views = [*known.views, *drive.views]
     poses = np.vstack([known.seen.poses, merge.view_poses(moved, drive.views)])
-    paths = [_path(known.trajectory), _path(moved)]
+    paths = [path_of(known.trajectory), path_of(moved)]
     lookup = Lookup(known.topology)
     said = [*lookup.names_at(paths[0][0][:, :3]), *lookup.names_at(paths[1][0][:, :3], _NAMED_WITHIN_M)]
     weights = np.concatenate([np.ones(len(known.views)), np.full(len(drive.views), _NEWER_WEIGHT)]).astype(np.int64)
@@ -261,14 +190,7 @@ def _seen(known: _Map, drive: _Map, moved: Trajectory, request: UpdateRequest) -
     return views, Seen(views, poses, path, times, said, request.machine, weights)
 
 
-def _path(trajectory: Trajectory) -> tuple[FloatArray, npt.NDArray[np.int64]]:
-    """Return a trajectory each quarter metre: poses (M, 4) and times (M,)."""
-    rows = Rows(trajectory.stamps_ns, merge.poses_of(trajectory))
-    chosen = each_step(rows)
-    return rows.poses[chosen][:, merge.PLANAR_AND_HEIGHT], rows.times_ns[chosen]
-
-
-def _counts(known: _Map, drive: _Map, newer: TopologicalMap, correction: Correction) -> dict[str, Any]:
+def _counts(known: TaughtMap, drive: TaughtMap, newer: TopologicalMap, correction: Correction) -> dict[str, Any]:
     """Return the figures of both drives together; places where the map's walls hold the drive count as closed loops."""
     earlier, added = known.folder.info.get("counts", {}), drive.folder.info.get("counts", {})
     summed = ("scans_processed", "duration_s", "lost_stretches", "closures")
@@ -289,6 +211,6 @@ def _length_m(trajectory: Trajectory) -> float:
     return float(np.linalg.norm(np.diff(trajectory.positions_m, axis=0), axis=1).sum())
 
 
-def _entry(known: _Map) -> dict[str, Any]:
+def _entry(known: TaughtMap) -> dict[str, Any]:
     file = known.folder.file("topology.geojson")
     return {"map": str(known.folder.path.name), "version": known.topology.version, "topology": file_entry(file)}

@@ -68,7 +68,7 @@ def _write_files(folder: MapFolderWriter, made: Made) -> None:
     known, drive = made.drives
     folder.write_trajectory(made.trajectory)
     folder.write_odometry(joined(known.odometry(), later(drive.odometry(), made.later_ns)))
-    folder.write_diagnostics(_diagnostics(known.diagnostics(), drive.diagnostics(), made.later_ns))
+    folder.write_diagnostics(joined_diagnostics(known.diagnostics(), drive.diagnostics(), made.later_ns))
     write_cloud(folder.path / "cloud.ply", made.cloud)
     folder.finished(folder.path / "cloud.ply")
     folder.write_json(
@@ -140,7 +140,8 @@ def joined(first: Trajectory, second: Trajectory) -> Trajectory:
     )
 
 
-def _diagnostics(first: Diagnostics, second: Diagnostics, later_ns: int) -> Diagnostics:
+def joined_diagnostics(first: Diagnostics, second: Diagnostics, later_ns: int) -> Diagnostics:
+    """Return the diagnostics of two drives in the order of time, the second so much later."""
     columns: dict[str, Any] = {}
     second = second._replace(stamp_ns=np.asarray(second.stamp_ns) + later_ns)
     order = np.argsort(np.concatenate([np.asarray(first.stamp_ns), second.stamp_ns]), kind="stable")

@@ -108,7 +108,8 @@ class ReportData:
 
     `witness`: which sensors told of the motion beside the scans (empty: none); `poses`: where given poses came from (empty: the
     path is that of the odometry); `pile_reason`: why no pile was looked for. `sheets`: free space of the levels of `topology`;
-    `closures`: places recognised, also those refused; `landmarks` of its nodes; `difference`: from the map's version before.
+    `closures`: places recognised, also those refused; `landmarks` of its nodes; `difference`: from the map's version before;
+    `drives`: how many were joined to it.
     """
 
     title: str
@@ -136,6 +137,7 @@ class ReportData:
     warnings: Sequence[str] = ()
     settings_text: str = ""
     provenance: Mapping[str, str] = field(default_factory=dict)
+    drives: int = 1
 
     def slip(self) -> SlipSeries | None:
         """Return the slip where wheels or machine move: at a stand it is noise over nothing. None: it is not known at all."""

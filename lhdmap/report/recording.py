@@ -158,6 +158,11 @@ class RecordingWriter:
         """Record something that is there all the time."""
         self._stream.log(entity, shape, static=True)
 
+    def add_at(self, stamp_ns: int, entity: str, shape: Any) -> None:
+        """Record something that is there from a time on, until the next one."""
+        self._at(stamp_ns)
+        self._stream.log(entity, shape)
+
     def add_path(self, name: str, trajectory: Trajectory, drawn: PathStyle) -> None:
         """Record a whole trajectory as a line that carries its name."""
         positions = trajectory.positions_m

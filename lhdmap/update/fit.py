@@ -27,6 +27,7 @@ from lhdmap.topology.views import View
 _KEY_M = 2.0
 _MOST_TRIED = 24
 _AROUND_M, _FEWEST_VIEWS = 12.0, 6
+_WITHIN_M, _LEVEL_M = 2.5, 4.0
 _CELL_M, _WINDOW_CELLS = 0.04, 512
 _GRID = SearchGrid(0.15, math.radians(2.5), apart_m=math.inf)
 _FIRST_REACH, _REACH = np.array([2.5, math.radians(6.0)]), np.array([1.0, math.radians(4.0)])
@@ -42,11 +43,15 @@ class Seen(NamedTuple):
 
 
 class Fit(NamedTuple):
-    """How a drive is to be moved into the map; how many keys it has, and how many of them the map's walls hold."""
+    """How a drive is to be moved into the map; how many keys it has, and how many of them the map's walls hold.
+
+    `within`: how many lie where the map's own drive went.
+    """
 
     correction: Correction
     keys: int
     tied: int
+    within: int = 0
 
 
 def fitted(known: Seen, drive: Seen, T_map_drive: FloatArray, settings: SmoothingSettings) -> Fit | None:
@@ -57,11 +62,15 @@ def fitted(known: Seen, drive: Seen, T_map_drive: FloatArray, settings: Smoothin
     moved = T_map_drive
     ties: list[Tie] = []
     raised: list[tuple[int, float]] = []
+    within = 0
     for number, row in enumerate(keys, 1):
         predicted = se2.compose(moved, planar[row])
         near = np.array(tree.query_ball_point(predicted[:2], _AROUND_M), dtype=np.int64)
+        if raised:  # before the first tie the map's height over the drive's is not known
+            near = near[np.abs(known.poses[near, 2] - drive.poses[row, 2] - raised[-1][1]) < _LEVEL_M]
         if len(near) < _FEWEST_VIEWS:
             continue
+        within += bool(np.linalg.norm(known.poses[near, :2] - predicted[:2], axis=1).min() < _WITHIN_M)
         tie = _tie(known, near, drive.views[row], predicted, _REACH if ties else _FIRST_REACH, settings)
         if tie is None:
             continue
@@ -71,7 +80,8 @@ def fitted(known: Seen, drive: Seen, T_map_drive: FloatArray, settings: Smoothin
         raised.append((row, float(known.poses[nearest, 2] - drive.poses[row, 2])))
     if len(ties) < 2:
         return None
-    return _solved(drive, keys, planar, T_map_drive, ties, raised, settings)
+    solved = _solved(drive, keys, planar, T_map_drive, ties, raised, settings)
+    return None if solved is None else solved._replace(within=within)
 
 
 def share_that_fits(known: Seen, drive: Seen, T_map_drive: FloatArray, settings: SmoothingSettings) -> float:

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import functools
 import math
+from itertools import pairwise
 
 import numpy as np
+from lhdmap.geometry import se2
 from lhdmap.landmarks.build import landmarks_of
 from lhdmap.landmarks.scans import NodeScan
 from lhdmap.landmarks.settings import LandmarkSettings
@@ -18,6 +20,7 @@ from lhdmap.simulation.planar import (
     poses_along,
     simulate_scans,
     way_from_rest,
+    world_from_polylines,
 )
 from lhdmap.topology.model import DEAD_END, TopologicalMap, Tunnel, Waypoint
 from lhdmap.topology.sheet import FREE, OCCUPIED, Sheet
@@ -91,16 +94,50 @@ def _sheet() -> Sheet:
     return sheet
 
 
+def changed_world(nearer: tuple[float, float, float] | None, parked: tuple[float, float] | None) -> PlanarWorld:
+    """Return the drift with both walls nearer between two places by so much, and with a box parked on its left between two."""
+    built = world()
+    segments, line = built.segments_m.copy(), built.centre_line_m
+    if nearer is not None:
+        middles = 0.5 * (segments[:, :2] + segments[:, 2:])
+        rows = np.linalg.norm(middles[:, None] - line[None, ::10, :2], axis=2).argmin(axis=1) * 10
+        inside = (line_m()[rows] > nearer[0]) & (line_m()[rows] < nearer[1])
+        inward = line[rows, :2] - middles
+        inward *= nearer[2] / np.linalg.norm(inward, axis=1, keepdims=True)
+        segments[inside] += np.tile(inward[inside], 2)
+    if parked is not None:
+        corners = [poses_at(np.array([at]))[0] for at in parked]
+        near, far = [[se2.compose(pose, np.array([0.0, y, 0.0]))[:2] for pose in corners] for y in (0.9, 1.7)]
+        ring = [near[0], near[1], far[1], far[0], near[0]]
+        segments = np.vstack([segments, [[*a, *b] for a, b in pairwise(ring)]])
+    return world_from_polylines(list(segments.reshape(-1, 2, 2)), line)
+
+
 @functools.cache
-def drive(from_m: float, way_m: float, seed: int = 3, *, jump_m: float = 0.0) -> tuple[Stream, FloatArray]:
+def line_m() -> FloatArray:
+    """Return the way (N,) at each point of the centre line."""
+    steps = np.linalg.norm(np.diff(world().centre_line_m[:, :2], axis=0), axis=1)
+    return np.concatenate([[0.0], np.cumsum(steps)])
+
+
+@functools.cache
+def drive(
+    from_m: float,
+    way_m: float,
+    seed: int = 3,
+    *,
+    jump_m: float = 0.0,
+    nearer: tuple[float, float, float] | None = None,
+    parked: tuple[float, float] | None = None,
+) -> tuple[Stream, FloatArray]:
     """Return messages of a drive from rest, and the true poses (N, 3) of its scans; half-way it is put ahead by `jump_m`.
 
-    The wheels are 1 % too fast and do not know of the jump.
+    The wheels are 1 % too fast and do not know of the jump. `nearer`, `parked`: as for `changed_world`.
     """
     way = from_m + way_from_rest(SPEED_MPS, RATE_HZ, way_m, 1.5)
     told = poses_at(way)
     poses = poses_at(way + jump_m * (way > from_m + 0.5 * way_m))
-    scans = simulate_scans(world(), poses, _SCANNER, RATE_HZ, seed)
+    scans = simulate_scans(changed_world(nearer, parked), poses, _SCANNER, RATE_HZ, seed)
     messages: list[tuple[str, Message]] = [("front", scan) for scan in scans]
     messages += wheels_of("articulated", told, [scan.stamp_ns for scan in scans])
     messages.sort(key=lambda one: one[1].stamp_ns)

@@ -15,7 +15,7 @@ from lhdmap.scan_matching.matching import Hits, Prior, match
 from lhdmap.scan_matching.submap import OTHER_VISIT
 
 from tests.landmarks.worlds import ROUGH, TunnelWorld, seen, tunnel
-from tests.localization.tunnels import near, walls_of
+from tests.localization.tunnels import near, walls_of, winding_walls
 
 PRIOR = np.diag([1.0 / 0.1**2, 1.0 / 0.1**2, 1.0 / math.radians(1.0) ** 2])
 
@@ -70,3 +70,21 @@ def test_levels_are_apart() -> None:
 def test_a_node_without_walls_has_no_quality() -> None:
     quality = long_one()[1].quality("nowhere")
     assert quality == pytest.approx(UNMEASURED, nan_ok=True)
+
+
+def test_a_tunnel_that_winds_above_itself_has_walls_by_height() -> None:
+    low, high = tunnel(3, ROUGH, 30.0), tunnel(4, ROUGH, 30.0)
+    walls = winding_walls([(low, 0.0), (high, 9.0)])
+    assert support(walls, low, 15.0, 0.5) > 0.9
+    assert support(walls, high, 15.0, 8.5) > 0.9
+    assert support(walls, high, 15.0, 0.5) < 0.75
+    assert support(walls, low, 15.0, 8.5) < 0.75
+    heights = walls.cells()[:, 2]
+    assert set(np.round(heights, 3)) == {0.0, 9.0}
+
+
+def test_a_map_that_tells_no_heights_is_read_by_its_line() -> None:
+    world = tunnel(3, ROUGH, 30.0)
+    walls = winding_walls([(world, 2.0)], told=False)
+    assert set(walls.cells()[:, 2]) == {2.0}
+    assert support(walls, world, 15.0, 2.5) > 0.9

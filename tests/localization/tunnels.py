@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from lhdmap.geometry import se2
@@ -58,3 +58,20 @@ def _landmarks(surfaces: Mapping[str, NodeSurface]) -> Landmarks:
         np.zeros((0, 2), np.float32), np.zeros(1, np.int64), np.zeros((0, 3)), np.zeros(0, np.str_), none, none, none,
         np.zeros(0, np.int32), np.zeros(0, np.bool_), {}, surfaces,
     )  # fmt: skip
+
+
+def winding_walls(windings: Sequence[tuple[TunnelWorld, float]], *, told: bool = True) -> MapWalls:
+    """Return the walls of one tunnel that passes above itself: its windings, each at a height (m).
+
+    `told`: whether the map tells the heights of its walls, as older ones do not.
+    """
+    frame, placed, heights, line = windings[0][0].frame(), list[FloatArray](), list[float](), list[FloatArray]()
+    T_node_map = se2.inverse(frame[[0, 1, 3]])
+    for world, height_m in windings:
+        scans = drive(world, 1, every_m=0.5)
+        placed += [se2.transform(se2.compose(T_node_map, one.T_map_base), near(one.points_m)) for one in scans]
+        heights += [height_m] * len(scans)
+        line += [np.array([*world.pose(at)[:2], height_m]) for at in np.arange(0.0, world.length_m + 0.1)]
+    one = Tunnel("w", "W", (DEAD_END, DEAD_END), np.array(line), np.full((len(line), 2), 2.2), frame)
+    cells = fused(placed, CELL_M, heights if told else None)
+    return MapWalls(TopologicalMap(tunnels=(one,)), _landmarks({"w": NodeSurface(cells, UNMEASURED, None)}))

@@ -7,6 +7,7 @@ from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
+from lhdmap.geometry import se2
 from lhdmap.logs.writer import LogWriter
 from lhdmap.messages import FloatArray
 from lhdmap.simulation.planar import (
@@ -59,3 +60,20 @@ def write_drive(path: Path, world: PlanarWorld, way: FloatArray, seed: int = 1) 
         for scan in simulate_scans(world, way, _SCANNER, RATE_HZ, seed):
             writer.write("/lidar/front/scan", scan._replace(stamp_ns=scan.stamp_ns + seed * 10**13))
     return path
+
+
+def north_way() -> FloatArray:
+    """Out of the tunnel to the south, to the east, and north: it shares 40 m with the first way."""
+    r, up = 7.0, DEEP_M + HALF_M - 3.0
+    line = centre_line(
+        (
+            (up - r, 0.0),
+            (r * math.pi / 2, -math.pi / 2),
+            (LONG_M - BRANCH_M - 15.0, 0.0),
+            (_QUARTER, math.pi / 2),
+            (14.0, 0.0),
+        )
+    )
+    way = poses_along(line, np.arange(0.5, 0.02 * (len(line) - 1) - 0.5, SPEED_MPS / RATE_HZ))
+    start = np.array([BRANCH_M, -up, math.pi / 2])
+    return np.array([se2.compose(start, pose) for pose in way])
