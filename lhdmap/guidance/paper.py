@@ -1,4 +1,4 @@
-"""Guidance as printed: Eqs. (12) to (19) of the topological paper, literally, minimised by sampling (cross-entropy). For comparison.
+"""Guidance as printed: Eqs. (12) to (19) of the topological paper, minimised by sampling (cross-entropy). For comparison.
 
 What it does not do well is measured in docs/guidance.md: nothing in it rewards progress, so the speed comes from the profile of
 the default; |DL - DR| / (DL² DR²) is nothing where both sides are equally near; only six corners count. Eq. (18) is read as the

@@ -1,4 +1,4 @@
-"""A planar drive in closed loop: walls as points, a machine with lags and dead time, guidance each 50 ms. Known truth, no sensors."""
+"""A planar drive in closed loop: walls as points, a machine with lags and dead time, guidance each 50 ms. No sensors."""
 
 from __future__ import annotations
 
@@ -89,7 +89,7 @@ def narrow(
     fields = [
         noise_field(np.random.default_rng([seed, k]), Scales(4, 8.0, 0.6), (0.0, 200.0), (0.0, 1.0)) for k in range(2)
     ]
-    at = 0.1 * np.arange(len(line))
+    at = np.arange(len(line), dtype=np.float64) * 0.1
     rough = []
     for one in fields:
         one.normalise(at, np.zeros(1), rms_m)
@@ -133,7 +133,7 @@ def drive(
     sent: list[Setpoint] = [Setpoint(-1_000_000_000, 0.0, 0.0)]
     while now < seconds * 1e9 and not out.arrived:
         if now % PERIOD_NS == 0:
-            motion = Motion(now, *state.tolist(), speed)
+            motion = _motion(now, state, speed)
             near = walls[np.hypot(*(walls - state[:2]).T) < 25.0]
             plan = guidance.plan(now, motion, sent[-60:], near, directive)
             queue = plan.setpoints
@@ -156,11 +156,16 @@ def drive(
             out.clearances_m.append(float(np.linalg.norm(outline[:, None] - near[None], axis=2).min()))
             out.speeds_mps.append(speed)
             out.states.append(state.copy())
-            at = guidance._leads[gear].state(Motion(now, *state.tolist(), speed))  # noqa: SLF001
+            at = guidance._leads[gear].state(_motion(now, state, speed))
             left = directive.stop_m - path[np.hypot(path[:, 0] - at[0], path[:, 1] - at[1]).argmin(), 5]
             out.arrived = left < 0.3 and abs(speed) < 0.05
     out.commands = sent
     return out
+
+
+def _motion(now: int, state: FloatArray, speed: float) -> Motion:
+    x, y, heading, bend, rate = state.tolist()
+    return Motion(now, x, y, heading, bend, rate, speed)
 
 
 def _at(queue: Setpoints, now: int, settings: GuidanceSettings) -> Setpoint:
