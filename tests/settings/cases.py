@@ -156,7 +156,7 @@ _SETTINGS = {
     "localization.support_scans": Case("carried_off"),
     "localization.window_m": Case("put_down", 5.0),
     "localization.gap": Case("put_down", 900.0),
-    "localization.search_every_m": Case("put_down", 4.0),
+    "localization.search_every_m": Case("put_down", 4.0, {"localization.gap": 900.0}),
     "localization.check_every_m": Case("carried_off", 1.0),
     "localization.start_std_m": Case("carried_off"),
     "localization.start_std_deg": Case("carried_off"),

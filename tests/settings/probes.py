@@ -236,7 +236,8 @@ def localized(settings: Settings, *, way_m: float, jump_m: float = 0.0, known_st
         localizer.update(role, message)
     localizer.finish()
     rows = [row._replace(latency_ms=0.0) for row in localizer.rows]
-    return digest(rows, localizer.withheld, localizer.lost_stretches, localizer.first_fix)
+    searches = [(one.stamp_ns, one.purpose) for one in localizer.searches]
+    return digest(rows, localizer.withheld, localizer.lost_stretches, localizer.first_fix, searches)
 
 
 def driven(settings: Settings) -> str:
