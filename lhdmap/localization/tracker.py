@@ -8,12 +8,12 @@ say little of one direction the prediction holds there, by the information alone
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
 
 import numpy as np
 
 from lhdmap.geometry import se2
 from lhdmap.landmarks.quality import Quality
+from lhdmap.localization.method import Corrected, Wheels
 from lhdmap.localization.settings import LocalizationSettings
 from lhdmap.localization.walls import MapWalls
 from lhdmap.messages import FloatArray
@@ -30,13 +30,6 @@ _LEAST_STD = np.array([1e-3, 1e-3, 1e-5])
 _PER_METRE = np.array([0.004, 0.003, math.radians(0.03)])  # of the odometry's step at least, per square root of a metre
 
 
-class Corrected(NamedTuple):
-    """What a scan says: share of hits that agree, information along the machine (1/m²)."""
-
-    support: float
-    information_along: float
-
-
 class Tracker:
     """`pose` (3,) in `map`, `P` (3, 3) its covariance in the map's axes, `height_m` of the floor there."""
 
@@ -47,7 +40,7 @@ class Tracker:
         self.pose, self.P, self.height_m = pose.copy(), P.copy(), height_m
         self._moved_m = _SHARED_M  # since the last correction; the first scan counts in full
 
-    def predict(self, step: FloatArray, covariance: FloatArray) -> None:
+    def predict(self, step: FloatArray, covariance: FloatArray, _wheels: Wheels | None = None, /) -> None:
         """Carry the pose on by a step (3,) of the odometry with its covariance (3, 3), in the axes of its end."""
         way = math.hypot(step[0], step[1])
         self._moved_m += way
@@ -56,10 +49,10 @@ class Tracker:
         self.pose = se2.compose(before, step)
         dx, dy = self.pose[0] - before[0], self.pose[1] - before[1]
         F = np.array([[1.0, 0.0, -dy], [0.0, 1.0, dx], [0.0, 0.0, 1.0]])
-        R = _turned(self.pose[2])
+        R = turned(self.pose[2])
         self.P = F @ self.P @ F.T + R @ noise @ R.T
 
-    def correct(self, points: FloatArray, front: int, quality: Quality) -> Corrected:
+    def correct(self, points: FloatArray, front: int, quality: Quality, /) -> Corrected:
         """Match hits (N, 2) in the machine's frame, the first `front` of the front scanner, and take over what they say."""
         walls, origin = self._walls.around(np.array([self.pose[0], self.pose[1], self.height_m]))
         hits = Hits(np.column_stack([points, np.zeros(len(points))]), front, layered=False)
@@ -75,7 +68,7 @@ class Tracker:
         self.pose = found.pose + np.array([origin[0], origin[1], 0.0])
         posterior = np.linalg.inv(information + found.information / kappa)
         scale = abs(quality.scale) if math.isfinite(quality.scale) else 0.003
-        R = _turned(self.pose[2])
+        R = turned(self.pose[2])
         map_error = R @ np.diag([(scale * _AHEAD_M) ** 2, _MAP_ACROSS_M**2, _MAP_HEADING_RAD**2]) @ R.T
         self.P = np.asarray(posterior + 0.5 * (map_error + map_error.T), dtype=float)
         return Corrected(float(found.support), along)
@@ -98,11 +91,12 @@ class Tracker:
     @property
     def deviations(self) -> FloatArray:
         """Standard deviations (3,) along, across and of the heading, in the machine's axes."""
-        R = _turned(self.pose[2])
+        R = turned(self.pose[2])
         deviations: FloatArray = np.sqrt(np.maximum(np.diag(R.T @ self.P @ R), 0.0))
         return deviations
 
 
-def _turned(heading_rad: float) -> FloatArray:
+def turned(heading_rad: float) -> FloatArray:
+    """Return the matrix (3, 3) that turns covariances of (along, across, heading) into the map's axes."""
     c, s = math.cos(heading_rad), math.sin(heading_rad)
     return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])

@@ -20,6 +20,9 @@ from lhdmap.config import Settings
 from lhdmap.geometry import se2
 from lhdmap.landmarks.model import Landmarks
 from lhdmap.landmarks.store import read_landmarks
+from lhdmap.localization.method import Tracks, Wheels
+from lhdmap.localization.paper import PaperTracker
+from lhdmap.localization.paper_nodes import PaperNodes
 from lhdmap.localization.place_on_map import Placer
 from lhdmap.localization.rows import CANDIDATE, LOST, NOWHERE, TRACKING, UNKNOWN, Row
 from lhdmap.localization.search import Found, GlobalSearch, RecentWay
@@ -29,6 +32,7 @@ from lhdmap.machine import Machine
 from lhdmap.mapfolder import MapFolder
 from lhdmap.messages import FloatArray, Message
 from lhdmap.odometry.planar import PlanarOdometry
+from lhdmap.odometry.rear_view import behind
 from lhdmap.odometry.steps import OdometryStep
 from lhdmap.pipeline.mapping import MappingPipeline
 from lhdmap.topology.files import read_topology
@@ -81,17 +85,20 @@ class Localizer:
     ) -> None:
         # What lies beyond the map does not count: no loop is closed, no pile looked for.
         settings = replace(settings, pile=replace(settings.pile, method="off"))
-        self._settings = settings.localization
+        self._settings, self._floor_m = settings.localization, settings.odometry.min_height_m
         self.pipeline = MappingPipeline(settings, machine, cloud=False, on_step=self._take)
         self._walls, self._placer = MapWalls(known.topology, known.landmarks), Placer(known.topology)
         self._search = GlobalSearch(known.sheets, self._walls, self._settings)
         self._way = RecentWay(self._settings.window_m)
-        self._tracker = None if start is None else self._started(start)
+        paper = self._settings.method == "paper"
+        self._paper = PaperNodes(known.topology, known.landmarks, settings.landmarks) if paper else None
+        self._tracker: Tracks | None = None if start is None else self._started(start)
         self._turnable = start is not None  # a waypoint's heading is its node's: the machine may face the other way
         self._status = UNKNOWN if start is None else TRACKING
         self._trial: _Trial | None = None
         self._supports: deque[float] = deque(maxlen=self._settings.support_scans)
         self._before: FloatArray | None = None
+        self._time_ns = 0
         self._travelled_m = self._searched_m = 0.0
         self._probability = 0.0 if start is None else 1.0
         self._information = 0.0
@@ -126,10 +133,15 @@ class Localizer:
         pose = se2.compose(tracker.pose, se2.between(self._before, planar))
         return Where(self._status, np.array([pose[0], pose[1], tracker.height_m, pose[2]]), tracker.P)
 
-    def _started(self, start: FloatArray) -> Tracker:
+    def _started(self, start: FloatArray) -> Tracks:
         std = np.array([self._settings.start_std_m] * 2 + [math.radians(self._settings.start_std_deg)])
         height = float(start[3]) if len(start) > 3 else 0.0
-        return Tracker(self._walls, self._settings, start[:3], np.diag(std**2), height)
+        return self._tracks(start[:3], std, height)
+
+    def _tracks(self, pose: FloatArray, std: FloatArray, height_m: float) -> Tracks:
+        """Return what tracks by the method of the settings from a pose (3,) with these deviations (3,)."""
+        tracker = Tracker(self._walls, self._settings, pose, np.diag(std**2), height_m)
+        return tracker if self._paper is None else PaperTracker(self._paper, self._placer, tracker)
 
     def _take(self, stamp_ns: int, step: OdometryStep, odometry: PlanarOdometry) -> None:
         """Take what the odometry says of a front scan."""
@@ -139,21 +151,34 @@ class Localizer:
             moved = se2.between(self._before, step.T_odom_base)
             self._travelled_m += math.hypot(moved[0], moved[1])
             if self._tracker is not None:
-                self._tracker.predict(moved, step.error.covariance if step.processed else np.zeros((3, 3)))
+                covariance = step.error.covariance if step.processed else np.zeros((3, 3))
+                self._tracker.predict(moved, covariance, self._wheels(step.time_ns))
+        self._time_ns = step.time_ns
         self._before = step.T_odom_base.copy()
         source = ""
         if step.processed:
-            points, front = self._hits(odometry)
+            points, front = self._hits(step, odometry)
             self._way.add(self._travelled_m, step.T_odom_base, points)
             source = self._correct(points, front)
             self._judge(stamp_ns)
             self._look_around(step)
         self.rows.append(self._row(stamp_ns, step, source, 1e3 * (time.perf_counter() - began)))
 
-    def _hits(self, odometry: PlanarOdometry) -> tuple[FloatArray, int]:
+    def _wheels(self, time_ns: int) -> Wheels:
+        """Return the wheels' motion from the scan before to a time."""
+        motion, dt_s = self.pipeline.wheels.motion_between(self._time_ns, time_ns), (time_ns - self._time_ns) * 1e-9
+        if motion is None:
+            return Wheels(dt_s, math.nan, math.nan)
+        forward_m = math.copysign(math.hypot(motion.delta[0], motion.delta[1]), motion.delta[0])
+        return Wheels(dt_s, forward_m, math.nan if motion.source == "tachometer" else float(motion.delta[2]))
+
+    def _hits(self, step: OdometryStep, odometry: PlanarOdometry) -> tuple[FloatArray, int]:
         """Return hits (N, 2) of both scanners near the machine, thinned, and how many are the front one's."""
-        parts = []
-        for points in (odometry.points, odometry.points_behind):
+        parts, rear = [], odometry.points_behind
+        if not len(rear):  # the odometry has no use for it where nothing tilts; the map has its walls
+            view = self.pipeline.front_end.behind_at(step.time_ns)
+            rear = rear if view is None else behind(view, step.velocity, 0.0, self._floor_m, self._settings.hits).points
+        for points in (odometry.points, rear):
             near = points[np.hypot(points[:, 0], points[:, 1]) < self._settings.range_m, :2]
             parts.append(near[:: max(-(-2 * len(near) // self._settings.hits), 1)])
         return np.concatenate(parts), len(parts[0])
@@ -170,7 +195,7 @@ class Localizer:
         tracker.height_m = self._placer.height_m(tracker.pose[0], tracker.pose[1], tracker.height_m)
         self._supports.append(said.support)
         self._information = said.information_along
-        return "walls" if said.support > 0.0 else "odometry"
+        return said.source if said.support > 0.0 else "odometry"
 
     def _judge(self, stamp_ns: int) -> None:
         """Decide by the support whether the place still holds, or holds at last."""
@@ -219,7 +244,7 @@ class Localizer:
     def _try(self, found: Found) -> None:
         std = np.array([0.1, 0.1, math.radians(1.0)])
         height = self._placer.height_m(found.pose[0], found.pose[1], found.height_m)
-        self._tracker = Tracker(self._walls, self._settings, found.pose, np.diag(std**2), height)
+        self._tracker = self._tracks(found.pose, std, height)
         self._trial = _Trial(self._travelled_m, found.margin)
         self._status, self._probability = CANDIDATE, min(max(found.margin, 0.0), 1.0)
         self._supports.clear()
