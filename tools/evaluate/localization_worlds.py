@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from lhdmap.config import settings_from
@@ -35,7 +35,7 @@ CLASSES = {
 }
 """Roughness, and whether it has bends and niches; None: every second world."""
 WAYS = ("same", "opposite", "reverse")
-LENGTH_M = 150.0
+LENGTH_M = 100.0
 MACHINE = Machine()
 FRONT_M, REAR_M = 0.8, -3.0
 _ANGLES = np.radians(np.arange(-95.0, 95.01, 0.5))
@@ -44,6 +44,7 @@ _FIRST_NS, _SECOND = 1_700_000_000_000_000_000, 1e9
 _FINE_M = 0.05
 _SMOOTH_M = 0.8
 _LATERAL_M = 0.15
+_SETTLES_M = 5.0
 SETTINGS = {"pile.method": "off", "recording.scan_interval_s": 10.0}
 
 
@@ -192,23 +193,26 @@ class Taught(NamedTuple):
 
 
 def taught(name: str, seed: int, folder: Path) -> Taught:
-    """Drive through a tunnel at 2 m/s and build its map from the log."""
+    """Drive through a tunnel at 2 m/s, without slip, and build its map from the log; maps that are there are read."""
     world = world_of(name, seed)
     planar, rng = planar_world(world), np.random.default_rng([seed, 1])
     path = path_of(world, rng, "same", offset_m=0.0, weave_m=0.05)
-    first = drive(planar, path, 1000 + seed, speed_mps=2.0)
-    log = folder / f"teach_{seed}.mcap"
-    with LogWriter(log) as writer:
-        for role, message in first.messages:
-            writer.write(ROLES[role].topic, [message] if isinstance(message, Mount) else message)
-    made = build_map(BuildRequest([log], folder / f"map_{seed}", settings_from(dict(SETTINGS)))).folder
+    first = drive(planar, path, 1000 + seed, speed_mps=2.0, slip=False)
+    made = folder / f"map_{list(CLASSES).index(name)}_{seed}"
+    if not made.exists():
+        log = made.with_suffix(".mcap")
+        with LogWriter(log) as writer:
+            for role, message in first.messages:
+                writer.write(ROLES[role].topic, [message] if isinstance(message, Mount) else message)
+        build_map(BuildRequest([log], made, settings_from(dict(SETTINGS))))
+        log.unlink()
     return Taught(world, planar, KnownMap.read(made), MapTruth(first.truth, MapFolder.open(made).trajectory()))
 
 
 class Run(NamedTuple):
     """Figures of `eval localization`, the table they are of, and the truth on the map (N, 4)."""
 
-    figures: dict[str, object]
+    figures: dict[str, Any]
     table: LocalizationTable
 
 
@@ -220,7 +224,7 @@ def second(place: Taught, seed: int, way: str) -> Drive:
     return drive(place.planar, path, 10 * seed + WAYS.index(way), speed_mps=3.6, reverse=way == "reverse")
 
 
-def localized(place: Taught, done: Drive, method: str, changes: dict[str, object] | None = None) -> Run:
+def localized(place: Taught, done: Drive, method: str, changes: dict[str, Any] | None = None) -> Run:
     """Localize a drive of which the start is about known."""
     first = done.truth
     yaw = 2.0 * math.atan2(first.quaternions_xyzw[0, 2], first.quaternions_xyzw[0, 3])
@@ -232,5 +236,8 @@ def localized(place: Taught, done: Drive, method: str, changes: dict[str, object
         for role, message in done.messages:
             localizer.update(role, message)
         localizer.finish()
-    table = LocalizationTable.of({k: np.asarray(v) for k, v in columns(localizer.rows).items()})
+    way = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(first.positions_m, axis=0), axis=1))])
+    settled = set(first.stamps_ns[way > _SETTLES_M].tolist())
+    kept = [row for row in localizer.rows if row.stamp_ns in settled]
+    table = LocalizationTable.of({name: np.asarray(values) for name, values in columns(kept).items()})
     return Run(evaluated(table, first, place.truth), table)
