@@ -39,6 +39,7 @@ from lhdmap.topology.files import read_topology
 from lhdmap.topology.model import TopologicalMap
 from lhdmap.topology.sheet import Sheet, read_sheets
 
+_GUESSED = np.array([0.5, 0.1, 0.1])  # m/s, m/s, rad/s: a step that neither walls nor wheels told
 _LEAST_SUPPORT = 0.35  # where a node's own scans tell of none
 
 
@@ -151,8 +152,7 @@ class Localizer:
             moved = se2.between(self._before, step.T_odom_base)
             self._travelled_m += math.hypot(moved[0], moved[1])
             if self._tracker is not None:
-                covariance = step.error.covariance if step.processed else np.zeros((3, 3))
-                self._tracker.predict(moved, covariance, self._wheels(step.time_ns))
+                self._tracker.predict(moved, *self._carried(step))
         self._time_ns = step.time_ns
         self._before = step.T_odom_base.copy()
         source = ""
@@ -164,18 +164,28 @@ class Localizer:
             self._look_around(step)
         self.rows.append(self._row(stamp_ns, step, source, 1e3 * (time.perf_counter() - began)))
 
-    def _wheels(self, time_ns: int) -> Wheels:
-        """Return the wheels' motion from the scan before to a time."""
-        motion, dt_s = self.pipeline.wheels.motion_between(self._time_ns, time_ns), (time_ns - self._time_ns) * 1e-9
+    def _carried(self, step: OdometryStep) -> tuple[FloatArray, Wheels]:
+        """Return the covariance (3, 3) of the odometry's step, and the wheels' motion over it.
+
+        Where a scan could not be placed the step is the wheels' own, or a guess, and as sure as these are.
+        """
+        covariance = step.error.covariance if step.processed else np.zeros((3, 3))
+        dt_s = (step.time_ns - self._time_ns) * 1e-9
+        motion = self.pipeline.wheels.motion_between(self._time_ns, step.time_ns)
+        if step.lost:
+            covariance = covariance + (np.diag((_GUESSED * dt_s) ** 2) if motion is None else motion.covariance)
         if motion is None:
-            return Wheels(dt_s, math.nan, math.nan)
+            return covariance, Wheels(dt_s, math.nan, math.nan)
         forward_m = math.copysign(math.hypot(motion.delta[0], motion.delta[1]), motion.delta[0])
-        return Wheels(dt_s, forward_m, math.nan if motion.source == "tachometer" else float(motion.delta[2]))
+        turn_rad = math.nan if motion.source == "tachometer" else float(motion.delta[2])
+        return covariance, Wheels(dt_s, forward_m, turn_rad)
 
     def _hits(self, step: OdometryStep, odometry: PlanarOdometry) -> tuple[FloatArray, int]:
         """Return hits (N, 2) of both scanners near the machine, thinned, and how many are the front one's."""
         parts, rear = [], odometry.points_behind
-        if not len(rear):  # the odometry has no use for it where nothing tilts; the map has its walls
+        if not len(rear) or not len(
+            odometry.points
+        ):  # where nothing tilts, or the front one is blind, it has no use for it
             view = self.pipeline.front_end.behind_at(step.time_ns)
             rear = rear if view is None else behind(view, step.velocity, 0.0, self._floor_m, self._settings.hits).points
         for points in (odometry.points, rear):

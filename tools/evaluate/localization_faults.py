@@ -161,7 +161,7 @@ def _later(step_s: float) -> Change:
 
 def _bent(_t: float, _role: str, message: Message, _rng: np.random.Generator) -> Message | None:
     if isinstance(message, Joints):
-        return message._replace(positions_rad={name: 0.1 for name in message.positions_rad})
+        return message._replace(positions_rad=dict.fromkeys(message.positions_rad, 0.1))
     return message
 
 
@@ -265,7 +265,7 @@ def row(fault: Fault, known: KnownMap, messages: Messages, drive: Any, truth: Ma
             localizer.update(role, message)
         localizer.finish()
     table = LocalizationTable.of({name: np.asarray(values) for name, values in columns(localizer.rows).items()})
-    stamps = table.stamp_ns - _shift_ns(fault, table.stamp_ns, int(drive.stamps_ns[0]))
+    stamps = table.stamp_ns - _shift_ns(fault, messages, len(table.stamp_ns))
     true = truth.placed(_at(drive, stamps))
     error = _error(table.poses, true)
     tracks = table.status == "tracking"
@@ -293,14 +293,14 @@ def row(fault: Fault, known: KnownMap, messages: Messages, drive: Any, truth: Ma
     return f"| {' | '.join(cells)} |"
 
 
-def _shift_ns(fault: Fault, stamps: Any, begins_ns: int) -> Any:
-    """Return by how much stamps are ahead of the truth's clock."""
+def _shift_ns(fault: Fault, messages: Messages, rows: int) -> Any:
+    """Return by how much the stamps of rows are ahead of the truth's clock: from the message on at which the clock was set."""
     probe = fault.change(fault.from_s, "tachometer", Tachometer(0, 0.0), np.random.default_rng(0))
     if probe is None or probe.stamp_ns == 0:
         return 0
-    return np.where(
-        stamps >= begins_ns + (fault.from_s + min(probe.stamp_ns / _SECOND, 0.0)) * _SECOND, probe.stamp_ns, 0
-    )
+    stamps = [one.stamp_ns for role, one in messages if role == "front"]
+    before = int(np.argmax(np.abs(np.diff(stamps)))) + 1
+    return np.where(np.arange(rows) >= before - len(stamps) + rows, probe.stamp_ns, 0)
 
 
 def _error(poses: FloatArray, true: FloatArray) -> FloatArray:
