@@ -134,6 +134,11 @@ class Localizer:
         pose = se2.compose(tracker.pose, se2.between(self._before, planar))
         return Where(self._status, np.array([pose[0], pose[1], tracker.height_m, pose[2]]), tracker.P)
 
+    @property
+    def support(self) -> float | None:
+        """Share of the newest scan's hits that agreed with the walls; None before the first that was matched."""
+        return self._supports[-1] if self._supports else None
+
     def _started(self, start: FloatArray) -> Tracks:
         std = np.array([self._settings.start_std_m] * 2 + [math.radians(self._settings.start_std_deg)])
         height = float(start[3]) if len(start) > 3 else 0.0
