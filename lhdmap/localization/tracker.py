@@ -24,7 +24,8 @@ from lhdmap.scan_matching.submap import OTHER_VISIT
 _MAP_ALONG_M, _MAP_ACROSS_M, _MAP_HEADING_RAD = 0.002, 0.003, math.radians(0.03)
 _SHARED_M = 1.0  # travel over which scans share the map's errors
 _LEAST_SHARE = 0.02
-_LOOSE = 0.01  # of the filter's information holds a match: smooth walls pull only one that is free to follow
+_LOOSE = 0.01  # of the filter's information holds a match: smooth walls pull only one that is free to follow ...
+_NEAR = np.diag([1.0 / 0.5**2, 1.0 / 0.5**2, 1.0 / math.radians(3.0) ** 2])  # ... within what a match can find
 _STRETCH_STD, _STRETCH_WALK = 0.01, 0.001  # of the odometry where walls tell it little of the way; growth each √m
 _CLEARLY = 0.15
 _MODEL = OTHER_VISIT._replace(rounds=4)
@@ -74,7 +75,7 @@ class Tracker:
         self._moved_m = 0.0
         local = self.pose - np.array([origin[0], origin[1], 0.0])
         information: FloatArray = np.asarray(np.linalg.inv(self._own[:3, :3] + np.diag(_LEAST_STD**2)), dtype=float)
-        found = match(walls, hits, Prior(local, _LOOSE * information), local, _MODEL)
+        found = match(walls, hits, Prior(local, _LOOSE * information + _NEAR), local, _MODEL)
         along = float(marginal_information(body_information(found.information, found.pose[2]))[0])
         if found.support <= 0.0:
             return Corrected(0.0, 0.0)

@@ -121,4 +121,6 @@ def test_a_step_is_carried_on_with_its_covariance() -> None:
     tracker.predict(np.array([10.0, 0.0, 0.0]), np.zeros((3, 3)))
     assert tracker.pose == pytest.approx([1.0, 12.0, 0.5 * math.pi])
     assert tracker.deviations[1] == pytest.approx(10.0 * heading_std, rel=0.02)
-    assert tracker.deviations[0] < 0.03
+    assert tracker.deviations[0] == pytest.approx(
+        0.1, rel=0.05
+    )  # the odometry may be off by 1 % where walls told nothing yet
