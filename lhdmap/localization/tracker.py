@@ -27,8 +27,10 @@ _LEAST_SHARE = 0.02
 _LOOSE = 0.01  # of the filter's information holds a match: smooth walls pull only one that is free to follow ...
 _NEAR = np.diag([1.0 / 0.5**2, 1.0 / 0.5**2, 1.0 / math.radians(3.0) ** 2])  # ... within what a match can find
 _STRETCH_STD, _STRETCH_WALK = 0.01, 0.001  # of the odometry where walls tell it little of the way; growth each √m
+_OF_WALLS = 0.5  # of what one scan is sure of along the machine: the map's noise, the same as long as a wall is in view
 _CLEARLY = 0.15
 _MODEL = OTHER_VISIT._replace(rounds=4)
+_MOST_NOISE_M = 0.1
 _AHEAD_M = 3.0  # mean distance of the hits ahead: what a wrong scale moves a scan by
 _LEAST_STD = np.array([1e-3, 1e-3, 1e-5])
 _PER_METRE = np.array([0.004, 0.003, math.radians(0.03)])  # of the odometry's step at least, per square root of a metre
@@ -50,6 +52,7 @@ class Tracker:
         self._own = np.zeros((4, 4))  # of pose and stretch
         self._own[:3, :3], self._own[3, 3] = P, _STRETCH_STD**2
         self._map_std = np.array([_MAP_ALONG_M, _MAP_ACROSS_M, _MAP_HEADING_RAD])
+        self._wall_noise_m = 0.0
         self._moved_m = _SHARED_M  # since the last correction; the first scan counts in full
 
     def predict(self, step: FloatArray, covariance: FloatArray, _wheels: Wheels | None = None, /) -> None:
@@ -82,6 +85,7 @@ class Tracker:
         self._fuse(found.pose - local, found.information / kappa)
         scale = abs(quality.scale) if math.isfinite(quality.scale) else 0.003
         self._map_std = np.array([math.hypot(_MAP_ALONG_M, scale * _AHEAD_M), _MAP_ACROSS_M, _MAP_HEADING_RAD])
+        self._wall_noise_m = min(_OF_WALLS / math.sqrt(max(along, 1e-9)), _MOST_NOISE_M)
         return Corrected(float(found.support), along)
 
     def _fuse(self, off: FloatArray, told: FloatArray) -> None:
@@ -112,7 +116,8 @@ class Tracker:
     def P(self) -> FloatArray:  # noqa: N802
         """Covariance (3, 3) of the pose, map axes: the filter's, and what the map is wrong by where the machine is."""
         R = turned(self.pose[2])
-        P: FloatArray = self._own[:3, :3] + R @ np.diag(self._map_std**2) @ R.T
+        beside = self._map_std**2 + np.array([self._wall_noise_m**2, 0.0, 0.0])
+        P: FloatArray = self._own[:3, :3] + R @ np.diag(beside) @ R.T
         return P
 
     @property

@@ -40,6 +40,7 @@ from lhdmap.topology.model import TopologicalMap
 from lhdmap.topology.sheet import Sheet, read_sheets
 
 _GUESSED = np.array([0.5, 0.1, 0.1])  # m/s, m/s, rad/s: a step that neither walls nor wheels told
+_HELD = 1.0 / 0.02**2  # 1/m²: less along the machine, and walls hardly hold it
 _LEAST_SUPPORT = 0.35  # where a node's own scans tell of none
 
 
@@ -193,9 +194,10 @@ class Localizer:
         ):  # where nothing tilts, or the front one is blind, it has no use for it
             view = self.pipeline.front_end.behind_at(step.time_ns)
             rear = rear if view is None else behind(view, step.velocity, 0.0, self._floor_m, self._settings.hits).points
+        most = self._settings.hits * (1 if self._information > _HELD else 2)  # smooth walls tell a little with each hit
         for points in (odometry.points, rear):
             near = points[np.hypot(points[:, 0], points[:, 1]) < self._settings.range_m, :2]
-            parts.append(near[:: max(-(-2 * len(near) // self._settings.hits), 1)])
+            parts.append(near[:: max(-(-2 * len(near) // most), 1)])
         return np.concatenate(parts), len(parts[0])
 
     def _correct(self, points: FloatArray, front: int) -> str:

@@ -41,12 +41,12 @@ Times on a machine that other work shared.
 """
 
 
-def tracking(seeds: range, folder: Path, methods: tuple[str, ...]) -> Iterator[str]:
+def tracking(seeds: range, folder: Path, methods: tuple[str, ...], classes: tuple[str, ...]) -> Iterator[str]:
     """Yield the lines of the section of planar tunnels."""
     yield _TRACKING.format(length=LENGTH_M, seeds=len(seeds), paper=min(_PAPER_WORLDS, len(seeds)))
     yield f"| {' | '.join(_COLUMNS)} |"
     yield "|" + " --- |" * len(_COLUMNS)
-    for name in CLASSES:
+    for name in classes:
         found: dict[str, list[dict[str, Any]]] = {method: [] for method in methods}
         for seed in seeds:
             place = taught(name, seed, folder)
@@ -97,6 +97,7 @@ def main(words: list[str] | None = None) -> int:
     parser.add_argument("what", choices=("tracking", "faults", "real"))
     parser.add_argument("--seeds", type=int, nargs="+", default=[10], help="how many worlds, or from which to which")
     parser.add_argument("--methods", nargs="+", default=METHODS, choices=METHODS)
+    parser.add_argument("--walls", nargs="+", default=tuple(CLASSES), choices=tuple(CLASSES))
     parser.add_argument("--folder", type=Path, help="where the maps of planar tunnels are kept, or the logs of mines")
     parser.add_argument("--data", type=Path, default=RESULT.parents[2] / "shared" / "data", help="the real logs")
     parser.add_argument("--write", action="store_true", help=f"into {RESULT.name}")
@@ -117,7 +118,7 @@ def main(words: list[str] | None = None) -> int:
 def _section(options: argparse.Namespace, folder: Path) -> tuple[str, Iterator[str]]:
     if options.what == "tracking":
         first, last = (1, options.seeds[0]) if len(options.seeds) == 1 else options.seeds[:2]
-        return "Tracking", tracking(range(first, last + 1), folder, tuple(options.methods))
+        return "Tracking", tracking(range(first, last + 1), folder, tuple(options.methods), tuple(options.walls))
     if options.what == "faults":
         from tools.evaluate.localization_faults import faults
 
