@@ -18,8 +18,9 @@ from lhdmap.localization.settings import LocalizationSettings
 from lhdmap.localization.walls import MapWalls
 from lhdmap.messages import FloatArray
 from lhdmap.scan_matching.information import body_information, marginal_information
-from lhdmap.scan_matching.matching import Hits, Prior, match
+from lhdmap.scan_matching.matching import Hits, Match, Prior, match
 from lhdmap.scan_matching.submap import OTHER_VISIT
+from lhdmap.scan_matching.surface_map import SurfaceMap
 
 _MAP_ALONG_M, _MAP_ACROSS_M, _MAP_HEADING_RAD = 0.002, 0.003, math.radians(0.03)
 _SHARED_M = 1.0  # travel over which scans share the map's errors
@@ -30,6 +31,7 @@ _STRETCH_STD, _STRETCH_WALK = 0.01, 0.001  # of the odometry where walls tell it
 _OF_WALLS = 0.5  # of what one scan is sure of along the machine: the map's noise, the same as long as a wall is in view
 _CLEARLY = 0.15
 _MODEL = OTHER_VISIT._replace(rounds=4)
+_WIDE, _DOUBT_M = OTHER_VISIT._replace(noise_m=0.25), 0.05  # hits of smooth walls agree within 6 cm alone
 _MOST_NOISE_M = 0.1
 _AHEAD_M = 3.0  # mean distance of the hits ahead: what a wrong scale moves a scan by
 _LEAST_STD = np.array([1e-3, 1e-3, 1e-5])
@@ -78,7 +80,7 @@ class Tracker:
         self._moved_m = 0.0
         local = self.pose - np.array([origin[0], origin[1], 0.0])
         information: FloatArray = np.asarray(np.linalg.inv(self._own[:3, :3] + np.diag(_LEAST_STD**2)), dtype=float)
-        found = match(walls, hits, Prior(local, _LOOSE * information + _NEAR), local, _MODEL)
+        found = self._placed(walls, hits, Prior(local, _LOOSE * information + _NEAR))
         along = float(marginal_information(body_information(found.information, found.pose[2]))[0])
         if found.support <= 0.0:
             return Corrected(0.0, 0.0)
@@ -87,6 +89,14 @@ class Tracker:
         self._map_std = np.array([math.hypot(_MAP_ALONG_M, scale * _AHEAD_M), _MAP_ACROSS_M, _MAP_HEADING_RAD])
         self._wall_noise_m = min(_OF_WALLS / math.sqrt(max(along, 1e-9)), _MOST_NOISE_M)
         return Corrected(float(found.support), along)
+
+    def _placed(self, walls: SurfaceMap, hits: Hits, prior: Prior) -> Match:
+        """Match from the prior's pose; where that is in doubt, hits may be farther from the walls at first."""
+        start = prior.pose
+        if self.deviations[1] > _DOUBT_M:
+            start = match(walls, hits, prior, start, _WIDE).pose
+        found: Match = match(walls, hits, prior, start, _MODEL)
+        return found
 
     def _fuse(self, off: FloatArray, told: FloatArray) -> None:
         """Take over what a match told: by how much the pose is off (3,), with its information (3, 3)."""
@@ -101,14 +111,9 @@ class Tracker:
         """Turn round about where the machine is, where hits (N, 2) fit the walls clearly better so."""
         walls, origin = self._walls.around(np.array([self.pose[0], self.pose[1], self.height_m]))
         hits = Hits(np.column_stack([points, np.zeros(len(points))]), len(points), layered=False)
-        supports = []
-        for turn in (0.0, math.pi):
-            start = self.pose + np.array([-origin[0], -origin[1], turn])
-            supports.append(
-                match(
-                    walls, hits, Prior(start, np.asarray(np.linalg.inv(self.P), dtype=float)), start, OTHER_VISIT
-                ).support
-            )
+        held = np.asarray(np.linalg.inv(self.P), dtype=float)
+        starts = [self.pose + np.array([-origin[0], -origin[1], turn]) for turn in (0.0, math.pi)]
+        supports = [self._placed(walls, hits, Prior(start, held)).support for start in starts]
         if supports[1] > supports[0] + _CLEARLY:
             self.pose[2] += math.pi
 

@@ -1,4 +1,4 @@
-"""Real logs that pass places again: the first part teaches, the second is localized on its map; relations set by hand compare both."""
+"""Real logs that pass places again: the first part teaches, the second is localized; relations set by hand compare both."""
 
 from __future__ import annotations
 
@@ -43,8 +43,9 @@ _SETTINGS = settings_from({"pile.method": "off", "recording.scan_interval_s": 20
 _MOVED_NS = 1_000_000
 _INTRO = """\
 The first share of a log's scans teaches, the rest is localized on that map, from where the first part ended. The robots drive into
-places that the first part never saw: there nothing can be tracked, and after a loss the search has to find the place again. "Relations": motions between a pose of the first part (in the
-map) and one of the second (tracked), as people have set them by hand (Freiburg benchmark); their error holds that of the map.
+places that the first part never saw: there nothing can be tracked, and after a loss the search has to find the place again.
+"Relations": motions between a pose of the first part (in the map) and one of the second (tracked), as people have set them by hand
+(Freiburg benchmark); their error holds that of the map.
 """
 _COLUMNS = (
     "log", "teaches", "scans after it", "tracked", "losses", "withheld", "support, 5th percentile / median",
@@ -77,11 +78,12 @@ def row(log: Log, data: Path, folder: Path) -> str:
                 supports.append(localizer.support)
         localizer.finish()
     rows = localizer.rows
+    tracked, lost = (100 * np.mean([one.status == status for one in rows]) for status in (TRACKING, LOST))
     cells = (
         log.name,
         f"{100 * log.teaches:.0f} %",
         str(len(rows)),
-        f"{100 * np.mean([one.status == TRACKING for one in rows]):.0f} % (lost {100 * np.mean([one.status == LOST for one in rows]):.0f} %)",
+        f"{tracked:.0f} % (lost {lost:.0f} %)",
         str(localizer.lost_stretches),
         str(localizer.withheld),
         f"{np.quantile(supports, 0.05):.2f} / {np.median(supports):.2f}" if supports else "",
