@@ -98,7 +98,7 @@ def test_perfectly_straight_walls_say_nothing_of_along() -> None:
     for _ in range(10):
         tracker.correct(points, len(points), walls.quality("s"))
     assert tracker.pose == pytest.approx([20.0, 0.0, 0.0], abs=0.01)
-    assert tracker.deviations[0] == pytest.approx(0.2, rel=0.1)
+    assert 0.19 < tracker.deviations[0] < 0.23  # as before, and what walls that say nothing may be wrong by
     assert tracker.deviations[1] < 0.02
 
 

@@ -36,7 +36,7 @@ Planar tunnels of {length:g} m, {seeds} worlds a class (the paper's method: the 
 through at 3.6 m/s in the same direction, in the other one, and in reverse gear, 0.1 to 0.5 m beside the middle, weaving 0.15 m.
 Articulated machine, two level scanners (190°, 0.5°, 12 mm, 10 Hz); tachometer 1 % too fast, 0.03 m/s of noise, on second drives
 slip by 30 to 100 % for 0.5 to 2 s each 8 to 25 s. The map is that of `build-map` from the teaching drive's log. Errors
-against the map; the start is known to 0.1 m, the first 5 m are left out. Rough and moderate: every second world with bends and niches.
+against the map; start known to 0.1 m, the first 5 m are left out. Rough and moderate: every second world has bends and niches.
 Times on a machine that other work shared.
 """
 
