@@ -19,6 +19,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_settings(parser)
     add_topics(parser)
     parser.add_argument("--machine", type=Path, metavar="FILE.toml", help="machine description")
+    parser.add_argument("--method", choices=("surface", "paper"), help="how it tracks (default: localization.method)")
     parser.add_argument(
         "--start",
         metavar="X,Y,DEG|NAME",
@@ -39,7 +40,7 @@ def run(arguments: argparse.Namespace, console: Console) -> int:
             arguments.logs,
             arguments.map,
             arguments.output or beside(arguments.logs[0], "localization"),
-            load_settings(arguments.config, arguments.set),
+            load_settings(arguments.config, [*arguments.set, *_method(arguments)]),
             topic_overrides(arguments.topic),
             load_machine(arguments.machine) if arguments.machine else None,
             start_of(arguments.start, arguments.map) if arguments.start else None,
@@ -51,6 +52,10 @@ def run(arguments: argparse.Namespace, console: Console) -> int:
         console.warn(text)
     console.result({"run": str(result.folder), **result.summary}, _text(result.folder, result.summary))
     return 0
+
+
+def _method(arguments: argparse.Namespace) -> list[str]:
+    return [f"localization.method={arguments.method}"] if arguments.method else []
 
 
 def _text(folder: Path, summary: dict[str, Any]) -> str:

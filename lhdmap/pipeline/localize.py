@@ -25,6 +25,9 @@ from lhdmap.landmarks.model import Landmarks
 from lhdmap.landmarks.store import read_landmarks
 from lhdmap.localization.changes import WorldChanges
 from lhdmap.localization.finder import Finder
+from lhdmap.localization.method import Tracks, Wheels
+from lhdmap.localization.paper import PaperTracker
+from lhdmap.localization.paper_nodes import PaperNodes
 from lhdmap.localization.place_on_map import Placer
 from lhdmap.localization.rows import CANDIDATE, LOST, NOWHERE, TRACKING, UNKNOWN, Row
 from lhdmap.localization.search import CHECK, CONFIRM, FIND, Candidate, GlobalSearch, Search
@@ -35,6 +38,7 @@ from lhdmap.machine import Machine
 from lhdmap.mapfolder import MapFolder
 from lhdmap.messages import FloatArray, Message
 from lhdmap.odometry.planar import PlanarOdometry
+from lhdmap.odometry.rear_view import behind
 from lhdmap.odometry.steps import OdometryStep
 from lhdmap.pipeline.mapping import MappingPipeline
 from lhdmap.topology.files import read_topology
@@ -43,6 +47,8 @@ from lhdmap.topology.sheet import Sheet, read_sheets
 
 _HITS_ABOVE_M = 1.0  # hits are flat: where they are shown over the floor
 _LEAST_LEFT = 0.25  # of the hits must be of walls that the map has, or nothing corrects the place
+_GUESSED = np.array([0.5, 0.1, 0.1])  # m/s, m/s, rad/s: a step that neither walls nor wheels told
+_HELD = 1.0 / 0.02**2  # 1/m²: less along the machine, and walls hardly hold it
 _LEAST_SUPPORT = 0.35  # where a node's own scans tell of none
 
 
@@ -115,19 +121,22 @@ class Localizer:
     ) -> None:
         # What lies beyond the map does not count: no loop is closed, no pile looked for.
         settings = replace(settings, pile=replace(settings.pile, method="off"))
-        self._settings = settings.localization
+        self._settings, self._floor_m = settings.localization, settings.odometry.min_height_m
         self.pipeline = MappingPipeline(settings, machine, cloud=False, on_step=self.take)
         self._walls, self._placer = MapWalls(known.topology, known.landmarks), Placer(known.topology)
         search = known.search(self._walls, settings)
         self.world = WorldChanges(known.topology, known.sheets, self._walls)
         self._finder = Finder(search, self._settings, settings.landmarks, waits=not live)
-        self._tracker = None if start is None else self._started(start)
+        paper = self._settings.method == "paper"
+        self._paper = PaperNodes(known.topology, known.landmarks, settings.landmarks) if paper else None
+        self._tracker: Tracks | None = None if start is None else self._started(start)
         self._turnable = start is not None  # a waypoint's heading is its node's: the machine may face the other way
         self._status = UNKNOWN if start is None else TRACKING
         self._trial: _Trial | None = None
         self._supports: deque[float] = deque(maxlen=self._settings.support_scans)
         self._before: FloatArray | None = None
         self._listener = listener
+        self._time_ns = 0
         self._travelled_m = 0.0
         self._probability = 0.0 if start is None else 1.0
         self._information = 0.0
@@ -182,10 +191,20 @@ class Localizer:
         pose, height = self._tracker.pose.copy(), self._tracker.height_m
         return Fix(stamp_ns, status, pose, self._before.copy(), self._tracker.P.copy(), height)
 
-    def _started(self, start: FloatArray) -> Tracker:
+    @property
+    def support(self) -> float | None:
+        """Share of the newest scan's hits that agreed with the walls; None before the first that was matched."""
+        return self._supports[-1] if self._supports else None
+
+    def _started(self, start: FloatArray) -> Tracks:
         std = np.array([self._settings.start_std_m] * 2 + [math.radians(self._settings.start_std_deg)])
         height = float(start[3]) if len(start) > 3 else 0.0
-        return Tracker(self._walls, self._settings, start[:3], np.diag(std**2), height)
+        return self._tracks(start[:3], std, height)
+
+    def _tracks(self, pose: FloatArray, std: FloatArray, height_m: float) -> Tracks:
+        """Return what tracks by the method of the settings from a pose (3,) with these deviations (3,)."""
+        tracker = Tracker(self._walls, self._settings, pose, np.diag(std**2), height_m)
+        return tracker if self._paper is None else PaperTracker(self._paper, self._placer, tracker)
 
     def take(self, stamp_ns: int, step: OdometryStep, odometry: PlanarOdometry) -> None:
         """Take what the odometry says of a front scan."""
@@ -196,11 +215,12 @@ class Localizer:
             moved = se2.between(self._before, step.T_odom_base)
             self._travelled_m += math.hypot(moved[0], moved[1])
             if self._tracker is not None:
-                self._tracker.predict(moved, step.error.covariance if step.processed else np.zeros((3, 3)))
+                self._tracker.predict(moved, *self._carried(step))
+        self._time_ns = step.time_ns
         self._before = step.T_odom_base.copy()
         source, points = "", np.zeros((0, 2))
         if step.processed:
-            points, front = self._hits(odometry)
+            points, front = self._hits(step, odometry)
             told, told_front = self._of_the_map(points, front)
             self._finder.add(step.T_odom_base, told)
             source = self._correct(told, told_front) if len(told) > _LEAST_LEFT * len(points) else "odometry"
@@ -233,12 +253,34 @@ class Localizer:
         kept = ~self.world.stands_in(self._tracker.pose, self._tracker.height_m, points)
         return points[kept], int(kept[:front].sum())
 
-    def _hits(self, odometry: PlanarOdometry) -> tuple[FloatArray, int]:
+    def _carried(self, step: OdometryStep) -> tuple[FloatArray, Wheels]:
+        """Return the covariance (3, 3) of the odometry's step, and the wheels' motion over it.
+
+        Where a scan could not be placed the step is the wheels' own, or a guess, and as sure as these are.
+        """
+        covariance = step.error.covariance if step.processed else np.zeros((3, 3))
+        dt_s = (step.time_ns - self._time_ns) * 1e-9
+        motion = self.pipeline.wheels.motion_between(self._time_ns, step.time_ns)
+        if step.lost:
+            covariance = covariance + (np.diag((_GUESSED * dt_s) ** 2) if motion is None else motion.covariance)
+        if motion is None:
+            return covariance, Wheels(dt_s, math.nan, math.nan)
+        forward_m = math.copysign(math.hypot(motion.delta[0], motion.delta[1]), motion.delta[0])
+        turn_rad = math.nan if motion.source == "tachometer" else float(motion.delta[2])
+        return covariance, Wheels(dt_s, forward_m, turn_rad)
+
+    def _hits(self, step: OdometryStep, odometry: PlanarOdometry) -> tuple[FloatArray, int]:
         """Return hits (N, 2) of both scanners near the machine, thinned, and how many are the front one's."""
-        parts = []
-        for points in (odometry.points, odometry.points_behind):
+        parts, rear = [], odometry.points_behind
+        if not len(rear) or not len(
+            odometry.points
+        ):  # where nothing tilts, or the front one is blind, it has no use for it
+            view = self.pipeline.front_end.behind_at(step.time_ns)
+            rear = rear if view is None else behind(view, step.velocity, 0.0, self._floor_m, self._settings.hits).points
+        most = self._settings.hits * (1 if self._information > _HELD else 2)  # smooth walls tell a little with each hit
+        for points in (odometry.points, rear):
             near = points[np.hypot(points[:, 0], points[:, 1]) < self._settings.range_m, :2]
-            parts.append(near[:: max(-(-2 * len(near) // self._settings.hits), 1)])
+            parts.append(near[:: max(-(-2 * len(near) // most), 1)])
         return np.concatenate(parts), len(parts[0])
 
     def _correct(self, points: FloatArray, front: int) -> str:
@@ -253,7 +295,7 @@ class Localizer:
         tracker.height_m = self._placer.height_m(tracker.pose[0], tracker.pose[1], tracker.height_m)
         self._supports.append(said.support)
         self._information = said.information_along
-        return "walls" if said.support > 0.0 else "odometry"
+        return said.source if said.support > 0.0 else "odometry"
 
     def _judge(self) -> None:
         """Decide by the support whether the place still holds."""
@@ -323,7 +365,7 @@ class Localizer:
         height = self._placer.height_m(found.pose[0], found.pose[1], found.height_m)
         if self._tracker is not None:
             self.world.found(self._travelled_m, self._tracker.pose, found.pose)
-        self._tracker = Tracker(self._walls, self._settings, found.pose, np.diag(std**2), height)
+        self._tracker = self._tracks(found.pose, std, height)
         self._trial = _Trial(self._travelled_m)
         self._status, self._probability = CANDIDATE, found.probability
         self._supports.clear()
