@@ -129,7 +129,7 @@ class GlobalSearch:
         denied = ""
         if place is not None:
             own = self._candidate(place, min(-best.evidence, 0.0) - place.cost, claimed[:3])
-            if own.evidence < -self._settings.gap:
+            if own.evidence < -self._settings.gap and place.compared >= _LEAST_COMPARED:
                 denied = f"other walls than there, {-own.evidence:.0f} nats"
         off = se2.between(claimed[:3], best.pose)
         if not said.refused and (math.hypot(off[0], off[1]) > _SAME_M or abs(off[2]) > _SAME_RAD):

@@ -47,6 +47,7 @@ from lhdmap.topology.sheet import Sheet, read_sheets
 
 _HITS_ABOVE_M = 1.0  # hits are flat: where they are shown over the floor
 _LEAST_LEFT = 0.25  # of the hits must be of walls that the map has, or nothing corrects the place
+_DENIALS = 2  # checks in a row
 _GUESSED = np.array([0.5, 0.1, 0.1])  # m/s, m/s, rad/s: a step that neither walls nor wheels told
 _HELD = 1.0 / 0.02**2  # 1/m²: less along the machine, and walls hardly hold it
 _LEAST_SUPPORT = 0.35  # where a node's own scans tell of none
@@ -133,6 +134,7 @@ class Localizer:
         self._turnable = start is not None  # a waypoint's heading is its node's: the machine may face the other way
         self._status = UNKNOWN if start is None else TRACKING
         self._trial: _Trial | None = None
+        self._denials = 0
         self._supports: deque[float] = deque(maxlen=self._settings.support_scans)
         self._before: FloatArray | None = None
         self._listener = listener
@@ -317,6 +319,7 @@ class Localizer:
         """Give a place up: a trial that failed, or one that was lost."""
         self.reasons.append((self._stamp_ns, why))
         self._supports.clear()
+        self._denials = 0
         self._probability = 0.0
         self._finder.again()
         if self._trial is not None:
@@ -357,8 +360,17 @@ class Localizer:
             self.withheld += bool(said.candidates)
         elif said.purpose == CONFIRM and said.confirms:
             self._status, self._trial = TRACKING, None
-        elif said.purpose == CONFIRM or said.denied:
+        elif said.purpose == CONFIRM or self._denied_again(said):
             self._drop(said.denied or said.refused or "a search finds another place")
+
+    def _denied_again(self, said: Search) -> bool:
+        """Return whether two checks in a row say that the machine is not where it is tracked: one may be of a bend or a niche.
+
+        That another place fits counts always; that this one does not, where the walls are smooth: in others their support tells.
+        """
+        tells = not said.refused or self._information < _HELD
+        self._denials = self._denials + 1 if said.denied and tells else 0
+        return self._denials >= _DENIALS
 
     def _try(self, found: Candidate) -> None:
         std = np.array([0.1, 0.1, math.radians(1.0)])
