@@ -48,7 +48,7 @@ class FrontEnd:
         self._settings, self._gyro_settings = settings.attitude, settings.gyro
         self.machine = machine or DEFAULT_MACHINE
         self.mounts = Mounts(machine)
-        self.attitude, self.gyro = AttitudeFilter(settings.attitude), Gyro(settings.gyro)
+        self.attitude, self.gyro = AttitudeFilter(settings.attitude), Gyro(settings.gyro, settings.attitude.lag_s)
         self.wheels = WheelOdometry(settings.wheels, self.machine)
         self.rear = RearScans(self.mounts, self.wheels, self.machine)
         self.sweep_times = SweepTimes()
@@ -86,7 +86,8 @@ class FrontEnd:
         """Return a scan with all that is known of the machine at `time_ns`, the middle of its sweep."""
         rear = partial(self.behind_at, time_ns) if self.has_inclinometer else None
         rise = rise_of(self.mounts.of(scan.frame_id, "front").T_parent_child)
-        view = View(height_m, self.boxes, rear, rise, self.has_inclinometer)
+        turn_rad = self.gyro.turn_between(before_ns, time_ns) if self.gyro.there else None
+        view = View(height_m, self.boxes, rear, rise, self.has_inclinometer, turn_rad)
         return ScanInput(scan, partial(self.placement, scan, time_ns), self._wheel_step(before_ns, time_ns), view)
 
     def placement(self, scan: LaserScan, time_ns: int) -> FloatArray:
@@ -146,7 +147,7 @@ class FrontEnd:
         if self.mounts.known(frame):
             R_base_sensor = self.mounts.of(frame, "inclinometer").T_parent_child[:3, :3]
         self.attitude = AttitudeFilter(self._settings, R_base_sensor)
-        self.gyro = Gyro(self._gyro_settings, R_base_sensor)
+        self.gyro = Gyro(self._gyro_settings, self._settings.lag_s, R_base_sensor)
         for message in self._early:
             self.attitude.update(message)
             self.gyro.update(message)

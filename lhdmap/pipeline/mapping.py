@@ -80,6 +80,7 @@ class MappingPipeline:
         self.sweeps = SweepIntegration(settings, machine, self.mounts, on_sweep, worker)
         self.smoother = Smoother(settings.smoothing)
         self.turns = Turns()  # by the gyroscope, where there is one
+        self.told: list[str] = []  # what came out once the drive was over
         self.said: list[tuple[int, str]] = []  # names of nodes, each where the operator begins to say it
         self.views = Views()  # of the drift, for the free space that the topology is found in
         looked_for = primary == "front" and settings.pile.method != "off"
@@ -138,8 +139,10 @@ class MappingPipeline:
     @property
     def warnings(self) -> list[str]:
         """What the stages found odd, in words."""
-        fused = self.odometry.wheels.warnings() if self.odometry is not None else []
-        return [*self.front_end.warnings, *fused]
+        if self.odometry is None:
+            return self.front_end.warnings
+        gyro = self.odometry.gyro.warning()
+        return [*self.front_end.warnings, *self.odometry.wheels.warnings(), *([] if gyro is None else [gyro]), *self.told]
 
     @property
     def has_inclinometer(self) -> bool:

@@ -25,6 +25,7 @@ from lhdmap.pile.result import PileReport
 from lhdmap.pipeline.beside import HelperDied
 from lhdmap.pipeline.closures import closure_rows
 from lhdmap.pipeline.given import GROUND_TRUTH
+from lhdmap.pipeline.heading import gyro_correction
 from lhdmap.pipeline.identify import identify_along
 from lhdmap.pipeline.landmarks import landmarks_for, with_stretches
 from lhdmap.pipeline.mapping import MappingPipeline
@@ -96,7 +97,10 @@ def ways_of(pipeline: MappingPipeline, given: Rows | None) -> Ways:
     """
     stamps, times = _moments(pipeline)
     rows = pipeline.path.final.rows() if given is None else given
-    correction = None if given is not None else _correction(pipeline, rows)
+    steadied = None if given is not None else gyro_correction(pipeline, rows)
+    if steadied is not None:
+        rows = Rows(rows.times_ns, corrected(rows.poses, rows.times_ns, steadied))
+    correction = None if given is not None else _correction(pipeline, rows, steadied)
     if given is not None and not any(map(FinalTrack(given).covers, times.tolist())):
         raise InputError(
             f"the given poses are of {given.times_ns[0] / 1e9:.3f} to {given.times_ns[-1] / 1e9:.3f} s, "
@@ -105,18 +109,22 @@ def ways_of(pipeline: MappingPipeline, given: Rows | None) -> Ways:
     if correction is not None:
         rows = Rows(rows.times_ns, corrected(rows.poses, rows.times_ns, correction))
     final = trajectory_of(resample(rows, times), stamps)
-    moved = given is not None or correction is not None
-    closed = (0, None) if correction is None else (correction.closures, correction.end_covariance)
-    return Ways(odometry_of(pipeline), final, rows, moved, *closed)
+    moved = given is not None or correction is not None or steadied is not None
+    if correction is not None:
+        end: tuple[int, FloatArray | None] = correction.closures, correction.end_covariance
+    else:
+        end = 0, None if steadied is None else pipeline.smoother.end_covariance([steadied])
+    return Ways(odometry_of(pipeline), final, rows, moved, *end)
 
 
-def _correction(pipeline: MappingPipeline, rows: Rows) -> Correction | None:
+def _correction(pipeline: MappingPipeline, rows: Rows, steadied: Correction | None) -> Correction | None:
     """Return how closed loops move the path; heights close where an inclinometer tells them."""
 
     def heights_m(times_ns: npt.NDArray[np.int64]) -> FloatArray:
         return resample(rows, times_ns).poses[:, 2]
 
-    return pipeline.smoother.correction(pipeline.path.correction(), heights_m if pipeline.has_inclinometer else None)
+    moved = [one for one in (pipeline.path.correction(), steadied) if one is not None]
+    return pipeline.smoother.correction(moved, heights_m if pipeline.has_inclinometer else None)
 
 
 class Outcome:
