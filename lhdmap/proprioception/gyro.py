@@ -34,7 +34,7 @@ class GyroSettings:
         minimum=1e-3,
         maximum=100.0,
         source="lhdmap: industrial MEMS have 0.2 to 0.6",
-        doc="Random walk of the angle where its readings do not tell of less; more where the scans do.",
+        doc="Random walk of the angle where its readings do not tell it; a quarter of it is the least that is believed.",
     )
     bias_deg_h: float = setting(
         20.0,
@@ -114,8 +114,7 @@ class Gyro:
         usual = self._settings.noise_deg_sqrt_h
         if not self._walks:
             return usual
-        found = _MORE * math.degrees(float(np.median(self._walks))) * 60.0
-        return float(np.clip(found, _LEAST * usual, usual if self._told_rps is None else math.inf))
+        return max(_MORE * math.degrees(float(np.median(self._walks))) * 60.0, _LEAST * usual)
 
     def _learn_noise(self) -> None:
         """Take the readings' white noise over the last seconds for noise of the angle: what is slower is motion."""

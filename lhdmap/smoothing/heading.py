@@ -28,6 +28,7 @@ _SCALE_STD = 0.003
 _CUTOFF = 6.0
 _ROUNDS = 6
 _MOST_OUT, _MOST_LOUDER = 0.2, 30.0
+_MOST_SPREAD = 2.5
 _DEG_PER_SQRT_H = math.radians(1.0) / 60.0  # in rad per root second
 _DEG_PER_H = math.radians(1.0) / 3600.0
 
@@ -88,19 +89,23 @@ def fused_heading(path: Path, turned: FloatArray, noise: GyroNoise) -> Heading |
         return ""
     difference = np.where(known, blocks.gyro - blocks.scans, 0.0)
     weight, walk = known.astype(float), noise.walk
+    spread = 1.0  # of the scans' deviations
     for _ in range(_ROUNDS):
-        variance = blocks.variance + walk**2 * blocks.dt
+        scans = spread**2 * blocks.variance
+        variance = scans + walk**2 * blocks.dt
         bias, scale, bias_std = _constants(blocks, difference, weight / variance, noise)
         off = difference - bias * blocks.dt - scale * blocks.scans
         sigmas = off / np.sqrt(variance)
         louder = float(1.4826 * np.median(np.abs(sigmas[known])))
-        if louder > 1.0:  # more than scans are wrong by: then it is the gyroscope
-            walk = math.sqrt(walk**2 + (louder**2 - 1.0) * float(np.median(variance[known] / blocks.dt[known])))
+        if louder > 1.0:  # the scans' fault as far as such scans are known; beyond that it is the gyroscope
+            wider = min(spread * louder, _MOST_SPREAD)
+            rest = louder**2 * variance - wider**2 * blocks.variance - walk**2 * blocks.dt
+            spread, walk = wider, math.sqrt(walk**2 + max(float(np.median((rest / blocks.dt)[known])), 0.0))
         weight = known * np.maximum(1.0 - (sigmas / (_CUTOFF * max(louder, 1.0))) ** 2, 0.0) ** 2
     left_out = float(1.0 - (weight[known] > 0.0).mean())
     if left_out > _MOST_OUT or walk > _MOST_LOUDER * noise.walk:
         return f"gyroscope: it is not like the scans over {100.0 * left_out:.0f} % of the drive; heading is the scans' alone"
-    believed = np.where(weight > 0.0, blocks.variance / (blocks.variance + walk**2 * blocks.dt), 0.0)
+    believed = np.where(weight > 0.0, scans / (scans + walk**2 * blocks.dt), 0.0)
     turns = np.concatenate([[0.0], np.cumsum(believed * off)])
     share = 1.0 - believed
     t = (path.times_ns - path.times_ns[0]) * 1e-9
