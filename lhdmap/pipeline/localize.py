@@ -20,6 +20,7 @@ from lhdmap.config import Settings
 from lhdmap.geometry import se2
 from lhdmap.landmarks.model import Landmarks
 from lhdmap.landmarks.store import read_landmarks
+from lhdmap.localization.fixed_lag import Belief, FixedLag, Step, placed_row
 from lhdmap.localization.place_on_map import Placer
 from lhdmap.localization.rows import CANDIDATE, LOST, NOWHERE, TRACKING, UNKNOWN, Row
 from lhdmap.localization.search import Found, GlobalSearch, RecentWay
@@ -73,12 +74,20 @@ class _Trial:
 class Localizer:
     """Takes messages by role in time order; `rows` is what it said of each front scan, `where` the newest.
 
-    `start` (4,): x, y, yaw (rad) and height about where the machine begins; None: it is searched for. A context manager.
+    `start` (4,): x, y, yaw (rad) and height about where the machine begins; None: it is searched for. With `smoother` a row's pose
+    is that of the fixed-lag smoother once the machine is some metres farther. A context manager.
     """
 
     def __init__(
-        self, known: KnownMap, settings: Settings, machine: Machine | None = None, start: FloatArray | None = None
+        self,
+        known: KnownMap,
+        settings: Settings,
+        machine: Machine | None = None,
+        start: FloatArray | None = None,
+        *,
+        smoother: bool = False,
     ) -> None:
+        self._lag = FixedLag() if smoother else None
         # What lies beyond the map does not count: no loop is closed, no pile looked for.
         settings = replace(settings, pile=replace(settings.pile, method="off"))
         self._settings = settings.localization
@@ -116,6 +125,8 @@ class Localizer:
     def finish(self) -> None:
         """Say that the log has ended."""
         self.pipeline.finish()
+        for one in self._lag.restart() if self._lag is not None else ():
+            self.rows[one.row] = placed_row(self.rows[one.row], one, self._placer)
 
     def pose_at(self, now_ns: int) -> Where:
         """Return where the machine is now: the newest place carried on as the odometry is (`MappingPipeline.pose_at`)."""
@@ -141,6 +152,7 @@ class Localizer:
             if self._tracker is not None:
                 self._tracker.predict(moved, step.error.covariance if step.processed else np.zeros((3, 3)))
         self._before = step.T_odom_base.copy()
+        predicted = self._belief()
         source = ""
         if step.processed:
             points, front = self._hits(odometry)
@@ -149,6 +161,21 @@ class Localizer:
             self._judge(stamp_ns)
             self._look_around(step)
         self.rows.append(self._row(stamp_ns, step, source, 1e3 * (time.perf_counter() - began)))
+        if self._lag is not None:
+            self._smooth(self._lag, step, predicted)
+
+    def _belief(self) -> Belief | None:
+        return None if self._tracker is None else Belief(self._tracker.pose.copy(), self._tracker.P.copy())
+
+    def _smooth(self, lag: FixedLag, step: OdometryStep, predicted: Belief | None) -> None:
+        """Hand a scan to the smoother; rewrite the rows that are final."""
+        believed = self._belief()
+        if believed is None or predicted is None or self._status != TRACKING:
+            final = lag.restart()
+        else:
+            final = lag.take(Step(len(self.rows) - 1, step.T_odom_base, step.error.covariance), predicted, believed)
+        for one in final:
+            self.rows[one.row] = placed_row(self.rows[one.row], one, self._placer)
 
     def _hits(self, odometry: PlanarOdometry) -> tuple[FloatArray, int]:
         """Return hits (N, 2) of both scanners near the machine, thinned, and how many are the front one's."""

@@ -31,7 +31,10 @@ KIND = "localization"
 
 @dataclass(frozen=True, slots=True)
 class LocalizeRequest:
-    """What is asked for: logs, map folder, the folder to make, settings, about where the drive starts (4,: x, y, yaw, z)."""
+    """What is asked for: logs, map folder, the folder to make, settings, about where the drive starts (4,: x, y, yaw, z).
+
+    `smoother`: rows are those of the fixed-lag smoother.
+    """
 
     logs: Sequence[Path]
     map: Path
@@ -42,6 +45,7 @@ class LocalizeRequest:
     start: FloatArray | None = None
     progress: Progress | None = None
     force: bool = False
+    smoother: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,7 +68,8 @@ def localize(request: LocalizeRequest) -> LocalizeResult:
     free_folder(request.target, force=request.force, inputs=inputs)
     known = KnownMap.read(request.map)
     with LogSource(list(request.logs), request.topics, force=request.force) as source:
-        with Localizer(known, request.settings, machine_of(source, request.machine), request.start) as localizer:
+        machine = machine_of(source, request.machine)
+        with Localizer(known, request.settings, machine, request.start, smoother=request.smoother) as localizer:
             messages = source.messages([role for role in ROLES_READ if role in source.roles])
             for role, message in request.progress(messages, source.duration_s) if request.progress else messages:
                 localizer.update(role, message)
@@ -80,7 +85,7 @@ def localize(request: LocalizeRequest) -> LocalizeResult:
         drawn = request.target.name, known.topology, known.sheets
         write_localization_report(folder.path / "report.html", drawn, localizer.rows, summary, told)
         folder.finished(folder.path / "report.html")
-        options = {**settings_table(request.settings), "request": {"map": str(request.map.resolve())}}
+        options = {**settings_table(request.settings), "request": {"map": str(request.map.resolve()), "smoother": request.smoother}}
         path = folder.complete(RunInfo(request.logs, options, summary, told))
     return LocalizeResult(path, summary | {"warnings": told}, localizer.rows)
 
