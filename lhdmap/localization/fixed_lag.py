@@ -26,6 +26,7 @@ _LEAST_STEP_STD = np.array([1e-3, 1e-3, math.radians(0.01)])
 _LEAST_INFORMATION = 1e-3
 _TURN_STD_RAD = math.radians(0.02)
 _LOOSE_M = 1e3
+_OF_THE_MAP = np.diag([0.004**2, 0.004**2, math.radians(0.02) ** 2])  # its errors: alike for all scans of a window
 
 
 class Belief(NamedTuple):
@@ -168,7 +169,7 @@ class FixedLag:
             share = min(math.hypot(*(step.odometry - self._odometry[node])[:2]) / whole_m, 1.0) if whole_m else 0.0
             mixed = first + share * (second - first)
             mixed[2] = first[2] + share * float(se2.wrap(second[2] - first[2]))
-            out.append(Placed(step.row, mixed, self._left_covariance))
+            out.append(Placed(step.row, mixed, self._left_covariance + _OF_THE_MAP))
         return out
 
 

@@ -39,6 +39,7 @@ class GyroTurn:
         self._before: FloatArray | None = None
         self._ratios: deque[float] = deque(maxlen=_MOST_RATIOS)
         self.used = 0
+        self.turn_rad: float | None = None  # of the last step, its bias taken off; None where it is not believed
 
     @property
     def believed(self) -> bool:
@@ -47,16 +48,19 @@ class GyroTurn:
 
     def fuse(self, turn_rad: float | None, dt_s: float) -> None:
         """Take the turn since the scan before; it is used where the walls did not hold the heading there, or long ago."""
+        self.turn_rad = None
         if turn_rad is None:
             self._restart()
             return
         self._gyro_rad += turn_rad
         self._stretch_s += dt_s
-        if not self.believed or (self._held and dt_s < _LONG_S):
+        if not self.believed:
+            return
+        self.turn_rad = way = turn_rad - self._bias * dt_s
+        if self._held and dt_s < _LONG_S:
             return
         _, direction = self._motion.begin_measurement(TURNING)
         sigma = math.hypot(_STEP_RAD, (_RATE_RPS + math.sqrt(self._variance)) * dt_s)
-        way = turn_rad - self._bias * dt_s
         self.used += self._motion.measure_way(direction, way, sigma**2, False, _GATE_SIGMAS)
 
     def learn(self, pose: FloatArray, *, held: bool) -> None:

@@ -162,18 +162,19 @@ class Localizer:
             self._look_around(step)
         self.rows.append(self._row(stamp_ns, step, source, 1e3 * (time.perf_counter() - began)))
         if self._lag is not None:
-            self._smooth(self._lag, step, predicted)
+            said = Step(len(self.rows) - 1, step.T_odom_base, step.error.covariance, odometry.gyro.turn_rad)
+            self._smooth(self._lag, said, predicted)
 
     def _belief(self) -> Belief | None:
         return None if self._tracker is None else Belief(self._tracker.pose.copy(), self._tracker.P.copy())
 
-    def _smooth(self, lag: FixedLag, step: OdometryStep, predicted: Belief | None) -> None:
+    def _smooth(self, lag: FixedLag, step: Step, predicted: Belief | None) -> None:
         """Hand a scan to the smoother; rewrite the rows that are final."""
         believed = self._belief()
         if believed is None or predicted is None or self._status != TRACKING:
             final = lag.restart()
         else:
-            final = lag.take(Step(len(self.rows) - 1, step.T_odom_base, step.error.covariance), predicted, believed)
+            final = lag.take(step, predicted, believed)
         for one in final:
             self.rows[one.row] = placed_row(self.rows[one.row], one, self._placer)
 
