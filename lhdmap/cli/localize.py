@@ -25,7 +25,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="about where the drive begins: a pose or a waypoint (default: it is searched for)",
     )
     parser.add_argument(
-        "--smoother", action="store_true", help="poses of a fixed-lag smoother: each is final once the machine is 15 m farther"
+        "--smoother",
+        action="store_true",
+        help="poses of a fixed-lag smoother: each is final once the machine is 15 m farther",
     )
 
 

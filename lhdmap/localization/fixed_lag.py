@@ -2,8 +2,8 @@
 
 Nodes each half metre, tied by the odometry's steps (walls, wheels and joint, as they were weighed there), by the turn of the
 gyroscope where it is believed, and to the map by what each scan's match told: robustly, as a changed place is no measurement.
-gtsam's `BatchFixedLagSmoother` solves the window and turns what leaves it into a prior (Dellaert and Kaess, *Factor Graphs for Robot
-Perception*, 2017, chapter 5). What a match told is what the tracker's covariance lost by it:
+gtsam's `BatchFixedLagSmoother` solves the window and turns what leaves it into a prior (Dellaert and Kaess, *Factor Graphs for
+Robot Perception*, 2017, chapter 5). What a match told is what the tracker's covariance lost by it:
 
     information = P⁻¹(after) - P⁻¹(before),  measured = after + information⁻¹ P⁻¹(before) (after - before)
 """
@@ -45,7 +45,7 @@ class Placed(NamedTuple):
 
 
 class Step(NamedTuple):
-    """A scan: its row, pose (3,) by odometry, covariance (3, 3) of the step to it, and its turn by the gyroscope (rad, None: unknown)."""
+    """A scan: its row, pose (3,) by odometry, covariance (3, 3) of the step to it, turn by the gyroscope (rad)."""
 
     row: int
     odometry: FloatArray

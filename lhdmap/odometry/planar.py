@@ -124,7 +124,9 @@ class PlanarOdometry:
         judged = self._judged(matched)
         held = matched.support > _WALLS_ALONE and not judged.weak
         self.wheels.learn(self._motion.pose, matched, held=held and not matched.lost)
-        self.gyro.learn(self._motion.pose, held=not (matched.lost or matched.doubtful or self._blind(judged.information)))
+        self.gyro.learn(
+            self._motion.pose, held=not (matched.lost or matched.doubtful or self._blind(judged.information))
+        )
         self._error = self._errors.of(self._motion.pose, matched, judged.covariance, levelled=view.levelled)
         return self._step(scan, matched, judged)
 

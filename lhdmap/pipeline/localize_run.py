@@ -85,7 +85,10 @@ def localize(request: LocalizeRequest) -> LocalizeResult:
         drawn = request.target.name, known.topology, known.sheets
         write_localization_report(folder.path / "report.html", drawn, localizer.rows, summary, told)
         folder.finished(folder.path / "report.html")
-        options = {**settings_table(request.settings), "request": {"map": str(request.map.resolve()), "smoother": request.smoother}}
+        options = {
+            **settings_table(request.settings),
+            "request": {"map": str(request.map.resolve()), "smoother": request.smoother},
+        }
         path = folder.complete(RunInfo(request.logs, options, summary, told))
     return LocalizeResult(path, summary | {"warnings": told}, localizer.rows)
 

@@ -142,7 +142,12 @@ class MappingPipeline:
         if self.odometry is None:
             return self.front_end.warnings
         gyro = self.odometry.gyro.warning()
-        return [*self.front_end.warnings, *self.odometry.wheels.warnings(), *([] if gyro is None else [gyro]), *self.told]
+        return [
+            *self.front_end.warnings,
+            *self.odometry.wheels.warnings(),
+            *([] if gyro is None else [gyro]),
+            *self.told,
+        ]
 
     @property
     def has_inclinometer(self) -> bool:

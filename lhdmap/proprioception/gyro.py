@@ -129,7 +129,9 @@ class Gyro:
         stamps, rows = self._samples.stamps_ns, self._samples.rows
         if not len(stamps):
             return np.full((len(times_ns), 2), math.nan)
-        first = max(int(np.searchsorted(stamps, times_ns.min())) - 1, 0)  # a scan asks for its own moment: no copy of all
+        first = max(
+            int(np.searchsorted(stamps, times_ns.min())) - 1, 0
+        )  # a scan asks for its own moment: no copy of all
         stamps, rows = stamps[first:], rows[first:]
         at, x = (times_ns - stamps[0]).astype(float), (stamps - stamps[0]).astype(float)
         found = np.column_stack([np.interp(at, x, rows[:, 0]), np.interp(at, x, rows[:, 1])])

@@ -14,10 +14,10 @@ from lhdmap.scan_matching.key_scan import KeyScan
 from lhdmap.smoothing.closures import Closure, Refusal, find_closures
 from lhdmap.smoothing.evidence import Evidence, evidence_of
 from lhdmap.smoothing.graph import chained, smoothed
-from lhdmap.smoothing.heights import closed_heights
 from lhdmap.smoothing.keys import KeyScans
 from lhdmap.smoothing.robust import Tie, judged
 from lhdmap.smoothing.settings import SmoothingSettings
+from lhdmap.smoothing.space import smoothed_in_space
 from lhdmap.smoothing.steps import step_covariances
 
 _PLANAR = [0, 1, 5]  # of a pose: x, y, heading
@@ -28,7 +28,8 @@ class Correction(NamedTuple):
     """Planar corrections of the odometry: `T_map_odom` (N, 3) at `times_ns` (N,), and the number of closures behind them.
 
     `end_covariance` (3, 3): of the last key, in its axes, where closures or a gyroscope were used; `raised_m` (N,): what the heights
-    change by; `left` (N, 2): of the error of a step's heading, share of its variance, and what adds up with time (rad/s).
+    change by; `left` (N, 2): of the error of a step's heading, share of its variance, and what adds up with time (rad/s). `height_std_m`: of the last
+    key, where closures were used in space.
     """
 
     times_ns: npt.NDArray[np.int64]
@@ -37,6 +38,7 @@ class Correction(NamedTuple):
     end_covariance: FloatArray | None = None
     raised_m: FloatArray | None = None
     left: FloatArray | None = None
+    height_std_m: float | None = None
 
 
 class Smoother:
@@ -50,12 +52,12 @@ class Smoother:
     def correction(
         self,
         moved: Sequence[Correction] = (),
-        heights_m: Callable[[npt.NDArray[np.int64]], FloatArray] | None = None,
+        floor: Callable[[npt.NDArray[np.int64]], FloatArray] | None = None,
     ) -> Correction | None:
         """Return how the path is to be moved, or None where no place was seen twice.
 
-        The path is the odometry's, as realignment and gyroscope have `moved` it, one after the other. `heights_m` tells that of the
-        floor at times (N,).
+        The path is the odometry's, as realignment and gyroscope have `moved` it, one after the other. `floor` tells height (m), roll and
+        pitch (rad) at times (N,) as (N, 3), where an inclinometer does: then the graph is one in space.
         """
         keys = self._moved(moved)
         refused: list[Refusal] = []
@@ -63,12 +65,15 @@ class Smoother:
         closures = self._believed(keys, found, refused)
         if not closures:
             return None
-        poses, end = smoothed(keys, closures, self._settings)
+        times_ns = np.array([key.time_ns for key in keys], dtype=np.int64)
+        raised, height_std_m = None, None
+        if floor is None:
+            poses, end = smoothed(keys, closures, self._settings)
+        else:
+            poses, raised, end, height_std_m = smoothed_in_space(keys, floor(times_ns), closures, self._settings)
         moves = np.array([se2.compose(pose, se2.inverse(key.pose)) for pose, key in zip(poses, keys, strict=True)])
         moves[:, 2] = np.unwrap(moves[:, 2])
-        times_ns = np.array([key.time_ns for key in keys], dtype=np.int64)
-        raised = None if heights_m is None else closed_heights(keys, heights_m(times_ns), closures)
-        return Correction(times_ns, moves, len(closures), end, raised)
+        return Correction(times_ns, moves, len(closures), end, raised, height_std_m=height_std_m)
 
     def end_covariance(self, moved: Sequence[Correction]) -> FloatArray:
         """Return the covariance (3, 3) of the last key on the path as it was `moved`, without closures."""

@@ -13,7 +13,9 @@ from lhdmap.odometry.settings import OdometrySettings
 DT_S = 0.04
 
 
-def _drive(factor: float = 1.0, bias_dps: float = 0.2, seconds: float = 60.0, frozen: bool = False) -> tuple[GyroTurn, Motion]:
+def _drive(
+    factor: float = 1.0, bias_dps: float = 0.2, seconds: float = 60.0, frozen: bool = False
+) -> tuple[GyroTurn, Motion]:
     """Drive through bends that walls see; the gyroscope turns `factor` times as far, with a bias."""
     motion = Motion(OdometrySettings())
     gyro, pose = GyroTurn(motion), np.zeros(3)

@@ -18,7 +18,9 @@ SECONDS = 20
 
 def _attitude(t: float) -> FloatArray:
     """Roll, pitch and heading of a machine that sways on a slope while it turns."""
-    return np.array([0.05 * math.sin(5.0 * t), 0.08 + 0.04 * math.sin(3.0 * t + 1.0), 0.3 * t + 0.2 * math.sin(0.7 * t)])
+    return np.array(
+        [0.05 * math.sin(5.0 * t), 0.08 + 0.04 * math.sin(3.0 * t + 1.0), 0.3 * t + 0.2 * math.sin(0.7 * t)]
+    )
 
 
 def _rates(t: float) -> FloatArray:
@@ -90,7 +92,9 @@ def test_its_noise_is_learned_from_its_readings(noise_dps: float) -> None:
         rate = message.angular_velocity_rps
         assert rate is not None
         gyro.update(message._replace(angular_velocity_rps=rate + math.radians(noise_dps) * rng.standard_normal(3)))
-    assert gyro.noise_deg_sqrt_h == pytest.approx(1.2 * noise_dps * 6.0, rel=0.25)  # 0.1 deg/s at 100 Hz: 0.6 deg/sqrt(h)
+    assert gyro.noise_deg_sqrt_h == pytest.approx(
+        1.2 * noise_dps * 6.0, rel=0.25
+    )  # 0.1 deg/s at 100 Hz: 0.6 deg/sqrt(h)
 
 
 def test_what_the_message_tells_of_its_noise_counts() -> None:

@@ -83,7 +83,9 @@ def test_the_bias_is_learned_at_rest() -> None:
     t, true, scans = _drive(3, rest_s=120.0)
     found = fused_heading(Path((t * 1e9).astype(np.int64), scans), _gyro(t, true[:, 2], 3, 80.0), NOISE)
     assert isinstance(found, Heading)
-    assert math.degrees(found.bias_rps) * 3600.0 == pytest.approx(80.0, abs=3.5 * math.degrees(found.bias_std_rps) * 3600.0)
+    assert math.degrees(found.bias_rps) * 3600.0 == pytest.approx(
+        80.0, abs=3.5 * math.degrees(found.bias_std_rps) * 3600.0
+    )
     assert math.degrees(found.bias_std_rps) * 3600.0 < 3.0
 
 

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import argparse
 import math
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -42,7 +41,9 @@ def _line(rng: np.random.Generator, length_m: float) -> tuple[tuple[float, float
         x, y, z = points[-1]
         rise_m = step_m * float(rng.uniform(-0.08, 0.08))
         points.append((x + step_m * math.cos(heading), y + step_m * math.sin(heading), z + rise_m))
-        heading = float(np.clip(heading + rng.choice([-1.0, 1.0]) * rng.uniform(0.15, 0.95), -_MOST_OFF_RAD, _MOST_OFF_RAD))
+        heading = float(
+            np.clip(heading + rng.choice([-1.0, 1.0]) * rng.uniform(0.15, 0.95), -_MOST_OFF_RAD, _MOST_OFF_RAD)
+        )
         way_m += step_m
     return tuple(points)
 
