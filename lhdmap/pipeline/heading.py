@@ -24,8 +24,7 @@ def gyro_correction(pipeline: MappingPipeline, rows: Rows) -> Correction | None:
         pipeline.told.extend([found] if found else [])
         return None
     if found.left_out > 0.0:
-        pipeline.told.append(
-            f"gyroscope: it contradicts the scans over {100.0 * found.left_out:.1f} % of the drive; left out there"
-        )
+        share = f"{100.0 * found.left_out:.1f} %"
+        pipeline.told.append(f"gyroscope: it contradicts the scans over {share} of the drive; left out there")
     left = np.column_stack([found.share, np.full(len(found.share), found.bias_std_rps) * (1.0 - found.share)])
     return Correction(rows.times_ns, moves_of(path, found.turned_rad), 0, left=left)

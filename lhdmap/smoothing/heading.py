@@ -1,11 +1,11 @@
 """Heading over the whole drive: the scans' turn and the gyroscope's, weighed by what each is wrong by.
 
-Scans drift with the way and in bends, a gyroscope with time: its bias is constant for minutes, its noise walks. Over blocks of some
-seconds both say how far the machine has turned; their difference is
+Scans drift with the way and in bends, a gyroscope with time: its bias is constant for minutes, its noise walks. Over blocks of
+some seconds both say how far the machine has turned; their difference is
 
     gyro - scans = bias dt + scale turn + noise(gyro) - noise(scans)
 
-Bias (in segments that walk) and scale are the least squares solution of all blocks, so that standing still teaches the bias without
+Bias (in segments that walk) and scale are the least squares solution of all blocks: standing still teaches the bias without
 anyone saying that the machine stands. Then each block's turn is the mean of both by their variances. Robust: what is beyond
 Tukey's cut-off is no gyroscope's noise, and a gyroscope is not used at all where it is not like the scans over the drive.
 """
@@ -148,7 +148,7 @@ def _constants(
     size = int(segment[-1]) + 2
     H, g = np.zeros((size, size)), np.zeros(size)
     np.add.at(H, (segment, segment), information * blocks.dt**2)
-    np.add.at(H, (segment, -1), information * blocks.dt * blocks.scans)
+    H[:-1, -1] = np.bincount(segment, information * blocks.dt * blocks.scans)
     np.add.at(g, segment, information * blocks.dt * difference)
     H[-1, :-1] = H[:-1, -1]
     H[-1, -1] = float((information * blocks.scans**2).sum()) + 1.0 / _SCALE_STD**2

@@ -27,9 +27,9 @@ _BLOCK = 50_000  # poses moved at a time: what is needed on the way is ten times
 class Correction(NamedTuple):
     """Planar corrections of the odometry: `T_map_odom` (N, 3) at `times_ns` (N,), and the number of closures behind them.
 
-    `end_covariance` (3, 3): of the last key, in its axes, where closures or a gyroscope were used; `raised_m` (N,): what the heights
-    change by; `left` (N, 2): of the error of a step's heading, share of its variance, and what adds up with time (rad/s). `height_std_m`: of the last
-    key, where closures were used in space.
+    `end_covariance` (3, 3): of the last key, in its axes, where closures were used; `raised_m` (N,): what the heights change by;
+    `left` (N, 2): what a gyroscope leaves of the error of a step's heading: share of its variance, and what adds up with time
+    (rad/s); `height_std_m`: of the last key, where loops were closed in space.
     """
 
     times_ns: npt.NDArray[np.int64]
@@ -56,8 +56,8 @@ class Smoother:
     ) -> Correction | None:
         """Return how the path is to be moved, or None where no place was seen twice.
 
-        The path is the odometry's, as realignment and gyroscope have `moved` it, one after the other. `floor` tells height (m), roll and
-        pitch (rad) at times (N,) as (N, 3), where an inclinometer does: then the graph is one in space.
+        The path is the odometry's, as realignment and gyroscope have `moved` it, one after the other. `floor` tells height (m),
+        roll and pitch (rad) at times (N,) as (N, 3), where an inclinometer does: then the graph is one in space.
         """
         keys = self._moved(moved)
         refused: list[Refusal] = []

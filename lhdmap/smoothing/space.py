@@ -39,7 +39,9 @@ _PLANAR = [_X, _Y, _YAW]
 
 
 class InSpace(NamedTuple):
-    """Planar poses of the keys (N, 3), by how much each is raised (N,), m; of the last: covariance (3, 3), height's deviation (m)."""
+    """Planar poses of the keys (N, 3), by how much each is raised (N,), m; of the last: covariance (3, 3), deviation of
+    its height (m).
+    """
 
     poses: FloatArray
     raised_m: FloatArray
@@ -76,7 +78,7 @@ def smoothed_in_space(
 
 
 def _end_covariance(graph: Any, solved: Any, keys: list[KeyScan], floor: FloatArray) -> FloatArray:
-    """Return the covariance (6, 6) of the last key in its level axes; that of the odometry alone where gtsam has no digits left."""
+    """Return the covariance (6, 6) of the last key in its level axes; the odometry's own where gtsam has no digits left."""
     import gtsam
 
     try:

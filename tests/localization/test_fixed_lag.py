@@ -40,7 +40,7 @@ def _run(seed: int, wrong: range = range(0), turned: bool = False) -> tuple[Floa
         if k % 10 == 0:
             z = se2.compose(true, SEEN_STD * rng.standard_normal(3))
             if k in wrong:
-                z = z + [0.6, 0.3, 0.0]
+                z = z + np.array([0.6, 0.3, 0.0])
             R = _turned(np.diag(SEEN_STD**2), true[2])
             P = np.linalg.inv(np.linalg.inv(before.P) + np.linalg.inv(R))
             after = Belief(before.pose + P @ np.linalg.solve(R, z - before.pose), P)

@@ -21,7 +21,7 @@ def _drive(
     gyro, pose = GyroTurn(motion), np.zeros(3)
     for k in range(round(seconds / DT_S)):
         turn = (0.25 * math.sin(0.3 * k * DT_S)) * DT_S
-        pose = pose + [0.0, 0.0, turn]
+        pose = pose + np.array([0.0, 0.0, turn])
         motion.predict(DT_S)
         gyro.fuse(0.0 if frozen else factor * turn + math.radians(bias_dps) * DT_S, DT_S)
         motion.correct(pose, np.diag([1e5, 1e5, 1e7]))
@@ -30,7 +30,7 @@ def _drive(
 
 
 def test_where_walls_hold_the_heading_it_changes_nothing() -> None:
-    gyro, motion = _drive()
+    gyro, _ = _drive()
     assert gyro.believed
     assert gyro.used == 0
     assert gyro.warning() is None

@@ -20,7 +20,7 @@ def _drive(seed: int, rest_s: float = REST_S) -> tuple[FloatArray, FloatArray, F
     """Return times (N,), the true path (N, 3) and the scans' of 400 s; the machine stands at first."""
     rng = np.random.default_rng(seed)
     t = np.arange(0.0, 400.0 + rest_s, PERIOD_S)
-    moving = t > rest_s
+    moving = (t > rest_s).astype(float)
     rates = np.repeat(rng.uniform(-0.1, 0.1, -(-len(t) // 60)), 60)[: len(t)] * moving
     true_rad = np.cumsum(rates) * PERIOD_S
     drift = math.radians(0.02) * math.sqrt(SPEED_MPS * PERIOD_S) * np.cumsum(moving * rng.standard_normal(len(t)))

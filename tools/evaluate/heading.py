@@ -45,14 +45,14 @@ class _Pipeline(MappingPipeline):
 def driven(log: Path, changes: dict[str, Any] | None = None) -> Driven:
     """Run a log through the pipeline."""
     truth: list[GroundTruth] = []
-    with LogSource([log], {}) as source:
-        with _Pipeline(settings_from(_SETTINGS | (changes or {})), machine_of(source, None)) as pipeline:
-            for role, message in source.messages([*(r for r in ROLES_READ if r in source.roles), "ground_truth"]):
-                if isinstance(message, GroundTruth):
-                    truth.append(message)
-                else:
-                    pipeline.update(role, message)
-            pipeline.finish()
+    settings = settings_from(_SETTINGS | (changes or {}))
+    with LogSource([log], {}) as source, _Pipeline(settings, machine_of(source, None)) as pipeline:
+        for role, message in source.messages([*(r for r in ROLES_READ if r in source.roles), "ground_truth"]):
+            if isinstance(message, GroundTruth):
+                truth.append(message)
+            else:
+                pipeline.update(role, message)
+        pipeline.finish()
     odometry = pipeline.track.rows()
     rpy = se3.rpy_from_quaternions(np.array([one.quaternion_xyzw for one in truth]))
     rpy[:, 2] = np.unwrap(rpy[:, 2])
