@@ -37,12 +37,12 @@ class GyroSettings:
         doc="Random walk of the angle where its readings do not tell it; a quarter of it is the least that is believed.",
     )
     bias_deg_h: float = setting(
-        20.0,
+        5.0,
         unit="deg/h",
         minimum=0.0,
         maximum=1e5,
-        source="lhdmap: bias from switch-on to switch-on of calibrated industrial MEMS",
-        doc="Constant part of its error, standard deviation, before anything was learned of it.",
+        source="lhdmap: data sheets of calibrated industrial MEMS",
+        doc="Constant part of its error, standard deviation; where the scans see a larger one, that is taken.",
     )
     bias_walk_deg_h: float = setting(
         2.0,

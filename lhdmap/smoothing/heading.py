@@ -23,12 +23,12 @@ from lhdmap.messages import FloatArray
 _BLOCK_S, _STILL_M = 4.0, 0.02
 _SEGMENT_S, _MOST_SEGMENTS = 60.0, 300
 _JITTER_RAD = math.radians(0.02)  # of a scan's heading, at both ends of a block: it does not add up
-_WALK_RAD, _PER_TURN = math.radians(0.015), 0.001  # of scans, per root metre and per radian turned
+_WALK_RAD, _PER_TURN = math.radians(0.011), 0.001  # of scans, per root metre and per radian turned
 _SCALE_STD = 0.003
 _CUTOFF = 6.0
 _ROUNDS = 6
 _MOST_OUT, _MOST_LOUDER = 0.2, 30.0
-_MOST_SPREAD = 2.5
+_MOST_SPREAD, _CLEARLY = 2.5, 2.0
 _DEG_PER_SQRT_H = math.radians(1.0) / 60.0  # in rad per root second
 _DEG_PER_H = math.radians(1.0) / 3600.0
 
@@ -157,9 +157,10 @@ def _constants(
     for k in range(size - 2):
         H[k : k + 2, k : k + 2] += tie * np.array([[1.0, -1.0], [-1.0, 1.0]])
     mean = np.append(np.bincount(segment, blocks.dt) / blocks.dt.sum(), 0.0)
-    # A bias that the scans see to be larger than it should be is no reason to believe the scans less.
-    free = np.linalg.solve(H + np.diag(1e-9 * np.diag(H)), g)
-    H[0, 0] += 1.0 / max(noise.bias, abs(float(mean @ free)), 1e-9) ** 2
+    # A bias that the scans clearly see to be larger than it should be is no reason to believe the scans less.
+    free = np.linalg.inv(H + np.diag(1e-9 * np.diag(H)))
+    seen2 = float(mean @ free @ g) ** 2 - _CLEARLY**2 * float(mean @ free @ mean)
+    H[0, 0] += 1.0 / max(noise.bias**2, seen2, 1e-18)
     P = np.linalg.inv(H)
     found = P @ g
     return found[segment], float(found[-1]), math.sqrt(float(mean @ P @ mean))

@@ -39,9 +39,7 @@ _PLANAR = [_X, _Y, _YAW]
 
 
 class InSpace(NamedTuple):
-    """Planar poses of the keys (N, 3), by how much each is raised (N,), m; of the last: covariance (3, 3), deviation of
-    its height (m).
-    """
+    """Planar poses of the keys (N, 3), by how much each is raised (N,), m; of the last: covariance (3, 3), height's deviation."""
 
     poses: FloatArray
     raised_m: FloatArray

@@ -1,79 +1,21 @@
-"""Heading over long drives without revisits: odometry, realigned, with gyroscopes good and bad."""
+"""Heading over long drives without revisits: odometry, realigned, with gyroscopes good and bad (`evaluation/smoother.md`)."""
 
 from __future__ import annotations
 
 import argparse
-import pickle
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
-from lhdmap.config import settings_from
-from lhdmap.geometry import se3
-from lhdmap.logs.source import LogSource
-from lhdmap.messages import FloatArray, GroundTruth, LaserScan, PointCloud
-from lhdmap.pipeline.mapping import MappingPipeline
-from lhdmap.pipeline.mounts import machine_of
-from lhdmap.pipeline.outcome import ROLES_READ
-from lhdmap.pipeline.track import Rows, resample
+from lhdmap.geometry import se2
+from lhdmap.messages import FloatArray
+from lhdmap.pipeline.track import Rows
 from lhdmap.proprioception.gyro import GyroSettings
 from lhdmap.smoothing.heading import GyroNoise, Heading, fused_heading
-from lhdmap.smoothing.heading import Path as Path2
+from lhdmap.smoothing.heading import Path as PlanarPath
 
-from tools.evaluate.heading_drives import LENGTH_M, drive_of
-
-_SETTINGS = {"pile.method": "off", "topology.method": "off"}
-
-
-class Driven(NamedTuple):
-    """What is kept of a drive: paths at the processed scans by odometry, realigned, and true, key scans, the gyroscope's turn."""
-
-    odometry: Rows
-    final: Rows
-    truth: Rows
-    keys: Any
-    gyro: FloatArray
-
-
-class _Pipeline(MappingPipeline):
-    """The pipeline without the cloud."""
-
-    def _hold(self, role: str, time_ns: int, sweep: LaserScan | PointCloud) -> None:
-        pass
-
-
-def driven(log: Path, changes: dict[str, Any] | None = None) -> Driven:
-    """Run a log through the pipeline."""
-    truth: list[GroundTruth] = []
-    settings = settings_from(_SETTINGS | (changes or {}))
-    with LogSource([log], {}) as source, _Pipeline(settings, machine_of(source, None)) as pipeline:
-        for role, message in source.messages([*(r for r in ROLES_READ if r in source.roles), "ground_truth"]):
-            if isinstance(message, GroundTruth):
-                truth.append(message)
-            else:
-                pipeline.update(role, message)
-        pipeline.finish()
-    odometry = pipeline.track.rows()
-    rpy = se3.rpy_from_quaternions(np.array([one.quaternion_xyzw for one in truth]))
-    rpy[:, 2] = np.unwrap(rpy[:, 2])
-    true = Rows(
-        np.array([one.stamp_ns for one in truth], dtype=np.int64),
-        np.column_stack([np.array([one.position_m for one in truth]), rpy]),
-    )
-    keys = [key._replace(points=key.points[:0]) for key in pipeline.smoother.keys.keys]
-    times = odometry.times_ns
-    return Driven(odometry, pipeline.path.final.rows(), resample(true, times), keys, pipeline.turns.at(times))
-
-
-def kept(seed: int, folder: Path, length_m: float) -> Driven:
-    """Return a drive, run where the folder does not have it."""
-    log = drive_of(seed, folder, length_m)
-    file = log.with_suffix(".pickle")
-    if not file.is_file():
-        file.write_bytes(pickle.dumps(driven(log)))
-    found = pickle.loads(file.read_bytes())  # noqa: S301
-    assert isinstance(found, Driven)
-    return found
+from tools.evaluate.heading_drives import LENGTH_M
+from tools.evaluate.heading_runs import Driven, kept
 
 
 class Bad(NamedTuple):
@@ -86,7 +28,7 @@ class Bad(NamedTuple):
 
 GYROSCOPES = {
     "none": None,
-    "0.3 deg/sqrt(h), bias taken off": Bad(0.3, 0.0),
+    "0.3 deg/sqrt(h), no bias, and `gyro.bias_deg_h` says so": Bad(0.3, 0.0, "known"),
     "0.3 deg/sqrt(h), 5 deg/h": Bad(0.3, 5.0),
     "... after a rest of 60 s": Bad(0.3, 5.0, "rest"),
     "0.6 deg/sqrt(h), 20 deg/h": Bad(0.6, 20.0),
@@ -101,6 +43,7 @@ GYROSCOPES = {
     "scale 1 % off": Bad(0.3, 5.0, "scale"),
 }
 _REST_S, _DRAWS = 60.0, 3
+_PLANAR = [0, 1, 5]  # of a pose: x, y, heading
 
 
 def measured(true_rad: FloatArray, t: FloatArray, bad: Bad, rng: np.random.Generator) -> FloatArray:
@@ -135,8 +78,8 @@ def error_deg(one: Driven, bad: Bad | None, seed: int) -> float:
         turned = measured(true_rad - true_rad[0], (times - times[0]) * 1e-9, bad, rng)
         defaults = GyroSettings()
         told = max(1.2 * bad.walk, 0.25 * defaults.noise_deg_sqrt_h)  # as learned from its readings
-        noise = GyroNoise.of(told, defaults.bias_deg_h, defaults.bias_walk_deg_h)
-        found = fused_heading(Path2(times, poses), np.column_stack([turned, np.zeros(len(turned))]), noise)
+        noise = GyroNoise.of(told, 0.2 if bad.kind == "known" else defaults.bias_deg_h, defaults.bias_walk_deg_h)
+        found = fused_heading(PlanarPath(times, poses), np.column_stack([turned, np.zeros(len(turned))]), noise)
         heading += found.turned_rad if isinstance(found, Heading) else 0.0
     error = heading - true_rad
     return float(np.degrees(error[-1] - error[0]))
@@ -146,6 +89,12 @@ def drift_deg_per_km(path: Rows, truth: Rows) -> float:
     """Return the heading's error at the end against the start, per kilometre."""
     error = path.poses[:, 5] - truth.poses[:, 5]
     return float(np.degrees(error[-1] - error[0]) / way_m(truth) * 1e3)
+
+
+def end_m(path: Rows, truth: Rows) -> float:
+    """Return how far the end is off in the plane, both paths from the same start."""
+    own, true = (se2.between(rows.poses[0, _PLANAR], rows.poses[-1, _PLANAR]) for rows in (path, truth))
+    return float(np.hypot(*(own - true)[:2]))
 
 
 def way_m(path: Rows) -> float:
@@ -169,7 +118,7 @@ def table(drives: list[Driven]) -> str:
             [1e3 * error_deg(one, bad, 10 * k + n) / way_m(one.truth) for k, one in enumerate(drives) for n in draws],
         )
     heights = [float(np.abs((p := one.final.poses[:, 2] - one.truth.poses[:, 2]) - p[0]).max()) for one in drives]
-    ends = [float(np.hypot(*(one.final.poses - one.truth.poses)[-1, :2])) for one in drives]
+    ends = [end_m(one.final, one.truth) for one in drives]
     rows += ["", f"End in the plane, realigned: {np.mean(ends):.1f} m off on the mean, {np.max(ends):.1f} m at most."]
     rows += [
         f"Height: {np.mean(heights):.3f} m off at most on the mean of the drives, {np.max(heights):.3f} m in the worst."
