@@ -21,6 +21,7 @@ from lhdmap.settings import setting
 
 _MORE, _LEAST = 1.2, 0.25  # of the random walk: readings that were filtered look quieter than they are
 _MOST_WALKS = 1000
+_KEEP_S = 60.0  # a scan waits for a second at most
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,7 +59,6 @@ class GyroSettings:
     max_rate_dps: float = setting(
         100.0, unit="deg/s", minimum=1.0, doc="A reading that is larger cannot be: a unit is wrong, or it was a jump."
     )
-    keep_s: float = setting(60.0, unit="s", minimum=1.0, doc="Readings are kept for this long.")
 
 
 class Gyro:
@@ -68,7 +68,7 @@ class Gyro:
         """Args: `lag_s`: of roll and pitch; `R_base_sensor`: mount, shape (3, 3); None where its axes are the body's."""
         self._settings, self.warnings = settings, Warnings()
         self._R = np.eye(3) if R_base_sensor is None else np.asarray(R_base_sensor, dtype=float)
-        self._samples = SampleBuffer("gyroscope", 3, settings.keep_s, self.warnings)
+        self._samples = SampleBuffer("gyroscope", 3, _KEEP_S, self.warnings)
         self._lag_ns, self._waiting = round(lag_s * 1e9), deque[tuple[int, FloatArray]]()
         self._rate_rps = math.nan
         self.impossible = self.taken = 0
