@@ -88,7 +88,11 @@ def fused_heading(path: Path, turned: FloatArray, noise: GyroNoise) -> Heading |
     if known.sum() < 2:
         return ""
     difference = np.where(known, blocks.gyro - blocks.scans, 0.0)
-    weight, walk = known.astype(float), noise.walk
+    walk, usual = noise.walk, float(np.median((difference / blocks.dt)[known]))
+    first = (difference - usual * blocks.dt) / np.sqrt(blocks.variance + walk**2 * blocks.dt)
+    weight = _weights(
+        first, known, float(1.4826 * np.median(np.abs(first[known])))
+    )  # a jump would be bias and noise else
     spread = 1.0  # of the scans' deviations
     for _ in range(_ROUNDS):
         scans = spread**2 * blocks.variance
@@ -101,7 +105,7 @@ def fused_heading(path: Path, turned: FloatArray, noise: GyroNoise) -> Heading |
             wider = min(spread * louder, _MOST_SPREAD)
             rest = louder**2 * variance - wider**2 * blocks.variance - walk**2 * blocks.dt
             spread, walk = wider, math.sqrt(walk**2 + max(float(np.median((rest / blocks.dt)[known])), 0.0))
-        weight = known * np.maximum(1.0 - (sigmas / (_CUTOFF * max(louder, 1.0))) ** 2, 0.0) ** 2
+        weight = _weights(sigmas, known, louder)
     left_out = float(1.0 - (weight[known] > 0.0).mean())
     if left_out > _MOST_OUT or walk > _MOST_LOUDER * noise.walk:
         return f"gyroscope: it is not like the scans over {100.0 * left_out:.0f} % of the drive; heading is the scans' alone"
@@ -112,6 +116,12 @@ def fused_heading(path: Path, turned: FloatArray, noise: GyroNoise) -> Heading |
     at = t[blocks.ends]
     inside = np.clip(np.searchsorted(at, t, side="right") - 1, 0, len(share) - 1)
     return Heading(np.interp(t, at, turns), share[inside], float(bias.mean()), bias_std, walk, left_out)
+
+
+def _weights(sigmas: FloatArray, known: npt.NDArray[np.bool_], spread: float) -> FloatArray:
+    """Return Tukey's weights of blocks that are so many deviations off; `spread`: what they usually are."""
+    weights: FloatArray = known * np.maximum(1.0 - (sigmas / (_CUTOFF * max(spread, 1.0))) ** 2, 0.0) ** 2
+    return weights
 
 
 def _blocks(path: Path, turned: FloatArray) -> _Blocks:

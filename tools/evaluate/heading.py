@@ -30,7 +30,7 @@ GYROSCOPES = {
     "none": None,
     "0.3 deg/sqrt(h), no bias, and `gyro.bias_deg_h` says so": Bad(0.3, 0.0, "known"),
     "0.3 deg/sqrt(h), 5 deg/h": Bad(0.3, 5.0),
-    "... after a rest of 60 s": Bad(0.3, 5.0, "rest"),
+    "... after a rest of 5 min": Bad(0.3, 5.0, "rest"),
     "0.6 deg/sqrt(h), 20 deg/h": Bad(0.6, 20.0),
     "0.6 deg/sqrt(h), 720 deg/h": Bad(0.6, 720.0),
     "noisy: 10 deg/sqrt(h)": Bad(10.0, 720.0),
@@ -42,7 +42,7 @@ GYROSCOPES = {
     "bias jumps by 720 deg/h": Bad(0.3, 5.0, "bias"),
     "scale 1 % off": Bad(0.3, 5.0, "scale"),
 }
-_REST_S, _DRAWS = 60.0, 3
+_REST_S, _DRAWS = 300.0, 3
 _PLANAR = [0, 1, 5]  # of a pose: x, y, heading
 
 
