@@ -28,7 +28,7 @@ _SCALE_STD = 0.003
 _CUTOFF = 6.0
 _ROUNDS = 6
 _MOST_OUT, _MOST_LOUDER = 0.2, 30.0
-_MOST_SPREAD, _CLEARLY = 2.5, 2.0
+_MOST_SPREAD, _CLEARLY = 2.5, 1.4
 _DEG_PER_SQRT_H = math.radians(1.0) / 60.0  # in rad per root second
 _DEG_PER_H = math.radians(1.0) / 3600.0
 
