@@ -124,7 +124,7 @@ class FrontEnd:
         return [
             *self.mounts.warnings,
             *self.attitude.texts(),
-            *self.gyro.warnings.texts(),
+            *self.gyro.texts(),
             *self.wheels.warnings.texts(),
             *self.sweep_times.warnings,
         ]

@@ -21,6 +21,7 @@ from lhdmap.settings import setting
 
 _MORE, _LEAST = 1.2, 0.25  # of the random walk: readings that were filtered look quieter than they are
 _MOST_WALKS = 1000
+_MOST_IMPOSSIBLE = 0.01
 _KEEP_S = 60.0  # a scan waits for a second at most
 
 
@@ -123,6 +124,14 @@ class Gyro:
         period_s = float(np.median(np.diff(stamps))) * 1e-9
         white = 1.4826 * float(np.median(np.abs(np.diff(rates, n=3)))) / THIRD_DIFFERENCE
         self._walks.append((white if self._told_rps is None else self._told_rps) * math.sqrt(period_s))
+
+    def texts(self) -> list[str]:
+        """Return what was odd, in words."""
+        told = self.warnings.texts()
+        if self.impossible > _MOST_IMPOSSIBLE * (self.taken + self.impossible):
+            most = f"{self._settings.max_rate_dps:g} deg/s"
+            told.append(f"gyroscope: {self.impossible} readings of more than {most} were left out: is it in degrees?")
+        return told
 
     def turned_at(self, times_ns: npt.NDArray[np.int64]) -> FloatArray:
         """Return turn (rad) and seconds of which it is not known (N, 2), both since the first reading; NaN beyond the readings."""

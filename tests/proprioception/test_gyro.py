@@ -74,6 +74,7 @@ def test_degrees_for_radians_cannot_be() -> None:
     for message in _messages(np.eye(3), 57.3):
         gyro.update(message)
     assert gyro.impossible > gyro.taken
+    assert any("is it in degrees?" in text for text in gyro.texts())
 
 
 def test_a_message_without_a_rate_says_nothing() -> None:
