@@ -25,6 +25,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="X,Y,DEG|NAME",
         help="about where the drive begins: a pose or a waypoint (default: it is searched for)",
     )
+    parser.add_argument(
+        "--smoother",
+        action="store_true",
+        help="poses of a fixed-lag smoother: each is final once the machine is 15 m farther",
+    )
 
 
 def run(arguments: argparse.Namespace, console: Console) -> int:
@@ -46,6 +51,7 @@ def run(arguments: argparse.Namespace, console: Console) -> int:
             start_of(arguments.start, arguments.map) if arguments.start else None,
             progress_of(console),
             arguments.force,
+            arguments.smoother,
         )
     )
     for text in result.summary["warnings"]:

@@ -25,6 +25,7 @@ from lhdmap.landmarks.model import Landmarks
 from lhdmap.landmarks.store import read_landmarks
 from lhdmap.localization.changes import WorldChanges
 from lhdmap.localization.finder import Finder
+from lhdmap.localization.fixed_lag import Belief, FixedLag, Step, placed_row
 from lhdmap.localization.method import Tracks, Wheels
 from lhdmap.localization.paper import PaperTracker
 from lhdmap.localization.paper_nodes import PaperNodes
@@ -107,7 +108,8 @@ class Localizer:
     """Takes messages by role in time order; `rows` is what it said of each front scan, `where` the newest.
 
     `start` (4,): x, y, yaw (rad) and height about where the machine begins; None: it is searched for. `live`: a running machine,
-    where nothing waits for a search; of a log each is waited for, so that the rows are the same each time. A context manager.
+    where nothing waits for a search; of a log each is waited for, so that the rows are the same each time. With
+    `smoother` a row's pose is that of the fixed-lag smoother once the machine is some metres farther. A context manager.
     """
 
     def __init__(
@@ -119,7 +121,9 @@ class Localizer:
         listener: Listener | None = None,
         *,
         live: bool = False,
+        smoother: bool = False,
     ) -> None:
+        self._lag = FixedLag() if smoother else None
         # What lies beyond the map does not count: no loop is closed, no pile looked for.
         settings = replace(settings, pile=replace(settings.pile, method="off"))
         self._settings, self._floor_m = settings.localization, settings.odometry.min_height_m
@@ -174,6 +178,8 @@ class Localizer:
     def finish(self) -> None:
         """Say that the log has ended."""
         self.pipeline.finish()
+        for one in self._lag.restart() if self._lag is not None else ():
+            self.rows[one.row] = placed_row(self.rows[one.row], one, self._placer)
 
     def pose_at(self, now_ns: int) -> Where:
         """Return where the machine is now: the newest place carried on as the odometry is (`MappingPipeline.pose_at`)."""
@@ -220,6 +226,7 @@ class Localizer:
                 self._tracker.predict(moved, *self._carried(step))
         self._time_ns = step.time_ns
         self._before = step.T_odom_base.copy()
+        predicted = self._belief()
         source, points = "", np.zeros((0, 2))
         if step.processed:
             points, front = self._hits(step, odometry)
@@ -233,9 +240,25 @@ class Localizer:
         self.rows.append(
             self._row(stamp_ns, step, source, 1e3 * (time.perf_counter() - began - self._finder.waited_s + waited_s))
         )
+        if self._lag is not None:
+            said = Step(len(self.rows) - 1, step.T_odom_base, step.error.covariance, odometry.gyro.turn_rad)
+            self._smooth(self._lag, said, predicted)
         self._set_against_the_map(stamp_ns, points)  # the place has not waited for it
         if self._listener is not None:
             self._listener(stamp_ns, step, odometry)
+
+    def _belief(self) -> Belief | None:
+        return None if self._tracker is None else Belief(self._tracker.pose.copy(), self._tracker.P.copy())
+
+    def _smooth(self, lag: FixedLag, step: Step, predicted: Belief | None) -> None:
+        """Hand a scan to the smoother; rewrite the rows that are final."""
+        believed = self._belief()
+        if believed is None or predicted is None or self._status != TRACKING:
+            final = lag.restart()
+        else:
+            final = lag.take(step, predicted, believed)
+        for one in final:
+            self.rows[one.row] = placed_row(self.rows[one.row], one, self._placer)
 
     def _set_against_the_map(self, stamp_ns: int, points: FloatArray) -> None:
         """Note what is not as in the map, where the place is known, or was until a moment ago."""

@@ -31,10 +31,12 @@ from lhdmap.movement.routes import RouteOptions, route
 from lhdmap.odometry.cloud_odometry import CloudStep
 from lhdmap.odometry.steps import OdometryStep
 from lhdmap.pile.stage import ScanHits
+from lhdmap.pipeline.heading import gyro_correction
 from lhdmap.pipeline.inspection import Inspection
 from lhdmap.pipeline.localize import Localizer
 from lhdmap.pipeline.mapping import MappingPipeline
 from lhdmap.pipeline.pile import PileWatch, PlacedScan
+from lhdmap.pipeline.track import Rows
 from lhdmap.rockbreaker.machine import Rockbreaker
 from lhdmap.simulation.grizzly import simulate_grizzly
 from lhdmap.smoothing.trust import expected_error
@@ -108,6 +110,22 @@ def run(settings: Settings, stream: Stream, primary: Literal["front", "points"] 
         pipeline.warnings,
         pipeline.sweeps.warnings,
     )
+
+
+def turning(settings: Settings) -> str:
+    """Return the digest of how a gyroscope moves a path whose scans drift in heading."""
+    pipeline = MappingPipeline(settings)
+    for k, message in enumerate(streams.turning()):
+        pipeline.front_end.update("inclinometer", message)
+        late_ns = message.stamp_ns - 200_000_000
+        if k % 5 == 0 and late_ns > 0 and pipeline.front_end.gyro.there:
+            pipeline.turns.append(late_ns, pipeline.front_end.gyro.turned_at(np.array([late_ns]))[0])
+    t = np.arange(0.5, 119.0, 0.1)
+    heading = 0.4 * (1.0 - np.cos(0.5 * t)) + 1e-3 * np.cumsum(np.random.default_rng(9).standard_normal(len(t)))
+    x, y = 0.3 * np.cumsum(np.cos(heading)), 0.3 * np.cumsum(np.sin(heading))
+    zero = np.zeros(len(t))
+    rows = Rows(np.round(t * 1e9).astype(np.int64), np.column_stack([x, y, zero, zero, zero, heading]))
+    return digest(gyro_correction(pipeline, rows))
 
 
 def lap(settings: Settings) -> str:
@@ -294,6 +312,7 @@ PROBES: dict[str, Probe] = {
     "unlevelled": _mapped(streams.unlevelled, own=True),
     "faulty": _mapped(streams.faulty, own=True),
     "rare": _mapped(streams.rare, own=True),
+    "turning": turning,
     "level": _mapped(streams.planar),
     "smooth": _mapped(partial(streams.planar, 0.005)),
     "tachometer": _mapped(partial(streams.planar, wheels="tachometer")),
