@@ -6,7 +6,6 @@ messages -> MappingPipeline (odometry alone) -> steps -> Tracker against the map
 
 from __future__ import annotations
 
-import copy
 import math
 import time
 from collections import deque
@@ -71,7 +70,7 @@ class KnownMap(NamedTuple):
     def search(self, walls: MapWalls, settings: Settings) -> GlobalSearch:
         """Return what searches it, with walls of its own: it works in a thread of its own."""
         strips = strips_of(self.topology, self.landmarks, settings.landmarks)
-        return GlobalSearch(strips, copy.copy(walls), settings.localization, settings.landmarks)
+        return GlobalSearch(strips, walls.apart(), settings.localization, settings.landmarks)
 
 
 class Where(NamedTuple):
