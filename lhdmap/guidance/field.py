@@ -4,8 +4,8 @@ Nearest hits are found in each row first, across the rows by the lower envelope 
 
 Of the hits in a cell the one nearest to the predicted way stays, so that thinning makes no room. Whether a point of an outline
 is beyond a wall is told from within: from the body's axis one walks outward by as much as is known to be free (sphere tracing);
-a wall that is met before the outline is a wall that the outline has crossed. The sign needs neither normals nor a flood, which
-leaks through the gaps between hits far ahead.
+a hit that is passed before the outline is one of a wall that the outline has crossed. The sign needs neither normals nor a flood,
+which leaks through the gaps between hits far ahead.
 """
 
 from __future__ import annotations
@@ -21,7 +21,8 @@ from lhdmap.messages import FloatArray
 
 CELL_M = 0.10
 FAR_M = 3.0
-_TOUCH_M = 0.05
+_TOUCH_M = 0.12  # thinned hits of a wall are up to two cells apart: no look slips between them
+_PAST_M = 0.02
 _MARGIN_M = 5.5
 _MOST_CELLS = 400_000
 
@@ -161,11 +162,17 @@ def clearance(px: float, py: float, ax: float, ay: float, field: Field) -> tuple
     length = math.sqrt(wx * wx + wy * wy)
     wx, wy = wx / length, wy / length
     gone, _ = distance(ax, ay, field)
+    gone = max(gone - 0.5 * _TOUCH_M, 0.0)
     while gone < length:
-        free, _ = distance(ax + gone * wx, ay + gone * wy, field)
-        if free < _TOUCH_M:
-            return gone - length, -wx, -wy
-        gone += free
+        qx, qy = ax + gone * wx, ay + gone * wy
+        free, n = distance(qx, qy, field)
+        if free >= _TOUCH_M:
+            gone += free - 0.5 * _TOUCH_M
+            continue
+        before = (field.hits[n, 0] - qx) * wx + (field.hits[n, 1] - qy) * wy
+        if before <= 0.0:
+            return gone + before - length, -wx, -wy
+        gone += max(before, _PAST_M) + 1e-3
     d, n = distance(px, py, field)
     if n < 0:
         return FAR_M, 0.0, 0.0

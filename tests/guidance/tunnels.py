@@ -135,6 +135,32 @@ def walls_beside(
     return np.vstack(walls)
 
 
+def least_room_m(line: FloatArray, walls: FloatArray) -> float:
+    """The least room beside the bodies where the front axle follows the line."""
+    heading, lead = headings(line), lead_of(1, MODEL, BODIES)
+    bend, least = 0.0, math.inf
+    for k in range(len(line) - 1):
+        curvature = (heading[k + 1] - heading[k]) / STEP_M
+        bend += STEP_M * (curvature * (lead.lead_m * math.cos(bend) + lead.trail_m) - math.sin(bend)) / lead.trail_m
+        if k % 2 == 0:
+            near = walls[np.hypot(*(walls - line[k]).T) < 9.0]
+            least = min(least, room(np.array([*line[k], heading[k + 1], bend]), near))
+    return least
+
+
+def tunnel(
+    seed: int, c_m: float, radii_m: tuple[float, float] = (5.5, 15.0), length_m: float = 70.0, rms_m: float = 0.10
+) -> tuple[FloatArray, FloatArray]:
+    """A winding line and rough walls with an opening, the least room along the line as measured."""
+    line = winding_line(seed, radii_m, length_m)
+    opening_m = float(np.random.default_rng([seed, 5]).uniform(25.0, len(line) * STEP_M - 25.0))
+    c = c_m
+    for _ in range(3):
+        walls = walls_beside(line, c, seed, rms_m, opening_m)
+        c += c_m - least_room_m(line, walls)
+    return line, walls
+
+
 def _dense(wall: FloatArray) -> FloatArray:
     at, fine = np.arange(len(wall)), np.arange((len(wall) - 1) * _DENSE + 1) / _DENSE
     return np.column_stack([np.interp(fine, at, wall[:, n]) for n in range(2)])
