@@ -32,7 +32,9 @@ def problem_of(seed: int, c_m: float = 0.4) -> tuple[Problem, Field]:
     rng = np.random.default_rng(seed)
     line, walls = narrow(8.0, 60.0, c_m, seed)
     path = path_of(line, 2.5)
-    start = np.array([line[200, 0], line[200, 1] + rng.normal(0.0, 0.1), rng.normal(0.0, 0.03), rng.normal(0, 0.05), 0.0])
+    start = np.array(
+        [line[200, 0], line[200, 1] + rng.normal(0.0, 0.1), rng.normal(0.0, 0.03), rng.normal(0, 0.05), 0.0]
+    )
     at = int(np.hypot(path[:, 0] - start[0], path[:, 1] - start[1]).argmin())
     problem = Problem(start, np.full(COUNT, 1.8), 0.0, math.radians(12.0), STEP, path, at)
     way = line[200:290:3]

@@ -44,7 +44,10 @@ def winding_line(
         turn = math.radians(rng.uniform(20.0, 90.0))
         side = -math.copysign(1.0, turned) if abs(turned) > 0.8 else float(rng.choice([-1.0, 1.0]))
         turned += side * turn
-        parts += [np.full(round(turn * radius / STEP_M), side / radius), np.zeros(round(rng.uniform(5.0, 10.0) / STEP_M))]
+        parts += [
+            np.full(round(turn * radius / STEP_M), side / radius),
+            np.zeros(round(rng.uniform(5.0, 10.0) / STEP_M)),
+        ]
     return line_of(np.concatenate([*parts, np.zeros(round(ends_m / STEP_M))]))
 
 
