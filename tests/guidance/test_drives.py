@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 from lhdmap.guidance.settings import GuidanceSettings
 from lhdmap.messages import FloatArray
+from tools.evaluate.guidance import CLASSES, row_of
 
 from tests.guidance.planar_drive import Drive, Errors, drive
 from tests.guidance.tunnels import MODEL, bend_line, narrow, walls_beside
-from tools.evaluate.guidance import CLASSES, row_of
 
 SETTINGS = GuidanceSettings()
 

@@ -17,7 +17,6 @@ from typing import Any
 import numpy as np
 from lhdmap.config import settings_from
 from lhdmap.guidance.settings import GuidanceSettings
-
 from tests.guidance.planar_drive import Drive, Errors, drive
 from tests.guidance.tunnels import MACHINE, tunnel
 
