@@ -11,19 +11,23 @@ import argparse
 import json
 import math
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from lhdmap.config import Settings
+from lhdmap.geometry import se2
 from lhdmap.machine import Machine
 from lhdmap.messages import FloatArray
 from lhdmap.mine.network import make_network
 from lhdmap.mine.plan import load_plan
+from lhdmap.replay.assemble import parts_of
+from lhdmap.replay.parts import Parts
 from lhdmap.replay.run import ReplayRequest, replay
 from lhdmap.replay.scenario import Limits, Scenario
 from lhdmap.replay.teaching import teach
+from lhdmap.simulation.history import START_NS
 from lhdmap.simulation.mine_drive import MineDrive, MineDriveSettings
 from lhdmap.simulation.operator import OperatorSettings
 
@@ -103,6 +107,18 @@ def measured(plan: Path) -> float:
     return drive.min_clearance_m
 
 
+def as_mapped(parts: Parts, scenario: Scenario, folder: Path) -> Parts:
+    """Return the parts with start and goal where the map has them: the teaching drive's stops, not the plan's places."""
+    assert parts.autonomous is not None  # noqa: S101  # the scenario has a goal
+    first = np.loadtxt(folder / "map_teaching.truth.tum", max_rows=1)
+    origin = np.array([first[1], first[2], 2.0 * math.atan2(first[6], first[7])])
+    begin, end = (parts.autonomous.known.topology.called(name).pose for name in (scenario.start, scenario.goal))
+    x, y, yaw = se2.compose(origin, begin[[0, 1, 3]]).tolist()
+    state = parts.vehicle.at_rest(x, y, yaw, near_z_m=float(first[3]), time_ns=START_NS, load_kg=1000.0 * scenario.load)
+    goal = se2.compose(origin, end[[0, 1, 3]])
+    return replace(parts, start=state, goal_m=(float(goal[0]), float(goal[1]), float(first[3])))
+
+
 def run(folder: Path, made: Tunnel, kind: str, *, reverse: bool, load_t: float, seed: int) -> dict[str, Any]:
     """Replay a tunnel; return what came of it, also from a replay that is there."""
     target = folder / f"run_{'rev' if reverse else 'fwd'}_{load_t:.0f}t_{seed}"
@@ -114,7 +130,8 @@ def run(folder: Path, made: Tunnel, kind: str, *, reverse: bool, load_t: float, 
             limits=Limits(time_s=300.0),
         )  # fmt: skip
         begun = time.process_time()
-        replay(ReplayRequest(scenario, target, recording=False, force=True))
+        parts = as_mapped(parts_of(scenario, folder), scenario, folder)
+        replay(ReplayRequest(scenario, target, recording=False, force=True), parts)
         (target / "cpu_s.json").write_text(json.dumps(time.process_time() - begun))
     verdict = json.loads(told.read_text())
     states = [json.loads(line) for line in (target / "journal.jsonl").read_text().splitlines()]
