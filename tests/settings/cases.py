@@ -166,6 +166,7 @@ _SETTINGS = {
     "guidance.samples": Case("guided", base=_PRINTED),
     "guidance.lateral_mps2": Case("guided", 0.1),
     "guidance.rounds": Case("guided", base=_PRINTED),
+    "navigation.standing_mps": Case("navigated", 0.4),
     "navigation.room_m": Case("navigated", 20.0),
     "navigation.reached_likelihood_pm2": Case("navigated", 1e-4),
     "navigation.reached_std_m": Case("navigated", 3.0),

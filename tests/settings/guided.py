@@ -13,8 +13,10 @@ from lhdmap.driving.motion import Motion
 from lhdmap.guidance.directive import Directive
 from lhdmap.guidance.local_walls import LocalWalls
 from lhdmap.guidance.settings import GuidanceSettings
-from lhdmap.movement.routes import RoutePlanner
+from lhdmap.movement.route import Route, route_json
+from lhdmap.movement.routes import RouteOptions, RoutePlanner
 from lhdmap.navigation.control import Located, NavigationControl
+from lhdmap.navigation.room import with_room
 from lhdmap.topology.model import TopologicalMap
 
 from tests.guidance.planar_drive import Errors, drive
@@ -139,4 +141,15 @@ def trips(settings: Settings) -> list[Any]:
     for _ in range(30):
         unsure.std_m += 0.08
         unsure.go(0.5)
-    return [*told, held.said, slipping.said, unsure.said]
+    return [*told, held.said, slipping.said, unsure.said, _turned_in_a_stub(settings)]
+
+
+def _turned_in_a_stub(settings: Settings) -> list[Any]:
+    """Return the route to a goal that has to be come to the other way round: there is a stub to turn in."""
+    topology = _map()
+    planner = RoutePlanner(topology, settings.movement)
+
+    def ask(avoid: tuple[str, ...]) -> Route:
+        return planner.route("t2.start", "t1.start", RouteOptions("against", "against", avoid=avoid))
+
+    return [route_json(with_room(topology, ask, (), 3.2, 6.5, settings.navigation.room_m))]

@@ -30,7 +30,6 @@ from lhdmap.replay.teaching import teach
 from lhdmap.simulation.history import START_NS
 from lhdmap.simulation.mine_drive import MineDrive, MineDriveSettings
 from lhdmap.simulation.operator import OperatorSettings
-
 from tests.guidance.tunnels import STEP_M, swept_half_widths, winding_line
 
 _EVERY = 20  # line points of a plan's point: 2 m
@@ -109,7 +108,7 @@ def measured(plan: Path) -> float:
 
 def as_mapped(parts: Parts, scenario: Scenario, folder: Path) -> Parts:
     """Return the parts with start and goal where the map has them: the teaching drive's stops, not the plan's places."""
-    assert parts.autonomous is not None  # noqa: S101  # the scenario has a goal
+    assert parts.autonomous is not None  # the scenario has a goal
     first = np.loadtxt(folder / "map_teaching.truth.tum", max_rows=1)
     origin = np.array([first[1], first[2], 2.0 * math.atan2(first[6], first[7])])
     begin, end = (parts.autonomous.known.topology.called(name).pose for name in (scenario.start, scenario.goal))
