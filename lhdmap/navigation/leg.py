@@ -77,7 +77,7 @@ def _runs(states: Sequence[Step]) -> list[list[Step]]:
     run: list[Step] = []
     for step in states:
         run.append(step)
-        if step.stop and len({one.point for one in run}) > 1:
+        if step.stop and any(a.node == b.node and a.point != b.point for a, b in pairwise(run)):
             runs.append(run)
             run = [step]
         elif step.stop:

@@ -45,6 +45,8 @@ _SECTIONS = {
     "smoothing": Case("lap"),
     "landmarks": Case("landmarks"),
     "executor": Case("driven"),
+    "guidance": Case("guided"),
+    "navigation": Case("navigated"),
     "pile": Case("pile"),
     "figure9": Case("pile", base=_FOUND),
     "figure9_repaired": Case("pile", base={"pile.method": "figure9_repaired"}),
@@ -81,6 +83,7 @@ def _figure9(section: str, found: Mapping[str, Any]) -> dict[str, Case]:
 
 
 _WAITS = {"cloud_odometry.step_m": 5.0, "cloud_odometry.step_deg": 50.0, "cloud_odometry.step_s": 60.0}
+_PRINTED = {"guidance.method": "paper", "guidance.samples": 16, "guidance.rounds": 2}
 _SETTINGS = {
     "odometry.max_beams": Case("tilted", 100),
     "odometry.max_rear_beams": Case("tilted", 65),
@@ -165,6 +168,16 @@ _SETTINGS = {
     "localization.check_every_m": Case("carried_off", 1.0),
     "localization.start_std_m": Case("carried_off"),
     "localization.start_std_deg": Case("carried_off"),
+    "guidance.samples": Case("guided", base=_PRINTED),
+    "guidance.lateral_mps2": Case("guided", 0.1),
+    "guidance.rounds": Case("guided", base=_PRINTED),
+    "navigation.standing_mps": Case("navigated", 0.4),
+    "navigation.room_m": Case("navigated", 20.0),
+    "navigation.reached_likelihood_pm2": Case("navigated", 1e-4),
+    "navigation.reached_std_m": Case("navigated", 3.0),
+    "navigation.arrived_m": Case("navigated", 0.02),
+    "navigation.approach_mps": Case("navigated", 4.9),
+    "navigation.heading_deg": Case("navigated", 1.0),
     "pile.reach_m": Case("pile", 15.0),
     "pile.deadline_m": Case("pile", 20.0),
     "pile.sure": Case("pile", 0.9),

@@ -50,6 +50,7 @@ from tests.movement.mines import fast_ladder
 from tests.report.synthetic import START_NS, report_data
 from tests.report.test_recording import read
 from tests.settings import streams
+from tests.settings.guided import plans, remembered, stops, trips
 from tests.settings.streams import Stream
 
 Probe = Callable[[Settings], str]
@@ -303,6 +304,16 @@ def driven(settings: Settings) -> str:
     return digest(told)
 
 
+def guided(settings: Settings) -> str:
+    """Return the digest of what guidance commands in a narrow bend, and on the way to a stop."""
+    return digest(plans(settings.guidance), stops(settings.guidance), remembered(settings.guidance))
+
+
+def navigated(settings: Settings) -> str:
+    """Return the digest of what navigation control says and asks for on trips over a small map."""
+    return digest(trips(settings))
+
+
 def _mapped(stream: Callable[[], Stream], primary: Literal["front", "points"] = "front", *, own: bool = False) -> Probe:
     return lambda settings: run(settings, stream(), primary, own=own)
 
@@ -323,6 +334,8 @@ PROBES: dict[str, Probe] = {
     "cut": _mapped(streams.cut, "points"),
     "lap": lap,
     "driven": driven,
+    "guided": guided,
+    "navigated": navigated,
     "landmarks": landmarks,
     "pile": pile,
     "recording": recording,
