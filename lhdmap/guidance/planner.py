@@ -89,6 +89,12 @@ class Guidance:
         self._eyes_m, self._method = eyes_m, method
         self._last: Plan | None = None
 
+    def eyes_in_base(self, bend_rad: float) -> tuple[FloatArray, FloatArray]:
+        """Return the places (2,) of the front and the rear scanner in `base_link`, at a joint angle."""
+        behind = self.model.rear_m + self._eyes_m[-1]
+        rear = np.array([-self.model.front_m - behind * math.cos(bend_rad), behind * math.sin(bend_rad)])
+        return np.array([self._eyes_m[1], 0.0]), rear
+
     def forget(self) -> None:
         """Begin anew, without the last plan."""
         self._last = None

@@ -28,6 +28,7 @@ from lhdmap.localization.finder import Finder
 from lhdmap.localization.place_on_map import Placer
 from lhdmap.localization.rows import CANDIDATE, LOST, NOWHERE, TRACKING, UNKNOWN, Row
 from lhdmap.localization.search import CHECK, CONFIRM, FIND, Candidate, GlobalSearch, Search
+from lhdmap.localization.starting import Start, best_start
 from lhdmap.localization.strips import strips_of
 from lhdmap.localization.tracker import Tracker
 from lhdmap.localization.walls import MapWalls
@@ -99,8 +100,9 @@ class _Trial:
 class Localizer:
     """Takes messages by role in time order; `rows` is what it said of each front scan, `where` the newest.
 
-    `start` (4,): x, y, yaw (rad) and height about where the machine begins; None: it is searched for. `live`: a running machine,
-    where nothing waits for a search; of a log each is waited for, so that the rows are the same each time. A context manager.
+    `start` (4,): x, y, yaw (rad) and height about where the machine begins, or several (K, 4) of which the first scan chooses;
+    None: it is searched for. `live`: a running machine, where nothing waits for a search; of a log each is waited for, so that
+    the rows are the same each time. A context manager.
     """
 
     def __init__(
@@ -123,11 +125,13 @@ class Localizer:
         self._finder = Finder(search, self._settings, settings.landmarks, waits=not live)
         self._tracker = None if start is None else self._started(start)
         self._turnable = start is not None  # a waypoint's heading is its node's: the machine may face the other way
+        self._starts = None if start is None or start.ndim == 1 else start
         self._status = UNKNOWN if start is None else TRACKING
         self._trial: _Trial | None = None
         self._supports: deque[float] = deque(maxlen=self._settings.support_scans)
         self._before: FloatArray | None = None
         self._listener = listener
+        self.start: Start | None = None  # which of several it was
         self._travelled_m = 0.0
         self._probability = 0.0 if start is None else 1.0
         self._information = 0.0
@@ -184,6 +188,7 @@ class Localizer:
 
     def _started(self, start: FloatArray) -> Tracker:
         std = np.array([self._settings.start_std_m] * 2 + [math.radians(self._settings.start_std_deg)])
+        start = start if start.ndim == 1 else start[0]
         height = float(start[3]) if len(start) > 3 else 0.0
         return Tracker(self._walls, self._settings, start[:3], np.diag(std**2), height)
 
@@ -247,7 +252,11 @@ class Localizer:
             return "odometry" if tracker is not None else ""
         if self._turnable:
             self._turnable = False
-            tracker.turn_if_better(points)
+            if self._starts is None:
+                tracker.turn_if_better(points)
+            else:
+                self.start = best_start(self._walls, self._starts, points)
+                tracker.pose, tracker.height_m = self.start.pose.copy(), self.start.height_m
         place = self._placer.at(tracker.pose, tracker.height_m, 1.0)
         said = tracker.correct(points, front or len(points), self._walls.quality(place.node))
         tracker.height_m = self._placer.height_m(tracker.pose[0], tracker.pose[1], tracker.height_m)

@@ -11,7 +11,7 @@ import numpy as np
 from lhdmap.config import Settings
 from lhdmap.machine import Machine
 from lhdmap.messages import FloatArray
-from lhdmap.navigation.control import Located
+from lhdmap.navigation.along import Located
 from lhdmap.odometry.planar import PlanarOdometry
 from lhdmap.odometry.steps import OdometryStep
 from lhdmap.pipeline.localize import KnownMap, Localizer
@@ -79,4 +79,4 @@ class Locating(Process):
         points = np.concatenate([part[:, :2] for part in (odometry.points, odometry.points_behind)])
         lost = self.localizer.pipeline.records.lost_now
         apart = (math.inf, math.inf) if lost else (0.0, 0.0)
-        self._seen.append(Seen(stamp_ns, step.T_odom_base.copy(), points, *apart))
+        self._seen.append(Seen(stamp_ns, step.T_odom_base.copy(), points, *apart, len(odometry.points)))

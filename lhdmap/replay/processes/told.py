@@ -9,13 +9,17 @@ from lhdmap.messages import FloatArray
 
 
 class Seen(NamedTuple):
-    """Hits (N, 2) of both scanners in `base_link` at a pose (3,) in `odom`, and how far pose and scan disagree (m, rad)."""
+    """Hits (N, 2) of both scanners in `base_link` at a pose (3,) in `odom`, and how far pose and scan disagree (m, rad).
+
+    `front`: how many of the hits, the first ones, are of the front scanner.
+    """
 
     stamp_ns: int
     pose_odom: FloatArray
     points_m: FloatArray
     apart_m: float
     apart_rad: float
+    front: int
 
 
 class Asked(NamedTuple):
