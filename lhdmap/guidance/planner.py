@@ -22,7 +22,7 @@ from lhdmap.guidance.directive import Directive
 from lhdmap.guidance.field import Field, field_around
 from lhdmap.guidance.outline import Outline, outline_of
 from lhdmap.guidance.paper import PaperCost
-from lhdmap.guidance.profile import Speeds, sight_m, speeds_of
+from lhdmap.guidance.profile import Speeds, before_nose_m, sight_m, speeds_of
 from lhdmap.guidance.settings import GuidanceSettings
 from lhdmap.guidance.solver import Problem, Solution, rolled, solve
 from lhdmap.messages import FloatArray
@@ -121,7 +121,8 @@ class Guidance:
         solution = self._method(problem, rates, vehicle, self._outlines[directive.gear], field)
         seen = self._sight(directive, lead, start, at, field)
         rise = 0.0 if len(speeds) < 2 else (speeds[1] - speeds[0]) / settings.stage_s
-        told = speeds_of(solution, speeds, (speed, rise), directive, seen, self.model, settings)
+        ahead = before_nose_m(solution.states, field, float(lead.leading_m[:, 0].max()))
+        told = speeds_of(solution, speeds, (speed, rise), directive, seen, ahead, self.model, settings)
         setpoints = self._setpoints(now_ns + _COMPUTING_NS, before, solution, told, directive.gear)
         self._last = Plan(now_ns, directive.gear, setpoints, begin_ns, solution, told)
         return self._last

@@ -18,6 +18,7 @@ from lhdmap.topology.model import Point, TopologicalMap, Tunnel
 _HEADINGS = 8  # of an intersection
 _FEW_HITS = 150
 _ABOUT_M = 6.0
+_ALONG_M, _ALONG_STEP_M = 4.0, 0.8
 _STD = np.array([0.6, 0.6, math.radians(6.0)])  # poses are a metre apart, and a machine need not stand in the middle
 _KAPPA = 10.0  # hits that are neighbours share the map's errors
 _SAME_M, _SAME_RAD = 1.5, math.radians(30.0)
@@ -58,6 +59,13 @@ def poses_about(topology: TopologicalMap, point: Point) -> FloatArray:
 def poses_anywhere(topology: TopologicalMap) -> FloatArray:
     """Return poses (K, 4) in all nodes of a map."""
     return np.concatenate([np.zeros((0, 4)), *(poses_in(topology, node) for node in topology.nodes)])
+
+
+def poses_along(pose: FloatArray, height_m: float) -> FloatArray:
+    """Return poses (K, 4) before and behind a pose (3,), in its direction."""
+    way = np.arange(-_ALONG_M, _ALONG_M + 0.1, _ALONG_STEP_M)
+    x, y = pose[0] + way * math.cos(pose[2]), pose[1] + way * math.sin(pose[2])
+    return np.column_stack([x, y, np.full_like(way, pose[2]), np.full_like(way, height_m)])
 
 
 def best_start(walls: MapWalls, starts: FloatArray, points: FloatArray) -> Start:

@@ -2,7 +2,8 @@
 
 planning -> driving -> resting (a change of gear) -> driving … -> arrived
                | stuck: backing, and another try, at most twice; then the way is closed, and another route is planned
-               | no other route, place not known, overrun: assistance, until the station says to go on
+               | place not known: halted, on from there once it is known again
+               | no other route, place not known for long, overrun: assistance, until the station says to go on
 """
 
 from __future__ import annotations
@@ -30,6 +31,7 @@ from lhdmap.navigation.room import with_room
 from lhdmap.navigation.settings import NavigationSettings
 
 IDLE, DRIVING, RESTING, BACKING, ARRIVED, ASSISTANCE = "idle", "driving", "resting", "backing", "arrived", "assistance"
+HALTED = "halted"
 _STUCK_RESET_M = 8.0
 
 
@@ -59,7 +61,7 @@ class NavigationControl:
         self._tries = 0
         self._tried_at_m = -math.inf
         self._backing: tuple[Leg, float] | None = None
-        self._driven_m = 0.0
+        self._driven_m = self._speed_mps = 0.0
         self._before: FloatArray | None = None
         self._at_m = 0.0
         self._loaded = False
@@ -74,7 +76,7 @@ class NavigationControl:
 
     def go_on(self, located: Located) -> None:
         """Plan again from where the machine is, after it was helped."""
-        if self.state == ASSISTANCE and self.goal:
+        if self.state not in (IDLE, ARRIVED) and self.goal:
             self.go("", self.goal, located, loaded=self._loaded)
 
     def close(self, way: str) -> None:
@@ -108,6 +110,9 @@ class NavigationControl:
         if not self.legs:
             self._goes(ARRIVED, "already there")
             return
+        if self.legs[0].gear * self._speed_mps < -self._settings.standing_mps:
+            self._goes(RESTING, "the other gear", gear=self.legs[0].gear)
+            return
         told = {"legs": len(self.legs), "distance_m": route.distance_m, "gear": self.legs[0].gear, "begin": begin.point}
         self._goes(DRIVING, "route", goal=self.goal, **told)
 
@@ -116,12 +121,12 @@ class NavigationControl:
         self._count(motion)
         if self.state in (IDLE, ARRIVED, ASSISTANCE):
             return None
-        if not self.knows(located):
-            self._ask(f"place not known: {located.status}, deviation {located.deviation_m:.2f} m")
-            return None
         standing = abs(motion.speed_mps) < self._settings.standing_mps
+        if self.state == HALTED or not self.knows(located):
+            self._halt(now_ns, located, standing=standing)
+            return None
         if self.state == RESTING:
-            self._rest(now_ns)
+            self._rest(now_ns, standing=standing)
             return None
         if self.state == BACKING:
             return self._back(now_ns, motion, located, standing)
@@ -189,7 +194,21 @@ class NavigationControl:
         else:
             self._goes(RESTING, "inversion" if leg.inversion else "stop", gear=self.legs[self.leg].gear)
 
-    def _rest(self, now_ns: int) -> None:
+    def _halt(self, now_ns: int, located: Located, *, standing: bool) -> None:
+        """Stand where the place is not known; go on from there once it is, or ask after some time."""
+        settings, why = self._settings, f"{located.status}, deviation {located.deviation_m:.2f} m"
+        if self.state != HALTED:
+            self._since_ns = now_ns
+            self._goes(HALTED, f"place not known: {why}")
+        elif self.knows(located) and standing:
+            self._since_ns = 0
+            self.go("", self.goal, located, loaded=self._loaded)
+        elif (now_ns - self._since_ns) * 1e-9 > settings.wait_s:
+            self._ask(f"place not known: {why}")
+
+    def _rest(self, now_ns: int, *, standing: bool) -> None:
+        if not standing:
+            self._since_ns = now_ns
         if (now_ns - self._since_ns) * 1e-9 >= self._settings.inversion_s:
             self._since_ns = 0
             self._goes(DRIVING, "rested", gear=self.legs[self.leg].gear)
@@ -242,6 +261,7 @@ class NavigationControl:
         return part_of(now_ns, leg.gear, path, min(leg.stop_m, float(path[-1, 5]) - 1.0), at_m)
 
     def _count(self, motion: Motion) -> None:
+        self._speed_mps = motion.speed_mps
         place = np.array([motion.x_m, motion.y_m])
         if self._before is not None:
             self._driven_m += float(np.linalg.norm(place - self._before))

@@ -28,7 +28,7 @@ from lhdmap.localization.finder import Finder
 from lhdmap.localization.place_on_map import Placer
 from lhdmap.localization.rows import CANDIDATE, LOST, NOWHERE, TRACKING, UNKNOWN, Row
 from lhdmap.localization.search import CHECK, CONFIRM, FIND, Candidate, GlobalSearch, Search
-from lhdmap.localization.starting import Start, best_start
+from lhdmap.localization.starting import Start, best_start, poses_along
 from lhdmap.localization.strips import strips_of
 from lhdmap.localization.tracker import Tracker
 from lhdmap.localization.walls import MapWalls
@@ -44,6 +44,7 @@ from lhdmap.topology.sheet import Sheet, read_sheets
 
 _HITS_ABOVE_M = 1.0  # hits are flat: where they are shown over the floor
 _LEAST_LEFT = 0.25  # of the hits must be of walls that the map has, or nothing corrects the place
+_LOOK_NS, _NEAR_M, _SAME_M, _CLEARLY, _LEAST_HITS = 400_000_000, 5.0, 0.3, 0.05, 40
 _LEAST_SUPPORT = 0.35  # where a node's own scans tell of none
 
 
@@ -130,6 +131,8 @@ class Localizer:
         self._trial: _Trial | None = None
         self._supports: deque[float] = deque(maxlen=self._settings.support_scans)
         self._before: FloatArray | None = None
+        self._lost_m, self._look_ns = 0.0, 0
+        self._near: tuple[FloatArray, FloatArray] | None = None
         self._listener = listener
         self.start: Start | None = None  # which of several it was
         self._travelled_m = 0.0
@@ -210,6 +213,7 @@ class Localizer:
             self._finder.add(step.T_odom_base, told)
             source = self._correct(told, told_front) if len(told) > _LEAST_LEFT * len(points) else "odometry"
             self._judge()
+            self._look_near(stamp_ns, told)
             self._look_around(stamp_ns, step)
             if self._status == TRACKING and self.first_fix is None:
                 self.first_fix = ((stamp_ns - self._began_ns) * 1e-9, self._travelled_m)
@@ -273,6 +277,29 @@ class Localizer:
             mean, wanted = float(np.mean(self._supports)), self._wanted_support()
             self._drop(f"the map's walls agree with {mean:.0%} of the hits, {wanted:.0%} were wanted")
 
+    def _look_near(self, stamp_ns: int, points: FloatArray) -> None:
+        """Take a lost place up again near where the odometry has carried it, where two looks in a row say the same."""
+        tracker = self._tracker
+        if self._status != LOST or tracker is None or len(points) < _LEAST_HITS or stamp_ns < self._look_ns:
+            return
+        if self._travelled_m - self._lost_m > _NEAR_M:
+            return
+        self._look_ns = stamp_ns + _LOOK_NS
+        found = best_start(self._walls, poses_along(tracker.pose, tracker.height_m), points)
+        before, self._near = self._near, None
+        if found.support < max(self._wanted_support(), found.rival + _CLEARLY):
+            return
+        self._near = tracker.pose.copy(), found.pose
+        if before is None:
+            return
+        off = se2.between(se2.compose(before[1], se2.between(before[0], tracker.pose)), found.pose)
+        if math.hypot(off[0], off[1]) > _SAME_M:
+            return
+        std = np.array([0.15, 0.15, math.radians(1.0)])
+        tracker.pose, tracker.P = found.pose.copy(), np.diag(std**2)
+        self._status, self._near = TRACKING, None
+        self._supports.clear()
+
     def _wanted_support(self) -> float:
         """Return the share of hits that must agree with the walls where the machine is."""
         assert self._tracker is not None  # noqa: S101  # asked where there is one
@@ -292,6 +319,7 @@ class Localizer:
             self._status = UNKNOWN if self.first_fix is None else LOST
             return
         self.lost_stretches += 1
+        self._lost_m, self._near, self._look_ns = self._travelled_m, None, self._stamp_ns + _LOOK_NS
         self._status = LOST
         self._finder.forget()
 

@@ -40,7 +40,8 @@ def autonomous_of(
         teach(scenario, network, machine, path, settings)
     known = KnownMap.read(path)
     start, pose = _start(known.topology, scenario.start)
-    _known(known.topology, scenario.goal, "goal")
+    for goal in (scenario.goal, *(one.goal for one in scenario.modes if one.goal)):
+        _known(known.topology, goal, "goal")
     return Autonomous(known, pose, Errand(start, scenario.goal, scenario.load > 0.0), ModeNow("idle"))
 
 

@@ -47,16 +47,19 @@ class Word(NamedTuple):
     speed_mps: float | None = None
     steering_rate_rps: float = 0.0
     go_on: bool = False
+    goal: str = ""
 
 
 class Health(NamedTuple):
-    """What the machine tells the station: armed, mode, standing, why it stopped, how far the mission is."""
+    """What the machine tells the station: armed, mode, standing, why it stopped, what help it asks for, its last gear."""
 
     stamp_ns: int
     armed: bool
     mode: str
     standing: bool
     causes: tuple[str, ...]
+    asks: str = ""
+    gear: int = 1
 
 
 class ModeNow:
