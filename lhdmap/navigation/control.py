@@ -74,8 +74,9 @@ class NavigationControl:
         begins = [Begin(start, 0.0, ())] if start else begins_at(self._planner.topology, place)
         self._plan(begins, located)
 
-    def go_on(self, located: Located) -> None:
-        """Plan again from where the machine is, after it was helped."""
+    def go_on(self, located: Located, *, reopened: bool = False) -> None:
+        """Plan again from where the machine is, after others drove it or helped; `reopened`: what was closed is open again."""
+        self.closed = () if reopened else self.closed
         if self.state not in (IDLE, ARRIVED) and self.goal:
             self.go("", self.goal, located, loaded=self._loaded)
 

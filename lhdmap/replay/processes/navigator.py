@@ -68,7 +68,7 @@ class Navigator(Process):
         directive = self._directive(now_ns, motion, located)
         mission = self._told()
         cause = mission if self.control.state == ASSISTANCE else self.control.state
-        yield Outgoing(DIRECTIVE, Asked(now_ns, directive, cause if self._mode in _MOVES else self._mode))
+        yield Outgoing(DIRECTIVE, Asked(now_ns, directive, cause))
         if mission != self._mission:
             self._mission = mission
             self._scribe.event("mission", mission)
@@ -83,7 +83,7 @@ class Navigator(Process):
         if control.state == IDLE:
             self._begin(now_ns, located)
         elif control.knows(located) and (self._away or self._asked_on):
-            control.go_on(located)
+            control.go_on(located, reopened=self._asked_on)
             self._away = self._asked_on = False
         elif self._goal not in ("", control.goal) and control.knows(located):
             control.go("", self._goal, located, loaded=self._errand.loaded)
