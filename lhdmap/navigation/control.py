@@ -64,6 +64,7 @@ class NavigationControl:
         self._driven_m = self._speed_mps = 0.0
         self._before: FloatArray | None = None
         self._at_m = 0.0
+        self._begun_m: float | None = None  # where along its path the leg was begun
         self._loaded = False
         self.sight_m = math.inf  # how far the path ahead is seen free, as guidance tells
 
@@ -71,7 +72,7 @@ class NavigationControl:
         """Plan to a goal from a point of the map, empty: from where the machine is; raises UsageError where a name is wrong."""
         self.goal, self._loaded = goal, loaded
         place = np.append(located.pose_map[:2], located.height_m)
-        begins = [Begin(start, 0.0, ())] if start else begins_at(self._planner.topology, place)
+        begins = [Begin(start, 0.0)] if start else begins_at(self._planner.topology, place, goal)
         self._plan(begins, located)
 
     def go_on(self, located: Located, *, reopened: bool = False) -> None:
@@ -107,7 +108,7 @@ class NavigationControl:
         away = {"away_m": begin.away_m}
         self.legs = legs_of(topology, route, wheelbase_m, self._nose_m, settings, loaded=self._loaded, **away)
         self.leg, self._target, self._tries, self._driven_m, self._since_ns = 0, 0, 0, 0.0, 0
-        self._tried_at_m = -math.inf
+        self._tried_at_m, self._begun_m = -math.inf, None
         if not self.legs:
             self._goes(ARRIVED, "already there")
             return
@@ -142,6 +143,7 @@ class NavigationControl:
         path = moved(leg.path, located.T_odom_map)
         lead = self._leads[leg.gear].state(motion)
         self._at_m = along_m(path, lead[0], lead[1])
+        self._begun_m = self._at_m if self._begun_m is None else self._begun_m
         left_m = leg.stop_m - self._at_m
         self._pass_targets(leg, motion, located)
         if self._missed(leg):
@@ -180,7 +182,7 @@ class NavigationControl:
 
     def _missed(self, leg: Leg) -> bool:
         """Return whether the odometry has gone much farther than the node of the target is long."""
-        before = leg.targets[self._target - 1].at_m if self._target > 0 else 0.0
+        before = leg.targets[self._target - 1].at_m if self._target > 0 else self._begun_m or 0.0
         length = (
             max(leg.targets[self._target].at_m, leg.stop_m if self._target == len(leg.targets) - 1 else 0.0) - before
         )
@@ -188,7 +190,7 @@ class NavigationControl:
 
     def _stopped(self, now_ns: int, leg: Leg) -> None:
         self.leg += 1
-        self._target, self._tries, self._driven_m = 0, 0, 0.0
+        self._target, self._tries, self._driven_m, self._begun_m = 0, 0, 0.0, None
         self._since_ns = now_ns
         if self.leg == len(self.legs):
             self._goes(ARRIVED, "stop", goal=self.goal)
@@ -244,7 +246,7 @@ class NavigationControl:
         way = f"{target.start}:{target.point}"
         self.close(way)
         self._say("closed", f"tried {self._tries + 1} times", way=way, at_m=self._at_m)
-        self._plan([Begin(target.start, max(self._at_m - begin_m, 0.0), ())], located)
+        self._plan([Begin(target.start, max(self._at_m - begin_m, 0.0))], located)
 
     def _back(self, now_ns: int, motion: Motion, located: Located, standing: bool) -> Directive | None:
         assert self._backing is not None  # noqa: S101  # in this state
@@ -256,7 +258,7 @@ class NavigationControl:
             self._since_ns = now_ns
         waited = (now_ns - self._since_ns) * 1e-9 > self._settings.stuck_s
         if standing and (abs(leg.stop_m - at_m) < self._settings.arrived_m or waited):
-            self._since_ns = 0
+            self._since_ns, self._driven_m, self._begun_m = 0, 0.0, None
             self._goes(DRIVING, "backed up", gear=self.legs[self.leg].gear)
             return None
         return part_of(now_ns, leg.gear, path, min(leg.stop_m, float(path[-1, 5]) - 1.0), at_m)

@@ -93,12 +93,17 @@ def _runs(states: Sequence[Step]) -> list[list[Step]]:
     run: list[Step] = []
     for step in states:
         run.append(step)
-        if step.stop and len({one.point for one in run}) > 1:
+        if step.stop and any(_drives(*pair) for pair in pairwise(run)):
             runs.append(run)
             run = [step]
         elif step.stop:
             run = [step]
     return runs
+
+
+def _drives(a: Step, b: Step) -> bool:
+    """Return whether a step is a way within a node: between twins of access points there is none."""
+    return a.point != b.point and a.node == b.node
 
 
 def _leg(
@@ -115,7 +120,7 @@ def _leg(
     gear = 1 if run[0].gear == "forward" else -1
     pieces, limits, weights, targets, along = [], [], [], [], 0.0
     for a, b in pairwise(run):
-        if a.point == b.point or a.node != b.node:
+        if not _drives(a, b):
             continue
         line, connection = _line(topology, a.point, b.point)
         node = topology.nodes[a.node]
