@@ -23,7 +23,7 @@ from lhdmap.guidance.field import Field, field_around
 from lhdmap.guidance.outline import Outline, outline_of
 from lhdmap.guidance.paper import PaperCost
 from lhdmap.guidance.prediction import Prediction, Slopes, predicted
-from lhdmap.guidance.profile import Speeds, sight_m, speeds_of
+from lhdmap.guidance.profile import Speeds, before_nose_m, sight_m, speeds_of
 from lhdmap.guidance.settings import GuidanceSettings
 from lhdmap.guidance.solver import Problem, Solution, rolled, solve
 from lhdmap.messages import FloatArray
@@ -91,6 +91,12 @@ class Guidance:
         self._eyes_m, self._method = eyes_m, method
         self._last: Plan | None = None
 
+    def eyes_in_base(self, bend_rad: float) -> tuple[FloatArray, FloatArray]:
+        """Return the places (2,) of the front and the rear scanner in `base_link`, at a joint angle."""
+        behind = self.model.rear_m + self._eyes_m[-1]
+        rear = np.array([-self.model.front_m - behind * math.cos(bend_rad), behind * math.sin(bend_rad)])
+        return np.array([self._eyes_m[1], 0.0]), rear
+
     def forget(self) -> None:
         """Begin anew, without the last plan."""
         self._last = None
@@ -116,9 +122,9 @@ class Guidance:
         problem = Problem(start, ahead.speed_mps, before, limit, ahead.step_s, directive.path, at)
         solution = self._method(problem, ahead.rates, vehicle, self._outlines[directive.gear], field)
         seen = self._sight(directive, lead, start, at, field)
-        told = speeds_of(
-            solution, ahead, (speed, self._rise(begin_ns)), directive, seen, self._speeds(), self.model, settings
-        )
+        nose_m = before_nose_m(solution.states, field, float(lead.leading_m[:, 0].max()))
+        start_at = (speed, self._rise(begin_ns))
+        told = speeds_of(solution, ahead, start_at, directive, seen, nose_m, self._speeds(), self.model, settings)
         setpoints = self._setpoints(now_ns + _COMPUTING_NS, before, told, directive.gear)
         self._last = Plan(now_ns, directive.gear, setpoints, begin_ns, solution, told, slopes_of(solution, ahead))
         return self._last

@@ -20,6 +20,7 @@ _FREE_M, _BESIDE_M, _NARROW_M, _STOP_M = 0.5, 0.2, 0.05, -0.02
 _STEERING_SHARE = 0.85
 _CREEP_MPS = 0.3
 _NEW_SHARE = 0.3
+_ASIDE_M, _ASIDE_LESS_M = 0.5, 0.15  # of the leading edge: there a wall may be nearer
 _SIGHT_STEP_M, _SIGHT_CLEAR_M = 0.5, 0.10
 
 
@@ -44,14 +45,16 @@ def speeds_of(
     start: tuple[float, float],
     directive: Directive,
     sight_m: float,
+    ahead_m: FloatArray,
     last: Speeds | None,
     model: DriveModel,
     settings: GuidanceSettings,
 ) -> Speeds:
-    """Return the speeds along a solution, from a speed and an acceleration at its start."""
+    """Return the speeds along a solution, from a speed and an acceleration at its start; `ahead_m` (K + 1,): `before_nose_m`."""
     along = _along(solution, directive.path)
     clear = _smoothed(solution.clearance_m, along, last)
     caps = _caps(solution, predicted, clear, directive, model, settings)
+    caps["ahead"] = np.where(ahead_m > settings.ahead_m, float(model.top_speed_mps), 0.0)
     way = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(solution.states[:, :2], axis=0).T))])
     left_m = np.maximum(directive.stop_m - along, 0.0)
     braking, full = settings.brake_mps2, settings.sight_brake_share * model.brake_mps2
@@ -174,6 +177,22 @@ def _seen_m(x: float, y: float, path: FloatArray, first: int, field: Field) -> f
             gone += max(free, 0.2)
         seen = path[n, 5] - start
     return seen
+
+
+def before_nose_m(states: FloatArray, field: Field, nose_m: float) -> FloatArray:
+    """Return how far (K + 1,) the middle of the leading edge is from the nearest hit: walls beside are farther, half a width."""
+    return np.array([_from_nose(x, y, heading, nose_m, field) for x, y, heading in states[:, :3].tolist()])
+
+
+@nb.njit(cache=True, nogil=True)
+def _from_nose(x: float, y: float, heading: float, nose_m: float, field: Field) -> float:
+    free, _ = distance(x + nose_m * math.cos(heading), y + nose_m * math.sin(heading), field)
+    for aside in (-_ASIDE_M, _ASIDE_M):
+        px = x + nose_m * math.cos(heading) - aside * math.sin(heading)
+        py = y + nose_m * math.sin(heading) + aside * math.cos(heading)
+        beside, _ = distance(px, py, field)
+        free = min(free, beside + _ASIDE_LESS_M)
+    return free
 
 
 def sight_m(eye: tuple[float, float], directive: Directive, first: int, field: Field, nose_m: float) -> float:

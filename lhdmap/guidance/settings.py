@@ -84,6 +84,13 @@ class GuidanceSettings:
     beside_mps: float = setting(
         1.5, unit="m/s", minimum=0.1, maximum=10.0, doc="Speed at 0.2 m of clearance; free at 0.5 m."
     )
+    ahead_m: float = setting(
+        0.6,
+        unit="m",
+        minimum=0.0,
+        maximum=3.0,
+        doc="Room before the middle of the leading edge in which it does not drive.",
+    )
     lateral_mps2: float = setting(
         1.2, unit="m/s2", minimum=0.1, maximum=5.0, source=_MEASURED, doc="Acceleration in bends."
     )

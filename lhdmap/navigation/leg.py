@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
@@ -30,20 +30,25 @@ _MACHINE_M = 1.225
 
 @dataclass(frozen=True)
 class Target:
-    """A point of a leg: its id, its node, where along the path, its pose (4,) in `map`, whether an intersection ends there."""
+    """A point of a leg: its id, its node, where along the path, its pose (4,) in `map`, whether an intersection ends there.
+
+    `start`: the point (id) of the same node that the way to it comes from.
+    """
 
     point: str
     node: str
     at_m: float
     pose: FloatArray
     crossing: bool
+    start: str = ""
 
 
 @dataclass(frozen=True)
 class Leg:
     """A drive from one stop to the next: `path` (N, 6) in `map` for the leading axle (`lhdmap.guidance.directive`).
 
-    `stop_m`: along it, for the leading axle; `goal_m`: for the last point itself; `inversion`: the gear changes after it.
+    `stop_m`: along it, for the leading axle; `goal_m`: for the last point itself; `inversion`: the gear changes after it;
+    `begin`: the point (id) that it begins at, `begin_m` along it.
     """
 
     gear: int
@@ -52,6 +57,8 @@ class Leg:
     goal_m: float
     targets: tuple[Target, ...]
     inversion: bool
+    begin: str = ""
+    begin_m: float = 0.0
 
 
 def legs_of(
@@ -62,11 +69,20 @@ def legs_of(
     settings: NavigationSettings,
     *,
     loaded: bool = False,
+    away_m: float = 0.0,
 ) -> list[Leg]:
-    """Return the legs of a feasible route; `nose_m`: how far the machine reaches before `base_link`."""
+    """Return the legs of a feasible route; `nose_m`: how far the machine reaches before `base_link`.
+
+    `away_m`: how far from the route's first point the machine is; the first path begins that far before it.
+    """
     runs = _runs(route.states)
     return [
-        _leg(topology, run, wheelbase_m, nose_m, settings, loaded=loaded, inversion=k + 1 < len(runs))
+        _leg(
+            *(topology, run, wheelbase_m, nose_m, settings),
+            loaded=loaded,
+            inversion=k + 1 < len(runs),
+            away_m=away_m if k == 0 else 0.0,
+        )
         for k, run in enumerate(runs)
     ]
 
@@ -77,12 +93,17 @@ def _runs(states: Sequence[Step]) -> list[list[Step]]:
     run: list[Step] = []
     for step in states:
         run.append(step)
-        if step.stop and any(a.node == b.node and a.point != b.point for a, b in pairwise(run)):
+        if step.stop and any(_drives(*pair) for pair in pairwise(run)):
             runs.append(run)
             run = [step]
         elif step.stop:
             run = [step]
     return runs
+
+
+def _drives(a: Step, b: Step) -> bool:
+    """Return whether a step is a way within a node: between twins of access points there is none."""
+    return a.point != b.point and a.node == b.node
 
 
 def _leg(
@@ -94,11 +115,12 @@ def _leg(
     *,
     loaded: bool,
     inversion: bool,
+    away_m: float,
 ) -> Leg:
     gear = 1 if run[0].gear == "forward" else -1
     pieces, limits, weights, targets, along = [], [], [], [], 0.0
     for a, b in pairwise(run):
-        if a.point == b.point or a.node != b.node:
+        if not _drives(a, b):
             continue
         line, connection = _line(topology, a.point, b.point)
         node = topology.nodes[a.node]
@@ -109,21 +131,22 @@ def _leg(
         crossing = not isinstance(node, Tunnel)
         weights.append(np.full(len(line), settings.crossing_weight if crossing else 1.0))
         along += float(np.linalg.norm(np.diff(line[:, :2], axis=0), axis=1).sum())
-        targets.append(Target(b.point, a.node, along, topology.points[b.point].pose, crossing))
+        targets.append(Target(b.point, a.node, along, topology.points[b.point].pose, crossing, a.point))
     line = np.concatenate(pieces)[:, :2]
-    before, after = _beyond(topology, run[0], -line[1] + line[0]), _beyond(topology, run[-1], line[-1] - line[-2])
+    before = _beyond(topology, run[0], -line[1] + line[0], away_m + _BEYOND_M)
+    after = _beyond(topology, run[-1], line[-1] - line[-2], _BEYOND_M)
     whole = np.concatenate([(line[0] + before)[::-1], line, line[-1] + after])
     limit = np.concatenate([np.full(len(before), limits[0][0]), *limits, np.full(len(after), limits[-1][-1])])
     weight = np.concatenate([np.full(len(before), weights[0][0]), *weights, np.full(len(after), weights[-1][-1])])
-    lead_m = float(np.linalg.norm(before[-1])) if len(before) else 0.0
+    lead_m = float(np.linalg.norm(np.diff(before, axis=0, prepend=np.zeros((1, 2))), axis=1).sum())
     path = _smooth(path_of(whole, np.minimum(limit, _limit_kmh(gear, settings, loaded=loaded)) / 3.6, weight))
     path[:, 4] = _widened(path[:, 4], settings.crossing_margin_m)
     goal = lead_m + along
     ahead = wheelbase_m if gear < 0 else 0.0
     if inversion and gear > 0:  # the rear axle leads next: it has to be at the point
         ahead = min(wheelbase_m, max(room_m(topology, run[-1], nose_m) - nose_m - settings.room_m, 0.0))
-    moved = tuple(Target(one.point, one.node, lead_m + one.at_m, one.pose, one.crossing) for one in targets)
-    return Leg(gear, path, goal + ahead, goal, moved, inversion)
+    moved = tuple(replace(one, at_m=lead_m + one.at_m) for one in targets)
+    return Leg(gear, path, goal + ahead, goal, moved, inversion, run[0].point, lead_m)
 
 
 def _limit_kmh(gear: int, settings: NavigationSettings, *, loaded: bool) -> float:
@@ -158,7 +181,7 @@ def _preferred(line: FloatArray, tunnel: Tunnel, settings: NavigationSettings) -
     return out
 
 
-def _beyond(topology: TopologicalMap, step: Step, way: FloatArray) -> FloatArray:
+def _beyond(topology: TopologicalMap, step: Step, way: FloatArray, reach_m: float) -> FloatArray:
     """Return how it goes on beyond an end of a leg, as offsets (M, 2): along the tunnel there, else straight."""
     length = max(float(np.linalg.norm(way)), 1e-9)
     unit = way / length
@@ -168,31 +191,35 @@ def _beyond(topology: TopologicalMap, step: Step, way: FloatArray) -> FloatArray
     for name in nodes:
         node = topology.nodes.get(name)
         if isinstance(node, Tunnel):
-            found = _along(node.line_m[:, :2], point.pose[:2], unit)
+            found = _along(node.line_m[:, :2], point.pose[:2], unit, reach_m)
             if len(found) > 1:
-                return _extended(found, unit)
-    return _extended(np.zeros((0, 2)), unit)
+                return _extended(found, unit, reach_m)
+    return _extended(np.zeros((0, 2)), unit, reach_m)
 
 
-def _along(line: FloatArray, place: FloatArray, unit: FloatArray) -> FloatArray:
-    """Return the offsets from a place of a line's points that go on in a direction."""
+def _along(line: FloatArray, place: FloatArray, unit: FloatArray, reach_m: float) -> FloatArray:
+    """Return the offsets from a place of a line's points that go on in a direction, for so far along them."""
     off = line - place
     nearest = int(np.linalg.norm(off, axis=1).argmin())
     tangent = line[min(nearest + 1, len(line) - 1)] - line[max(nearest - 1, 0)]
     ordered = off[nearest:] if tangent @ unit > 0.0 else off[nearest::-1]
     ahead = ordered[1:] if len(ordered) > 1 else ordered[:0]
-    ahead = ahead[ahead @ unit > 0.3] if len(ahead) else ahead
-    return ahead[np.linalg.norm(ahead, axis=1) < _BEYOND_M] if len(ahead) else ahead
+    beyond = np.flatnonzero(ahead @ unit > 0.3) if len(ahead) else np.zeros(0, int)
+    if not len(beyond):
+        return ahead[:0]
+    ahead = ahead[beyond[0] :]
+    gone = np.cumsum(np.linalg.norm(np.diff(ahead, axis=0, prepend=np.zeros((1, 2))), axis=1))
+    return ahead[gone < reach_m]
 
 
-def _extended(found: FloatArray, unit: FloatArray) -> FloatArray:
+def _extended(found: FloatArray, unit: FloatArray, reach_m: float) -> FloatArray:
     """Return offsets that reach as far as wanted, straight where nothing is known."""
     if len(found) >= 2:
         last = found[-1] - found[-2]
         unit = last / max(float(np.linalg.norm(last)), 1e-9)
     begin = found[-1] if len(found) else np.zeros(2)
-    reach = float(np.linalg.norm(begin))
-    more = np.arange(0.5, max(_BEYOND_M - reach, 1.0), 0.5)
+    reach = float(np.linalg.norm(np.diff(found, axis=0, prepend=np.zeros((1, 2))), axis=1).sum())
+    more = np.arange(0.5, max(reach_m - reach, 1.0), 0.5)
     whole: FloatArray = np.concatenate([found, begin + more[:, None] * unit])
     return whole
 

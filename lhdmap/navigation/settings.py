@@ -67,9 +67,15 @@ class NavigationSettings:
     stuck_s: float = setting(
         6.0, unit="s", minimum=1.0, maximum=120.0, doc="Standing so long short of a stop is being stuck."
     )
+    blocked_m: float = setting(
+        4.0, unit="m", minimum=0.0, maximum=30.0, doc="Something stands in the way where less of the path is seen free."
+    )
+    wait_s: float = setting(
+        15.0, unit="s", minimum=1.0, maximum=600.0, doc="... and it may leave: so long is waited before backing up."
+    )
     back_up_m: float = setting(6.0, unit="m", minimum=1.0, maximum=30.0, doc="How far it backs up before another try.")
     back_ups: int = setting(
-        2, minimum=0, maximum=10, source="at most two, then assistance", doc="How often it backs up at one place."
+        2, minimum=0, maximum=10, source="at most two, then another way", doc="How often it backs up at one place."
     )
     believe_m: float = setting(
         1.0,

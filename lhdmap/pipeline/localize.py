@@ -31,6 +31,7 @@ from lhdmap.localization.paper_nodes import PaperNodes
 from lhdmap.localization.place_on_map import Placer
 from lhdmap.localization.rows import CANDIDATE, LOST, NOWHERE, TRACKING, UNKNOWN, Row
 from lhdmap.localization.search import CHECK, CONFIRM, FIND, Candidate, GlobalSearch, Search
+from lhdmap.localization.starting import Start, best_start, poses_along
 from lhdmap.localization.strips import strips_of
 from lhdmap.localization.tracker import Tracker
 from lhdmap.localization.walls import MapWalls
@@ -50,6 +51,7 @@ _LEAST_LEFT = 0.25  # of the hits must be of walls that the map has, or nothing 
 _DENIALS = 2  # checks in a row
 _GUESSED = np.array([0.5, 0.1, 0.1])  # m/s, m/s, rad/s: a step that neither walls nor wheels told
 _HELD = 1.0 / 0.02**2  # 1/m²: less along the machine, and walls hardly hold it
+_LOOK_NS, _NEAR_M, _SAME_M, _CLEARLY, _LEAST_HITS = 400_000_000, 5.0, 0.3, 0.05, 40
 _LEAST_SUPPORT = 0.35  # where a node's own scans tell of none
 
 
@@ -106,9 +108,10 @@ class _Trial:
 class Localizer:
     """Takes messages by role in time order; `rows` is what it said of each front scan, `where` the newest.
 
-    `start` (4,): x, y, yaw (rad) and height about where the machine begins; None: it is searched for. `live`: a running machine,
-    where nothing waits for a search; of a log each is waited for, so that the rows are the same each time. With
-    `smoother` a row's pose is that of the fixed-lag smoother once the machine is some metres farther. A context manager.
+    `start` (4,): x, y, yaw (rad) and height about where the machine begins, or several (K, 4) of which the first scan chooses;
+    None: it is searched for. `live`: a running machine, where nothing waits for a search; of a log each is waited for, so that
+    the rows are the same each time. With `smoother` a row's pose is that of the fixed-lag smoother once the machine is some metres
+    farther. A context manager.
     """
 
     def __init__(
@@ -135,13 +138,17 @@ class Localizer:
         self._paper = PaperNodes(known.topology, known.landmarks, settings.landmarks) if paper else None
         self._tracker: Tracks | None = None if start is None else self._started(start)
         self._turnable = start is not None  # a waypoint's heading is its node's: the machine may face the other way
+        self._starts = None if start is None or start.ndim == 1 else start
         self._status = UNKNOWN if start is None else TRACKING
         self._trial: _Trial | None = None
         self._denials = 0
         self._supports: deque[float] = deque(maxlen=self._settings.support_scans)
         self._before: FloatArray | None = None
+        self._lost_m, self._look_ns = 0.0, 0
+        self._near: tuple[FloatArray, FloatArray] | None = None
         self._listener = listener
         self._time_ns = 0
+        self.start: Start | None = None  # which of several it was
         self._travelled_m = 0.0
         self._probability = 0.0 if start is None else 1.0
         self._information = 0.0
@@ -205,6 +212,7 @@ class Localizer:
 
     def _started(self, start: FloatArray) -> Tracks:
         std = np.array([self._settings.start_std_m] * 2 + [math.radians(self._settings.start_std_deg)])
+        start = start if start.ndim == 1 else start[0]
         height = float(start[3]) if len(start) > 3 else 0.0
         return self._tracks(start[:3], std, height)
 
@@ -233,6 +241,7 @@ class Localizer:
             self._finder.add(step.T_odom_base, told)
             source = self._correct(told, told_front) if len(told) > _LEAST_LEFT * len(points) else "odometry"
             self._judge()
+            self._look_near(stamp_ns, told)
             self._look_around(stamp_ns, step)
             if self._status == TRACKING and self.first_fix is None:
                 self.first_fix = ((stamp_ns - self._began_ns) * 1e-9, self._travelled_m)
@@ -313,7 +322,11 @@ class Localizer:
             return "odometry" if tracker is not None else ""
         if self._turnable:
             self._turnable = False
-            tracker.turn_if_better(points)
+            if self._starts is None:
+                tracker.turn_if_better(points)
+            else:
+                self.start = best_start(self._walls, self._starts, points)
+                tracker.pose, tracker.height_m = self.start.pose.copy(), self.start.height_m
         place = self._placer.at(tracker.pose, tracker.height_m, 1.0)
         said = tracker.correct(points, front or len(points), self._walls.quality(place.node))
         tracker.height_m = self._placer.height_m(tracker.pose[0], tracker.pose[1], tracker.height_m)
@@ -329,6 +342,29 @@ class Localizer:
         if not holds and len(self._supports) == self._supports.maxlen:
             mean, wanted = float(np.mean(self._supports)), self._wanted_support()
             self._drop(f"the map's walls agree with {mean:.0%} of the hits, {wanted:.0%} were wanted")
+
+    def _look_near(self, stamp_ns: int, points: FloatArray) -> None:
+        """Take a lost place up again near where the odometry has carried it, where two looks in a row say the same."""
+        tracker = self._tracker
+        if self._status != LOST or tracker is None or len(points) < _LEAST_HITS or stamp_ns < self._look_ns:
+            return
+        if self._travelled_m - self._lost_m > _NEAR_M:
+            return
+        self._look_ns = stamp_ns + _LOOK_NS
+        found = best_start(self._walls, poses_along(tracker.pose, tracker.height_m), points)
+        before, self._near = self._near, None
+        if found.support < max(self._wanted_support(), found.rival + _CLEARLY):
+            return
+        self._near = tracker.pose.copy(), found.pose
+        if before is None:
+            return
+        off = se2.between(se2.compose(before[1], se2.between(before[0], tracker.pose)), found.pose)
+        if math.hypot(off[0], off[1]) > _SAME_M:
+            return
+        std = np.array([0.15, 0.15, math.radians(1.0)])
+        tracker.pose, tracker.P = found.pose.copy(), np.diag(std**2)
+        self._status, self._near = TRACKING, None
+        self._supports.clear()
 
     def _wanted_support(self) -> float:
         """Return the share of hits that must agree with the walls where the machine is."""
@@ -350,6 +386,7 @@ class Localizer:
             self._status = UNKNOWN if self.first_fix is None else LOST
             return
         self.lost_stretches += 1
+        self._lost_m, self._near, self._look_ns = self._travelled_m, None, self._stamp_ns + _LOOK_NS
         self._status = LOST
         self._finder.forget()
 

@@ -113,7 +113,7 @@ def _autonomous(scenario: Scenario, parts: Parts, given: Autonomous, journal: Jo
         Navigator(navigation, given.errand, journal.of(NAVIGATION)),
         Guide(guidance, journal.of(GUIDANCE)),
         Execute(control, machine, given.mode, journal.of(EXECUTOR)),
-        Station("autonomous", scenario.rearm_s, journal.of(Station.name)),
+        Station(scenario.wanted_modes, scenario.rearm_s, scenario.assist_s, journal.of(Station.name)),
     ]
 
 

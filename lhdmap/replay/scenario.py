@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +19,7 @@ from lhdmap.simulation.sensing.faults import FaultSettings
 
 KINDS = ("tram", "loading", "mission", "haulage", "grizzly")
 AUTONOMOUS, OPERATOR, TELEOPERATOR = "autonomous", "operator", "teleoperator"
+MODES = ("idle", "autonomous", "assisted", "teleoperated", "manual")
 FOLDER = "pipelines/scenarios"
 _NO_MEASUREMENTS = ("/tf_static", "/ground_truth/odometry")
 
@@ -28,6 +31,30 @@ class Errand:
     source: str = setting(REQUIRED, key="from", doc="Draw point.")
     to: str = setting(REQUIRED, doc="Dump.")
     buckets: int = setting(1, minimum=1, maximum=10_000, doc="How many.")
+
+
+@dataclass(frozen=True, slots=True)
+class ModeAt:
+    """A mode that the station wants from a time on, and what its operator does then."""
+
+    at_s: float = setting(0.0, unit="s", minimum=0.0, doc="When, after the start.")
+    mode: str = setting("autonomous", choices=MODES, doc="Mode of /operation/mode.")
+    speed_kmh: float = setting(
+        0.0,
+        unit="km/h",
+        minimum=-40.0,
+        maximum=40.0,
+        doc="His speed: a limit in assisted, in teleoperated and manual the speed itself, negative in reverse.",
+    )
+    steering_dps: float = setting(
+        0.0, unit="deg/s", minimum=-30.0, maximum=30.0, doc="How he bends the joint in teleoperated and manual."
+    )
+    goal: str = setting("", doc="Another goal from then on: the branch that he wants.")
+
+    @property
+    def steering_rps(self) -> float:
+        """How he bends the joint, rad/s."""
+        return math.radians(self.steering_dps)
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,6 +100,10 @@ class Scenario:
         maximum=3600.0,
         doc="How long the station looks at a stop before it arms the machine again.",
     )
+    assist_s: float = setting(
+        10.0, unit="s", minimum=0.0, maximum=3600.0, doc="How long the station takes to answer a request for help."
+    )
+    modes: tuple[ModeAt, ...] = part(tuple, key="mode")
     limits: Limits = part(Limits)
     link: LinkSettings = part(LinkSettings)
     faults: tuple[FaultSettings, ...] = part(tuple, key="fault")
@@ -85,11 +116,19 @@ class Scenario:
             raise ConfigError("driver = 'autonomous': a goal was wanted")
         if self.goal and self.route:
             raise ConfigError(f"goal = '{self.goal}' and route = '{self.route}': one of them was wanted")
+        if any(one.at_s > other.at_s for one, other in pairwise(self.modes)):
+            raise ConfigError("[[mode]]: in order of at_s was wanted")
         for number, fault in enumerate(self.faults, start=1):
             try:
                 _check_target(fault)
             except ConfigError as error:
                 raise ConfigError(f"[[fault]] {number}: {error}") from error
+
+    @property
+    def wanted_modes(self) -> tuple[ModeAt, ...]:
+        """The modes that the station wants, the first one from the start on."""
+        begin = () if self.modes and self.modes[0].at_s == 0.0 else (ModeAt(),)
+        return (*begin, *self.modes)
 
     @property
     def who(self) -> str:

@@ -8,6 +8,7 @@ import numpy as np
 
 from lhdmap.config import Settings
 from lhdmap.errors import UsageError
+from lhdmap.localization.starting import poses_about, poses_anywhere, poses_in
 from lhdmap.machine import Machine
 from lhdmap.messages import FloatArray
 from lhdmap.mine.network import Network
@@ -39,7 +40,8 @@ def autonomous_of(
         teach(scenario, network, machine, path, settings)
     known = KnownMap.read(path)
     start, pose = _start(known.topology, scenario.start)
-    _known(known.topology, scenario.goal, "goal")
+    for goal in (scenario.goal, *(one.goal for one in scenario.modes if one.goal)):
+        _known(known.topology, goal, "goal")
     return Autonomous(known, pose, Errand(start, scenario.goal, scenario.load > 0.0), ModeNow("idle"))
 
 
@@ -54,17 +56,16 @@ def teach(scenario: Scenario, network: Network, machine: Machine, path: Path, se
     build_map(BuildRequest([log], path, settings=settings, machine=machine))
 
 
-def _start(topology: TopologicalMap, name: str) -> tuple[str, FloatArray | None]:
-    """Return the point that a drive begins at, and its pose (4,: x, y, yaw, z)."""
+def _start(topology: TopologicalMap, name: str) -> tuple[str, FloatArray]:
+    """Return the point that a drive begins at, empty: where the machine is found; and its pose (4,: x, y, yaw, z), or several."""
     if not name:
-        origin = np.zeros(3)
-        points = list(topology.points.values())
-        near = min(points, key=lambda one: float(np.linalg.norm(one.pose[:3] - origin)))
-        return near.id, np.zeros(4)
-    found = _known(topology, name, "start")
+        return "", np.zeros(4)  # where the teaching drive began
+    found = topology.called(name)
+    if found is None:
+        return "", poses_anywhere(topology)
     if isinstance(found, (Waypoint, AccessPoint)):
-        return name, found.pose[[0, 1, 3, 2]]
-    raise UsageError(f"start = '{name}': the machine needs a place to stand at, not a whole node")
+        return "", np.concatenate([found.pose[None, [0, 1, 3, 2]], poses_about(topology, found)])
+    return "", poses_in(topology, found.id)
 
 
 def _known(topology: TopologicalMap, name: str, key: str) -> object:

@@ -21,7 +21,7 @@ class Lookup:
         self._topology = topology
         points, owner = [], []
         for tunnel in topology.tunnels:
-            points.append(_each_metre(tunnel.line_m))
+            points.append(each_metre(tunnel.line_m))
             owner += [tunnel.id] * len(points[-1])
         for node in topology.intersections:
             middle = node.T_map_node[:3]
@@ -53,7 +53,7 @@ class Lookup:
         return names
 
 
-def _each_metre(line_m: FloatArray) -> FloatArray:
+def each_metre(line_m: FloatArray) -> FloatArray:
     """Return points (M, 3) at most a metre apart on a line (N, 3)."""
     way = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(line_m, axis=0), axis=1))])
     at = np.unique(np.concatenate([way, np.arange(0.0, way[-1], _STEP_M)]))

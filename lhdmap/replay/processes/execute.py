@@ -50,6 +50,7 @@ class Execute(Process):
         self.control, self._machine, self._mode, self._scribe = control, machine, mode, scribe
         self._feed = MotionFeed()
         self._wanted = Stop.GO
+        self._asks, self._gear = "", 1
         self._told_ns = 0
         self._pull_mps2 = 0.0
 
@@ -57,7 +58,8 @@ class Execute(Process):
         """Take what has come; give the command of now."""
         for received in inbox:
             self._take(received, now_ns)
-        command = self.control.step(now_ns, self._feed.motion, self._wanted, "navigation", self._pull_mps2)
+        wanted = self._wanted if self.control.modes.mode.source == "guidance" else Stop.GO
+        command = self.control.step(now_ns, self._feed.motion, wanted, "navigation", self._pull_mps2)
         for who, note in self.control.take_notes():
             self._scribe.event(
                 f"{who}: {note.event}", note.cause, before=note.before, after=note.after, **dict(note.values)
@@ -77,6 +79,7 @@ class Execute(Process):
         elif topic == PLAN:
             watchdog.saw(GUIDANCE, message.stamp_ns, now_ns)
             if not isinstance(message, Idle):
+                self._gear = message.gear
                 self.control.plan("guidance", message.setpoints, message.stamp_ns, now_ns)
         elif topic == SEEN:
             watchdog.disagreement(message.stamp_ns, now_ns, message.apart_m, message.apart_rad)
@@ -93,6 +96,7 @@ class Execute(Process):
 
     def _ask(self, asked: Asked) -> None:
         self._wanted = Stop.SERVICE if asked.directive is None else Stop.GO
+        self._asks = asked.cause if asked.cause.startswith("assistance") else ""
 
     def _scan(self, scan: LaserScan, now_ns: int, *, front: bool) -> None:
         points, _ = scan_points(scan)
@@ -133,4 +137,5 @@ class Execute(Process):
     def _health(self, now_ns: int) -> Health:
         control = self.control
         watchdog = control.watchdog
-        return Health(now_ns, watchdog.armed, control.modes.name, control.executor.standing, watchdog.causes)
+        standing, causes = control.executor.standing, watchdog.causes
+        return Health(now_ns, watchdog.armed, control.modes.name, standing, causes, self._asks, self._gear)

@@ -6,13 +6,14 @@ from collections import deque
 from collections.abc import Iterator, Sequence
 
 from lhdmap.driving.motion import Setpoint
+from lhdmap.guidance.ghosts import Eye
 from lhdmap.guidance.local_walls import LocalWalls
 from lhdmap.guidance.planner import Guidance
 from lhdmap.messages import Command
 from lhdmap.replay.journal import Scribe
 from lhdmap.replay.process import DIRECTIVE, MILLISECOND_NS, PLAN, SEEN, Outgoing, Process, Received
 from lhdmap.replay.processes.feed import MOTION_TOPICS, MotionFeed
-from lhdmap.replay.processes.told import Asked, Idle
+from lhdmap.replay.processes.told import Asked, Idle, Seen
 from lhdmap.roles import ROLES
 
 GUIDANCE = "guidance"
@@ -55,7 +56,7 @@ class Guide(Process):
     def _take(self, received: Received) -> None:
         topic, _, message = received
         if topic == SEEN:
-            self._walls.add(message.pose_odom, message.points_m)
+            self._walls.add(message.pose_odom, message.points_m, self._eyes(message))
             self._seen_ns = message.stamp_ns
         elif topic == DIRECTIVE:
             self._asked = message
@@ -63,6 +64,14 @@ class Guide(Process):
             self._sent.append(self._as_setpoint(message, received.sent_ns))
         else:
             self._feed.take(received)
+
+    def _eyes(self, seen: Seen) -> list[Eye]:
+        """Return the scanners with their hits, in `base_link`."""
+        motion = self._feed.motion
+        if motion is None:
+            return []
+        front, rear = self._guidance.eyes_in_base(motion.articulation_rad)
+        return [Eye(front, seen.points_m[: seen.front]), Eye(rear, seen.points_m[seen.front :])]
 
     def _as_setpoint(self, command: Command, sent_ns: int) -> Setpoint:
         speed = 0.0 if command.brake else command.propel * self._guidance.model.top_speed_mps

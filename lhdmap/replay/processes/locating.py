@@ -9,9 +9,11 @@ from dataclasses import replace
 import numpy as np
 
 from lhdmap.config import Settings
+from lhdmap.localization.agreement import Agreement
+from lhdmap.localization.rows import TRACKING
 from lhdmap.machine import Machine
 from lhdmap.messages import FloatArray
-from lhdmap.navigation.control import Located
+from lhdmap.navigation.along import Located
 from lhdmap.odometry.planar import PlanarOdometry
 from lhdmap.odometry.steps import OdometryStep
 from lhdmap.pipeline.localize import KnownMap, Localizer
@@ -42,6 +44,7 @@ class Locating(Process):
         soon = replace(settings.attitude, half_window_s=min(settings.attitude.half_window_s, _HALF_WINDOW_S))
         live = replace(settings, odometry=often, attitude=soon)
         self.localizer = Localizer(known, live, machine, start, listener=self._listen)
+        self._agreement = Agreement(self.localizer.pipeline.front_end.wheels.motion_between)
         scribe.goes("waiting", "no scan yet")
 
     def step(self, now_ns: int, inbox: Sequence[Received]) -> Iterator[Outgoing]:
@@ -77,6 +80,15 @@ class Locating(Process):
         if not step.processed:
             return
         points = np.concatenate([part[:, :2] for part in (odometry.points, odometry.points_behind)])
-        lost = self.localizer.pipeline.records.lost_now
-        apart = (math.inf, math.inf) if lost else (0.0, 0.0)
-        self._seen.append(Seen(stamp_ns, step.T_odom_base.copy(), points, *apart))
+        self._seen.append(Seen(stamp_ns, step.T_odom_base.copy(), points, *self._apart(step), len(odometry.points)))
+
+    def _apart(self, step: OdometryStep) -> tuple[float, float]:
+        """Return by how much pose and scan disagree; infinite where the scan does not fit at all."""
+        by_wheels = self._agreement.of_motion(step.time_ns, step.T_odom_base)
+        fix = self.localizer.fix
+        by_map = (0.0, 0.0)
+        if fix is not None:
+            by_map = self._agreement.of_map(fix.pose_map, fix.pose_odom, known=fix.status == TRACKING)
+        if self.localizer.pipeline.records.lost_now:
+            return math.inf, math.inf
+        return max(by_wheels[0], by_map[0]), max(by_wheels[1], by_map[1])

@@ -2,11 +2,17 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
+import numpy as np
+
+from lhdmap.driving.motion import Motion
+from lhdmap.guidance.directive import SPEED, Directive
 from lhdmap.messages import Text
-from lhdmap.navigation.control import ARRIVED, ASSISTANCE, IDLE, Located, NavigationControl
+from lhdmap.navigation.along import Located
+from lhdmap.navigation.control import ARRIVED, ASSISTANCE, IDLE, NavigationControl
 from lhdmap.replay.journal import Scribe
 from lhdmap.replay.process import (
     DIRECTIVE,
@@ -14,20 +20,23 @@ from lhdmap.replay.process import (
     MACHINE_SAYS,
     MILLISECOND_NS,
     MISSION,
+    PLAN,
+    STATION_SAYS,
     Outgoing,
     Process,
     Received,
 )
 from lhdmap.replay.processes.feed import MOTION_TOPICS, MotionFeed
-from lhdmap.replay.processes.told import Asked
+from lhdmap.replay.processes.told import Asked, Idle
 
 NAVIGATION = "navigation"
 _SETTLED_NS = 1_000_000_000
 _MOVES = ("autonomous", "assisted")
+_CREEPS_MPS = 0.1
 
 
 class Errand(NamedTuple):
-    """A drive from a place of the map to another."""
+    """A drive from a place of the map, empty: from where the machine is, to another."""
 
     start: str
     goal: str
@@ -38,36 +47,65 @@ class Navigator(Process):
     """Plans once the place is known and the machine is armed; then a directive each 100 ms."""
 
     name, period_ns, latency_ns, priority = NAVIGATION, 100 * MILLISECOND_NS, 5 * MILLISECOND_NS, 20
-    reads = (*MOTION_TOPICS, LOCATED, MACHINE_SAYS)
+    reads = (*MOTION_TOPICS, LOCATED, MACHINE_SAYS, PLAN, STATION_SAYS)
 
     def __init__(self, control: NavigationControl, errand: Errand, scribe: Scribe) -> None:
         self.control, self._errand, self._scribe = control, errand, scribe
         self._feed = MotionFeed()
         self._located: Located | None = None
         self._mission = ""
+        self._asked_on = self._away = False
+        self._goal, self._mode, self._speed_mps = "", "", 0.0
         self._since_ns: int | None = None
 
     def step(self, now_ns: int, inbox: Sequence[Received]) -> Iterator[Outgoing]:
         """Take what has come; give the directive of now and say how far the drive is."""
         for received in inbox:
-            if received.topic == LOCATED:
-                self._located = received.message
-            elif received.topic == MACHINE_SAYS:
-                self.control.may_move = received.message.armed and received.message.mode in _MOVES
-            else:
-                self._feed.take(received)
+            self._take(received)
         motion, located = self._feed.motion, self._located
         if motion is None or located is None:
             return
-        if self.control.state == IDLE:
-            self._begin(now_ns, located)
-        directive = self.control.step(now_ns, motion, located)
-        yield Outgoing(DIRECTIVE, Asked(now_ns, directive, self.control.state))
+        directive = self._directive(now_ns, motion, located)
         mission = self._told()
+        cause = mission if self.control.state == ASSISTANCE else self.control.state
+        yield Outgoing(DIRECTIVE, Asked(now_ns, directive, cause))
         if mission != self._mission:
             self._mission = mission
             self._scribe.event("mission", mission)
             yield Outgoing(MISSION, Text(now_ns, mission))
+
+    def _directive(self, now_ns: int, motion: Motion, located: Located) -> Directive | None:
+        """Return the directive of now; None where the machine is to stand, or others drive it."""
+        control = self.control
+        if self._mode not in _MOVES:
+            self._away = control.state not in (IDLE, ARRIVED, ASSISTANCE)
+            return None
+        if control.state == IDLE:
+            self._begin(now_ns, located)
+        elif control.knows(located) and (self._away or self._asked_on):
+            control.go_on(located, reopened=self._asked_on)
+            self._away = self._asked_on = False
+        elif self._goal not in ("", control.goal) and control.knows(located):
+            control.go("", self._goal, located, loaded=self._errand.loaded)
+        directive = control.step(now_ns, motion, located)
+        return directive if self._mode == "autonomous" else _no_faster(directive, self._speed_mps)
+
+    def _take(self, received: Received) -> None:
+        topic, _, message = received
+        if topic == LOCATED:
+            self._located = message
+        elif topic == MACHINE_SAYS:
+            self._mode = message.mode
+            waits = message.mode == "assisted" and self._speed_mps < _CREEPS_MPS
+            self.control.may_move = message.armed and message.mode in _MOVES and not waits
+        elif topic == PLAN:
+            self.control.sight_m = math.inf if isinstance(message, Idle) else message.speeds.sight_m
+        elif topic == STATION_SAYS:
+            self._asked_on = message.go_on
+            self._goal = message.goal or self._goal
+            self._speed_mps = abs(message.speed_mps or 0.0)
+        else:
+            self._feed.take(received)
 
     def _begin(self, now_ns: int, located: Located) -> None:
         """Go, once the place has held for a second."""
@@ -84,3 +122,12 @@ class Navigator(Process):
         if state == ARRIVED:
             return "done"
         return f"assistance: {self.control.reason}" if state == ASSISTANCE else "driving"
+
+
+def _no_faster(directive: Directive | None, speed_mps: float) -> Directive | None:
+    """Return a directive at an operator's speed; None where he wants to stand."""
+    if directive is None or speed_mps < _CREEPS_MPS:
+        return None
+    path = directive.path.copy()
+    path[:, SPEED] = np.minimum(path[:, SPEED], speed_mps)
+    return directive._replace(path=path)

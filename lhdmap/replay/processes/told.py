@@ -9,13 +9,17 @@ from lhdmap.messages import FloatArray
 
 
 class Seen(NamedTuple):
-    """Hits (N, 2) of both scanners in `base_link` at a pose (3,) in `odom`, and how far pose and scan disagree (m, rad)."""
+    """Hits (N, 2) of both scanners in `base_link` at a pose (3,) in `odom`, and how far pose and scan disagree (m, rad).
+
+    `front`: how many of the hits, the first ones, are of the front scanner.
+    """
 
     stamp_ns: int
     pose_odom: FloatArray
     points_m: FloatArray
     apart_m: float
     apart_rad: float
+    front: int
 
 
 class Asked(NamedTuple):
@@ -43,16 +47,19 @@ class Word(NamedTuple):
     speed_mps: float | None = None
     steering_rate_rps: float = 0.0
     go_on: bool = False
+    goal: str = ""
 
 
 class Health(NamedTuple):
-    """What the machine tells the station: armed, mode, standing, why it stopped, how far the mission is."""
+    """What the machine tells the station: armed, mode, standing, why it stopped, what help it asks for, its last gear."""
 
     stamp_ns: int
     armed: bool
     mode: str
     standing: bool
     causes: tuple[str, ...]
+    asks: str = ""
+    gear: int = 1
 
 
 class ModeNow:

@@ -1,0 +1,69 @@
+"""Places along a leg: where the machine is on a path, the part of it that guidance gets, the heading at a goal."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from lhdmap.driving.motion import Motion
+from lhdmap.geometry import se2
+from lhdmap.guidance.directive import Directive
+from lhdmap.messages import FloatArray
+from lhdmap.topology.model import DEAD_END, TopologicalMap, Tunnel, Waypoint
+
+_BEHIND_M, _AHEAD_M = 12.0, 60.0
+
+
+class Located(NamedTuple):
+    """Where the machine is: `status` as in localization, the same place in both frames (3,), covariance (3, 3) in `map`."""
+
+    stamp_ns: int
+    status: str
+    pose_map: FloatArray
+    pose_odom: FloatArray
+    covariance: FloatArray
+    height_m: float
+
+    @property
+    def T_odom_map(self) -> FloatArray:  # noqa: N802  # frames in the name
+        """The frame `map` in `odom` (3,)."""
+        return se2.compose(self.pose_odom, se2.inverse(self.pose_map))
+
+    @property
+    def deviation_m(self) -> float:
+        """Standard deviation of the place in the direction that is known worst."""
+        return math.sqrt(max(float(np.linalg.eigvalsh(self.covariance[:2, :2])[-1]), 0.0))
+
+
+def on_map(motion: Motion, located: Located) -> Motion:
+    """Return a motion with its place in `map`."""
+    T_map_odom = se2.compose(located.pose_map, se2.inverse(located.pose_odom))
+    x, y, heading = se2.compose(T_map_odom, np.array([motion.x_m, motion.y_m, motion.heading_rad])).tolist()
+    return motion._replace(x_m=x, y_m=y, heading_rad=heading)
+
+
+def along_m(path: FloatArray, x: float, y: float) -> float:
+    """Return how far along a path a place is."""
+    near = int(np.hypot(path[:, 0] - x, path[:, 1] - y).argmin())
+    heading = path[near, 2]
+    ahead = math.cos(heading) * (x - path[near, 0]) + math.sin(heading) * (y - path[near, 1])
+    return float(path[near, 5] + ahead)
+
+
+def part_of(now_ns: int, gear: int, path: FloatArray, stop_m: float, at_m: float) -> Directive:
+    """Return the directive with the part of a path around a place."""
+    part = (path[:, 5] > at_m - _BEHIND_M) & (path[:, 5] < at_m + _AHEAD_M)
+    return Directive(now_ns, gear, path[part], stop_m)
+
+
+def facing(topology: TopologicalMap, goal: str) -> str | None:
+    """Return the heading at a goal: a draw point or a dump at a dead end is faced with the bucket; None: any will do."""
+    point = topology.called(goal)
+    if not isinstance(point, Waypoint) or point.purpose not in ("draw_point", "dump"):
+        return None
+    node = topology.nodes[point.node]
+    if not isinstance(node, Tunnel) or DEAD_END not in node.ends:
+        return None
+    return "along" if node.ends[1] == DEAD_END else "against"

@@ -1,0 +1,45 @@
+"""How the scripted operator helps: after some seconds he backs the machine up by hand, and says to go on."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from lhdmap.replay.journal import Scribe
+from lhdmap.replay.processes.told import Health
+from lhdmap.replay.scenario import ModeAt
+from lhdmap.simulation.history import SECOND_NS
+
+_BACK_NS, _BACK_KMH = 8 * SECOND_NS, 2.2
+_WAITS = "place not known"
+
+
+class Help:
+    """Answers requests one after the other; `done`: what is left is to say that the machine is to go on."""
+
+    def __init__(self, assist_s: float, scribe: Scribe) -> None:
+        self._assist_ns, self._scribe = round(assist_s * SECOND_NS), scribe
+        self._asked_ns: int | None = None
+        self._backs_until_ns: int | None = None
+        self.done = False
+
+    def wanted(self, now_ns: int, health: Health, script: ModeAt) -> ModeAt:
+        """Return the mode that helps now, else that of the script."""
+        if not health.asks:
+            self._asked_ns, self._backs_until_ns, self.done = None, None, False
+            return script
+        self._asked_ns = now_ns if self._asked_ns is None else self._asked_ns
+        if now_ns - self._asked_ns < self._assist_ns:
+            return script
+        if _WAITS in health.asks or (self._backs_until_ns is not None and now_ns > self._backs_until_ns):
+            self._say("go on", health.asks)
+            self.done = True
+            return script
+        by_hand = replace(script, mode="teleoperated", speed_kmh=-health.gear * _BACK_KMH, steering_dps=0.0, goal="")
+        if health.armed and health.mode == by_hand.mode and self._backs_until_ns is None:
+            self._backs_until_ns = now_ns + _BACK_NS
+            self._scribe.event("helps", health.asks, by="backing up")
+        return by_hand
+
+    def _say(self, what: str, why: str) -> None:
+        if not self.done:
+            self._scribe.event("helps", why, by=what)
