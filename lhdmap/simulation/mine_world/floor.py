@@ -35,7 +35,7 @@ class Stations(NamedTuple):
     """Points of all centre lines, `rows` (N, 7): x, y, z, x and y of the direction, half width, tube; and a grid to find them.
 
     `starts` (columns · rows + 1,) lists the blocks of each cell, `blocks` (B + 1,) the `members` of each block: a few stations of
-    one tube. `places` (N, 3) are those of the members, `rounds` (B, 4) a circle around each block and its tube: x, y, radius, tube.
+    one tube. `places` (N, 3): of the members; `rounds` (B, 4): a circle around each block and its tube (x, y, radius, tube).
     `corner_m` (2,) is the grid's.
     """
 
@@ -144,7 +144,7 @@ def _line_height(x, y, z, stations):  # type: ignore[no-untyped-def]
 @nb.njit(cache=True, nogil=True)
 def _nearest_of_each(x, y, z, stations, best, station):  # type: ignore[no-untyped-def]
     """Write the nearest station of each tube near a place, and its squared distance; return how many tubes there are."""
-    rows, corner, shape, starts, blocks, members, places, rounds, cell_m = stations
+    _, corner, shape, starts, blocks, members, places, rounds, cell_m = stations
     ci, cj = int(math.floor((x - corner[0]) / cell_m)), int(math.floor((y - corner[1]) / cell_m))
     tubes = np.empty(_MOST)
     count = 0
