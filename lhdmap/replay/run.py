@@ -165,10 +165,12 @@ class _Replay:
         }
         left_out = self._timeline.left_out
         warnings = [f"{left_out} changes of state are in journal.jsonl alone: there are too many to draw"]
+        rows = film.series.rows()
+        drive = None if film.drive is None else film.drive.data(rows, self._parts.machine)
         return ReplayData(
-            f"Replay {self._request.name}", verdict, film.series.rows(), START_NS, self._timeline.changes,
+            f"Replay {self._request.name}", verdict, rows, START_NS, self._timeline.changes,
             self._parts.lines_m, film.believed_m(), self._parts.goal_m, made, scenario_toml(scenario),
-            warnings if left_out else (), None if film.drive is None else film.drive.data(), self._stops.rows(),
+            warnings if left_out else (), drive, self._stops.rows(),
         )  # fmt: skip
 
 

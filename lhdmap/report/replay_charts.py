@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -10,7 +10,7 @@ from lhdmap.messages import FloatArray
 from lhdmap.report import charts
 from lhdmap.report.path_charts import plan_axes
 from lhdmap.report.replay_data import Change, ReplayData
-from lhdmap.report.replay_drive_charts import draw_drive, name_places
+from lhdmap.report.replay_drive_charts import draw_drive, extent_m, name_places
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 _SECOND_NS = 1e9
 _MOST_BARS = 400
 _GAP_S = 1.0
-_LEGEND_IN = 0.17  # a second row of it
+_LEGEND_COLUMNS, _LEGEND_ROW_IN = 6, 0.19
 NOT_PLANNED = ""
 _LANE_IN, _NAMES_IN = 0.42, 1.15
 _SHADES = (charts.FINAL, charts.ODOMETRY, charts.TRUTH, charts.FLAGGED, charts.WHEELS, "#8a949e", "#b7d3ea", "#f0c419")
@@ -28,8 +28,8 @@ _SHADES = (charts.FINAL, charts.ODOMETRY, charts.TRUTH, charts.FLAGGED, charts.W
 def plan_chart(data: ReplayData) -> Figure:
     """Draw walls, true path, what perception believed, start, end, goal, contacts and where faults began."""
     way = data.rows[:, 1:4]
-    figure = charts.new_figure(charts.plan_height_in(np.vstack([way, *data.lines_m])) + _LEGEND_IN)
-    figure.subplots_adjust(top=1.0 - (_LEGEND_IN + 0.15) / figure.get_figheight())
+    whole = np.vstack([way, *data.lines_m]) if data.drive is None else extent_m(data.drive, way)
+    figure = charts.new_figure(charts.plan_height_in(whole, least=3.0) + _LEGEND_ROW_IN)
     axes = figure.add_subplot()
     for line in data.lines_m:
         axes.plot(line[:, 0], line[:, 1], color=charts.INK, linewidth=0.6, alpha=0.35)
@@ -48,10 +48,20 @@ def plan_chart(data: ReplayData) -> Figure:
     begun = [fault["began_s"] for fault in data.verdict["faults"] if fault["began_s"] is not None]
     _marks(axes, [_place_at(data, at_s) for at_s in begun], "v", charts.FLAGGED, "fault begins")
     plan_axes(axes)
-    charts.legend_above(axes, columns=6)
+    rows = -(-len(axes.get_legend_handles_labels()[0]) // _LEGEND_COLUMNS)
+    figure.subplots_adjust(top=1.0 - (0.12 + _LEGEND_ROW_IN * rows) / figure.get_figheight())
+    charts.legend_above(axes, columns=_LEGEND_COLUMNS)
     if data.drive is not None:
+        _look_at(figure, axes, whole)
         name_places(axes, data.drive, way)
     return figure
+
+
+def _look_at(figure: Figure, axes: Axes, corners_m: FloatArray) -> None:
+    """Set the limits to corners (2, 2), and to more on the sides that have room."""
+    low, high = corners_m
+    axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), autoscale_on=False)
+    figure.draw_without_rendering()
 
 
 def time_chart(data: ReplayData) -> Figure:
@@ -94,7 +104,7 @@ def time_chart(data: ReplayData) -> Figure:
     return figure
 
 
-def _curve(axes: Axes, x: FloatArray, y: FloatArray, colour: str, label: str, **more: float) -> None:
+def _curve(axes: Axes, x: FloatArray, y: FloatArray, colour: str, label: str, **more: Any) -> None:
     axes.plot(*charts.envelope(x, y), color=colour, label=label, **more)
 
 

@@ -39,11 +39,12 @@ class StopRow(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class DriveData:
-    """What a machine that drives itself planned and believed, in the frame of the truth: both are aligned at the start.
+    """What a machine that drives itself planned and believed, in the frame of the truth.
 
     `plans` (N, 5) of `PLAN_COLUMNS`, of which the last is an index of `limits`: what limits the speed; `horizons`: predicted
     ways (K, 3) of the leading axle; `places` (M, 5) of `PLACE_COLUMNS`: place by localization less the true one, in the axes of
-    the machine, and the standard deviation that it tells. `topology` None: the place was never known.
+    the machine, and the standard deviation that it tells. `topology` None: the place was never known. `bodies`: lines (5, 2)
+    around both bodies on the way.
     """
 
     topology: TopologicalMap | None
@@ -52,6 +53,7 @@ class DriveData:
     limits: Sequence[str]
     horizons: Sequence[FloatArray]
     places: FloatArray
+    bodies: Sequence[FloatArray] = ()
 
     def plan(self, name: str) -> FloatArray:
         """Return a column of `plans` by its name, shape (N,)."""

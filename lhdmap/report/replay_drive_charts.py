@@ -1,4 +1,4 @@
-"""Charts of a drive on a map: the map with the legs and what guidance predicted, and the place by localization against the truth."""
+"""Charts of a drive on a map: the map, legs and what guidance predicted; the place by localization against the truth."""
 
 from __future__ import annotations
 
@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 FORWARD, REVERSE, HORIZON = "#7fcdb0", "#f3cf7f", "#cc79a7"
+_AROUND_M = 15.0
 _GEARS = (("forward", FORWARD), ("reverse", REVERSE))
 
 
@@ -32,8 +33,15 @@ def draw_drive(axes: Axes, drive: DriveData) -> None:
     for gear, colour in _GEARS:
         lines = [leg.line_m for leg in drive.legs if leg.gear == gear]
         drawing.draw_lines(axes, lines, colour, "-", f"leg, {gear}", linewidth=4.0, zorder=1.8)
+    drawing.draw_lines(axes, drive.bodies, charts.INK, "-", "both bodies", linewidth=0.7, alpha=0.8, zorder=2.5)
     ways = [line for line in drive.horizons if len(line)]
     drawing.draw_lines(axes, ways, HORIZON, "-", "predicted way", linewidth=0.6, alpha=0.7, zorder=2.6)
+
+
+def extent_m(drive: DriveData, way_m: FloatArray) -> FloatArray:
+    """Return the corners (2, 2) of what is looked at: the way (N, 3) and the legs, with room around them."""
+    points = np.concatenate([way_m[:, :2], *(leg.line_m[:, :2] for leg in drive.legs)])
+    return np.array([points.min(axis=0) - _AROUND_M, points.max(axis=0) + _AROUND_M])
 
 
 def name_places(axes: Axes, drive: DriveData, way_m: FloatArray) -> None:
@@ -45,7 +53,6 @@ def name_places(axes: Axes, drive: DriveData, way_m: FloatArray) -> None:
     names = [(one.name, one.pose, 4.0) for one in topology.waypoints]
     names += [(one.name, one.T_map_node, 1.0) for one in topology.intersections]
     names += [(one.name, middle(one.line_m), 1.5) for one in topology.tunnels if (one.id, one.name) not in said]
-    axes.figure.draw_without_rendering()
     low, high = np.array([axes.get_xlim(), axes.get_ylim()]).T
     near = [one for one in names if (one[1][:2] > low).all() and (one[1][:2] < high).all()]
     drawing.draw_labels(axes, near, [way_m, *(one.line_m for one in topology.tunnels)])

@@ -17,12 +17,12 @@ if TYPE_CHECKING:
 
 PLAN = "The way from above: what truly happened, and where perception believed the machine, placed at the true start."
 DRIVE = (
-    "The map that is driven on (aligned with the truth where the machine stood at the start, for this picture alone), the legs that "
-    "navigation asked for, and each way of the leading axle that guidance predicted, drawn from where the machine truly was."
+    "The map that is driven on, the legs that navigation asked for, and each way of the leading axle that guidance predicted, "
+    "drawn from where the machine truly was. Map and truth are laid over each other, for this picture alone, as they fit best."
 )
 PLACE = (
-    "Place by localization less the true one, in the axes of the machine; map and truth are aligned at the start, so that errors of "
-    "the map are in it."
+    "Place by localization less the true one, in the axes of the machine; map and truth are laid over each other as they fit best "
+    "over the drive: errors of localization and of the map."
 )
 TIME = (
     "Speed, joint angle and clearance as they truly were; what was planned, predicted and commanded beside it. Stretches with a "

@@ -132,9 +132,11 @@ class ReplayRecording:
             self._writer.explain("red points", "contacts")
 
     def _add_drive(self, drive: DriveData) -> None:
-        """Record the legs that were asked for, and by how much the place on the map was off."""
+        """Record the map where it fits best, the legs that were asked for, and by how much the place on the map was off."""
         import rerun as rr
 
+        if drive.topology is not None:
+            self.add_map(drive.topology)
         for gear, (rgba, colour) in _GEARS.items():
             lines = [raised(leg.line_m) for leg in drive.legs if leg.gear == gear]
             if lines:

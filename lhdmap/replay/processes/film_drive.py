@@ -1,7 +1,7 @@
 """What a machine that drives itself plans and believes, as the film sees it: beside the truth, and in its frame.
 
-The map is aligned with the truth once, where the machine stands at the start, and for the picture alone. Plans are drawn from
-where the machine truly is.
+Map and truth are laid over each other for the picture alone: while it goes on where the machine stood at the start, at the end
+as they fit best over the drive. Plans are drawn from where the machine truly is.
 """
 
 from __future__ import annotations
@@ -12,26 +12,31 @@ from typing import Any
 
 import numpy as np
 
+from lhdmap.driving.bodies import bodies_of
 from lhdmap.geometry import se2
 from lhdmap.guidance.directive import WAY, Directive, moved
 from lhdmap.guidance.planner import Plan
+from lhdmap.kinematics import T_base_rear
+from lhdmap.machine import Machine
 from lhdmap.messages import FloatArray
 from lhdmap.navigation.control import Located
 from lhdmap.replay.parts import State
 from lhdmap.replay.process import DIRECTIVE, LOCATED, PLAN, POSE
 from lhdmap.replay.series import Series
-from lhdmap.report.replay_data import PLACE_COLUMNS, PLAN_COLUMNS, DriveData
+from lhdmap.report.replay_data import COLUMNS, PLACE_COLUMNS, PLAN_COLUMNS, DriveData
 from lhdmap.report.route_legs import Leg
 from lhdmap.simulation.history import SECOND_NS, START_NS
-from lhdmap.topology.carried import carried
+from lhdmap.topology.carried import carried, carried_points
 from lhdmap.topology.model import TopologicalMap
 
 TOPICS = (POSE, LOCATED, DIRECTIVE, PLAN)
 _EACH_NS = SECOND_NS // 5
 _ABOVE_M = 0.4
 _KEPT = 400  # true states: four seconds
-_MOST_HORIZONS, _MOST_LEGS, _MOST_FIXES = 300, 500, 100
-_ON_PATH_M = 0.05
+_MOST_HORIZONS, _MOST_LEGS = 300, 500
+_ON_PATH_M, _BODIES_M = 0.05, 15.0
+_PLACED = 10  # time, true pose (x, y, z, yaw), place on the map (x, y, yaw, z), deviation
+_HEADING_M = 2.0  # so far from a place its heading counts as much as the place itself
 
 
 class Truth:
@@ -70,10 +75,9 @@ class DriveFilm:
         self.truth = Truth()
         self.map: TopologicalMap | None = None
         self.planned_mps = self.predicted_m = math.nan
-        self._plans, self._places = Series(len(PLAN_COLUMNS)), Series(len(PLACE_COLUMNS))
+        self._plans, self._places = Series(len(PLAN_COLUMNS)), Series(_PLACED)
         self._limits: dict[str, int] = {}
         self._horizons, self._looked_ns = _Thinned(_MOST_HORIZONS), 0
-        self._fixes: list[tuple[FloatArray, Located]] = []
         self._T_true_map: FloatArray | None = None
         self._T_true_odom: FloatArray | None = None
         self._located: Located | None = None
@@ -119,10 +123,16 @@ class DriveFilm:
         legs = self._drawn_legs(self._legs[-1:])
         return legs[0] if legs else None
 
-    def data(self) -> DriveData:
-        """Return all of it."""
-        rows, places = self._plans.rows(), self._places.rows()
-        return DriveData(self.map, self._drawn_legs(self._legs), rows, tuple(self._limits), self._horizons.kept, places)
+    def data(self, rows: FloatArray, machine: Machine) -> DriveData:
+        """Return all of it; `rows` (N, 10) of the replay, for the bodies of the machine on its way."""
+        told, places = self._places.rows(), np.empty((0, len(PLACE_COLUMNS)))
+        if len(told):
+            self._align(told)
+        if self._T_true_map is not None:
+            places = _off(told, self._T_true_map)
+        bodies = outlines(rows, machine, _BODIES_M) if len(rows) else []
+        plans, legs = self._plans.rows(), self._drawn_legs(self._legs)
+        return DriveData(self.map, legs, plans, tuple(self._limits), self._horizons.kept, places, bodies)
 
     def _pose(self, stamp_ns: int, T_odom_base: FloatArray) -> None:
         true = self.truth.at(stamp_ns)
@@ -136,17 +146,14 @@ class DriveFilm:
         true = self.truth.at(located.stamp_ns)
         if true is None or located.status == "lost":
             return
-        if self._T_true_map is None:
-            self._fixes = [*self._fixes, (true, located)][-_MOST_FIXES:]
-            return
-        apart = se2.between(true[[0, 1, 3]], se2.compose(self._T_true_map[[0, 1, 3]], located.pose_map))
         deviation = math.sqrt(max(float(np.linalg.eigvalsh(located.covariance[:2, :2])[-1]), 0.0))
-        self._places.add(((located.stamp_ns - START_NS) / SECOND_NS, *apart.tolist(), deviation))
+        time_s = (located.stamp_ns - START_NS) / SECOND_NS
+        self._places.add((time_s, *true.tolist(), *located.pose_map.tolist(), located.height_m, deviation))
 
     def _ask(self, asked: Directive) -> None:
         """Keep what is new of the path that is asked for; with the first one the start is over."""
-        if self._T_true_map is None:
-            self._align()
+        if self._T_true_map is None and len(self._places.rows()):
+            self._align(self._places.rows())
         if self._located is None or self._T_true_map is None:
             return
         way, leg = asked.path[:, WAY], (asked.gear, round(asked.stop_m, 2))
@@ -158,8 +165,7 @@ class DriveFilm:
         new = (way > self._along_m) & (way < asked.stop_m + _ON_PATH_M)
         if new.any():
             T_map_odom = se2.compose(self._located.pose_map, se2.inverse(self._located.pose_odom))
-            T_true_odom = se2.compose(self._T_true_map[[0, 1, 3]], T_map_odom)
-            self._legs[-1][1].append(moved(asked.path[new], T_true_odom)[:, :2])
+            self._legs[-1][1].append(moved(asked.path[new], T_map_odom)[:, :2])
             self._along_m = float(way[new][-1])
 
     def _begin_m(self, asked: Directive) -> float:
@@ -169,29 +175,21 @@ class DriveFilm:
         near = int(np.hypot(asked.path[:, 0] - x, asked.path[:, 1] - y).argmin())
         return float(asked.path[near, WAY]) - 1e-6
 
-    def _align(self) -> None:
-        """Align map and truth at the start: by all places that were told while the machine stood there."""
-        if not self._fixes:
-            return
-        true = np.array([one for one, _ in self._fixes])
-        told = np.array([[*one.pose_map, one.height_m] for _, one in self._fixes])
-        turns = true[:, 3] - told[:, 2]
-        yaw = math.atan2(float(np.sin(turns).mean()), float(np.cos(turns).mean()))
-        c, s = math.cos(yaw), math.sin(yaw)
-        (x, y), (tx, ty) = told[:, :2].mean(axis=0), true[:, :2].mean(axis=0)
-        z = float((true[:, 2] - told[:, 3]).mean())
-        self._T_true_map = np.array([tx - c * x + s * y, ty - s * x - c * y, z, yaw])
-        self._fixes = []
+    def _align(self, rows: FloatArray) -> None:
+        """Lay map and truth over each other by rows (N, 10) of true poses and places on the map."""
+        self._T_true_map = _fitted(rows)
         if self._topology is not None:
             self.map = carried(self._topology, self._T_true_map)
 
     def _drawn_legs(self, legs: list[tuple[str, list[FloatArray]]]) -> list[Leg]:
-        """Return legs with lines (N, 3), on the floor of the map's nearest tunnel point."""
-        floor = np.zeros((1, 3)) if self.map is None else np.concatenate([one.line_m for one in self.map.connections])
+        """Return legs with lines (N, 3) in the frame of the truth, on the floor of the nearest way of the map."""
+        if self.map is None or self._T_true_map is None:
+            return []
+        floor = np.concatenate([np.zeros((1, 3)), *(one.line_m for one in self.map.connections)])
         drawn = []
         for gear, parts in legs:
             if parts:
-                line = np.concatenate(parts)
+                line = carried_points(np.concatenate(parts), self._T_true_map)
                 near = [int(np.hypot(floor[:, 0] - x, floor[:, 1] - y).argmin()) for x, y in line]
                 drawn.append(Leg(gear, np.column_stack([line, floor[near, 2]])))
         return drawn
@@ -211,3 +209,43 @@ class _Thinned:
             if len(self.kept) >= self._most:
                 self.kept, self._step = self.kept[::2], 2 * self._step
         self._seen += 1
+
+
+def _fitted(rows: FloatArray) -> FloatArray:
+    """Return T_true_map (4,: x, y, z, yaw) that fits best to rows of true poses and places on the map; headings count, too."""
+    true, told = rows[:, 1:5], rows[:, 5:9]
+    p, q = told[:, :2] - told[:, :2].mean(axis=0), true[:, :2] - true[:, :2].mean(axis=0)
+    turn = true[:, 3] - told[:, 2]
+    sine = float((p[:, 0] * q[:, 1] - p[:, 1] * q[:, 0] + _HEADING_M**2 * np.sin(turn)).sum())
+    cosine = float((p * q).sum() + (_HEADING_M**2 * np.cos(turn)).sum())
+    yaw = math.atan2(sine, cosine)
+    at = np.array([0.0, 0.0, 0.0, yaw])
+    shift = (true[:, :2] - carried_points(told[:, :2], at)).mean(axis=0)
+    return np.array([*shift, float((true[:, 2] - told[:, 3]).mean()), yaw])
+
+
+def _off(rows: FloatArray, T_true_map: FloatArray) -> FloatArray:
+    """Return rows of `PLACE_COLUMNS`: the place on the map less the true one in the axes of the machine."""
+    true, yaw = rows[:, 1:5], rows[:, 4]
+    apart = carried_points(rows[:, 5:7], T_true_map) - true[:, :2]
+    along, across = (
+        np.cos(yaw) * apart[:, 0] + np.sin(yaw) * apart[:, 1],
+        np.cos(yaw) * apart[:, 1] - np.sin(yaw) * apart[:, 0],
+    )
+    turn = rows[:, 7] + T_true_map[3] - yaw
+    return np.column_stack([rows[:, 0], along, across, np.arctan2(np.sin(turn), np.cos(turn)), rows[:, 9]])
+
+
+def outlines(rows: FloatArray, machine: Machine, each_m: float) -> list[FloatArray]:
+    """Return both bodies of a machine as lines (5, 2) after each `each_m` of its way and at its end; rows as of the replay."""
+    x, y, yaw, bend = (rows[:, COLUMNS.index(name)] for name in ("x_m", "y_m", "yaw_rad", "articulation_rad"))
+    way = np.concatenate([[0.0], np.cumsum(np.hypot(np.diff(x), np.diff(y)))])
+    wanted = np.searchsorted(way, np.arange(0.0, way[-1], each_m))
+    bodies, drawn = bodies_of(machine), []
+    for row in sorted({*wanted.tolist(), len(way) - 1}):
+        T_base = np.array([x[row], y[row], yaw[row]])
+        T = T_base_rear(float(bend[row]), machine)
+        T_rear = se2.compose(T_base, np.array([T[0, 3], T[1, 3], math.atan2(T[1, 0], T[0, 0])]))
+        for pose, ((x0, y0), (x1, y1)) in ((T_base, bodies.front_box_m), (T_rear, bodies.rear_box_m)):
+            drawn.append(se2.transform(pose, np.array([(x0, y0), (x1, y0), (x1, y1), (x0, y1), (x0, y0)])))
+    return drawn
