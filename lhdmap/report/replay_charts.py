@@ -48,8 +48,8 @@ def plan_chart(data: ReplayData) -> Figure:
     begun = [fault["began_s"] for fault in data.verdict["faults"] if fault["began_s"] is not None]
     _marks(axes, [_place_at(data, at_s) for at_s in begun], "v", charts.FLAGGED, "fault begins")
     plan_axes(axes)
-    rows = -(-len(axes.get_legend_handles_labels()[0]) // _LEGEND_COLUMNS)
-    figure.subplots_adjust(top=1.0 - (0.12 + _LEGEND_ROW_IN * rows) / figure.get_figheight())
+    heads = -(-len(axes.get_legend_handles_labels()[0]) // _LEGEND_COLUMNS)
+    figure.subplots_adjust(top=1.0 - (0.12 + _LEGEND_ROW_IN * heads) / figure.get_figheight())
     charts.legend_above(axes, columns=_LEGEND_COLUMNS)
     if data.drive is not None:
         _look_at(figure, axes, whole)

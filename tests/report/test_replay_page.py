@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -66,6 +67,6 @@ def test_the_plan_looks_at_the_drive_with_all_its_names_within() -> None:
 
 @pytest.mark.parametrize("left_out", ["topology", "plans", "places", "legs"])
 def test_what_is_not_known_is_left_out(left_out: str) -> None:
-    empty = {"topology": None, "plans": np.empty((0, 5)), "places": np.empty((0, 5)), "legs": []}
+    empty: dict[str, Any] = {"topology": None, "plans": np.empty((0, 5)), "places": np.empty((0, 5)), "legs": []}
     assert render(replace(replayed(), drive=replace(drive(), **{left_out: empty[left_out]})))
     assert "Place on the map" not in render(replace(replayed(), drive=None))
