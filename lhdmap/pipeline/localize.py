@@ -362,7 +362,7 @@ class Localizer:
         if math.hypot(off[0], off[1]) > _SAME_M:
             return
         std = np.array([0.15, 0.15, math.radians(1.0)])
-        tracker.pose, tracker.P = found.pose.copy(), np.diag(std**2)
+        self._tracker = self._tracks(found.pose.copy(), std, tracker.height_m)
         self._status, self._near = TRACKING, None
         self._supports.clear()
 

@@ -30,7 +30,8 @@ def bend_line(radius_m: float, turn_deg: float, before_m: float = 22.0, after_m:
     """Straight, arc, straight."""
     arc = math.radians(abs(turn_deg)) * radius_m
     s = np.arange(0.0, before_m + arc + after_m, STEP_M)
-    return line_of(math.copysign(1.0 / radius_m, turn_deg) * ((s >= before_m) & (s < before_m + arc)))
+    bent: FloatArray = ((s >= before_m) & (s < before_m + arc)).astype(np.float64)
+    return line_of(math.copysign(1.0 / radius_m, turn_deg) * bent)
 
 
 def winding_line(

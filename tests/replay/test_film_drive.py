@@ -10,11 +10,12 @@ import pytest
 from lhdmap.geometry import se2
 from lhdmap.guidance.directive import Directive, path_of
 from lhdmap.guidance.planner import Plan
+from lhdmap.guidance.prediction import Slopes
 from lhdmap.guidance.profile import Speeds
 from lhdmap.guidance.solver import Solution
 from lhdmap.machine import Machine
 from lhdmap.messages import FloatArray
-from lhdmap.navigation.control import Located
+from lhdmap.navigation.along import Located
 from lhdmap.replay.journal import Event
 from lhdmap.replay.process import DIRECTIVE, LOCATED, PLAN, POSE
 from lhdmap.replay.processes.film_drive import DriveFilm, Truth, outlines
@@ -71,7 +72,15 @@ def _plan(now_ns: int, odom: FloatArray) -> Plan:
     states = np.zeros((3, 5))
     states[:, :3] = [se2.compose(odom, np.array([float(k), 0.0, 0.0])) for k in range(3)]
     solution = Solution(np.zeros(2), states, np.array([0.9, 0.5, 0.7]), np.zeros(3, dtype=np.int64), 0.0, 1)
-    return Plan(now_ns, 1, (), now_ns, solution, Speeds(np.full(3, 2.0), 15.0, "sight"))
+    return Plan(
+        now_ns,
+        1,
+        (),
+        now_ns,
+        solution,
+        Speeds(np.full(3, 2.0), np.zeros(2), 0.15, 15.0, "sight", np.zeros(3), np.ones(3)),
+        Slopes(np.zeros(2), np.zeros(2)),
+    )
 
 
 def _driven(error_m: float = 0.0, seconds: float = 4.0) -> tuple[DriveFilm, list[FloatArray]]:

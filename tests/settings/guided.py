@@ -15,7 +15,8 @@ from lhdmap.guidance.local_walls import LocalWalls
 from lhdmap.guidance.settings import GuidanceSettings
 from lhdmap.movement.route import Route, route_json
 from lhdmap.movement.routes import RouteOptions, RoutePlanner
-from lhdmap.navigation.control import Located, NavigationControl
+from lhdmap.navigation.along import Located
+from lhdmap.navigation.control import NavigationControl
 from lhdmap.navigation.room import with_room
 from lhdmap.topology.model import TopologicalMap
 
@@ -91,7 +92,7 @@ class Trip:
             return
         self.said.append((self.control.state, asked.gear, asked.stop_m, asked.path))
         lead = lead_of(asked.gear, MODEL, BODIES)
-        state = lead.state(Motion(0, *self.pose.tolist(), 0.0, 0.0, 0.0))
+        state = lead.state(Motion(0, float(self.pose[0]), float(self.pose[1]), float(self.pose[2]), 0.0, 0.0, 0.0))
         path = asked.path
         near = int(np.hypot(path[:, 0] - state[0], path[:, 1] - state[1]).argmin())
         left = asked.stop_m - float(path[near, 5])

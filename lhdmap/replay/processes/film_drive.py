@@ -19,7 +19,7 @@ from lhdmap.guidance.planner import Plan
 from lhdmap.kinematics import T_base_rear
 from lhdmap.machine import Machine
 from lhdmap.messages import FloatArray
-from lhdmap.navigation.control import Located
+from lhdmap.navigation.along import Located
 from lhdmap.replay.parts import State
 from lhdmap.replay.process import DIRECTIVE, LOCATED, PLAN, POSE
 from lhdmap.replay.series import Series
