@@ -174,8 +174,8 @@ def _plan_line(found: Mapping[str, Any]) -> str:
 
 
 def _scenario_line(told: Mapping[str, Any]) -> str:
-    """Say who drove where: by hand along a route, or by itself to a goal."""
-    who = told.get("driver") or ("operator" if told.get("route") else "by itself")
+    """Say who drove where."""
+    who = told.get("driver") or ("autonomous" if told.get("goal") else "operator")
     way = f"route {told['route']}" if told.get("route") else f"to {told['goal']}" if told.get("goal") else "all drifts"
     start = f"from {told['start']} " if told.get("start") else ""
     load = f", {told['load']:.1f} t" if told.get("load") else ""
