@@ -55,6 +55,7 @@ def folder_values(path: Path) -> dict[str, Any]:
         "files": {one.name: one.stat().st_size for one in sorted(path.iterdir()) if one.is_file()},
         "changed": folder.changed_files(by_size=True),
         "warnings": folder.warnings,
+        **({"scenario": info["options"]["scenario"]} if "scenario" in info.get("options", {}) else {}),
         **({"map": folder_values(path / info["map"])} if "map" in info else {}),
     }
 
@@ -83,6 +84,8 @@ def folder_lines(values: Mapping[str, Any]) -> list[str]:
     for source in values["sources"][:1]:
         more = f" and {len(values['sources']) - 1} more" if len(values["sources"]) > 1 else ""
         lines.append(f"made from    {source['path']}{'' if source['there'] else ' (not found from here)'}{more}")
+    if "scenario" in values:
+        lines.append(_scenario_line(values["scenario"]))
     lines += _drive_lines(values["counts"])
     lines += _tracked_lines(values["counts"])
     lines += _result_lines(Path(values["path"]))
@@ -170,10 +173,22 @@ def _plan_line(found: Mapping[str, Any]) -> str:
     return f"plan         {str(found['path']).upper()}, {found['timing']}: {found['duration_s']:.2f} s"
 
 
+def _scenario_line(told: Mapping[str, Any]) -> str:
+    """Say who drove where."""
+    who = told.get("driver") or ("autonomous" if told.get("goal") else "operator")
+    way = f"route {told['route']}" if told.get("route") else f"to {told['goal']}" if told.get("goal") else "all drifts"
+    start = f"from {told['start']} " if told.get("start") else ""
+    load = f", {told['load']:.1f} t" if told.get("load") else ""
+    return f"scenario     {who}, {start}{way}{load}; mine {Path(str(told.get('mine'))).stem}, seed {told.get('seed')}"
+
+
 def _verdict_line(found: Mapping[str, Any]) -> str:
     contacts, near = len(found.get("contacts", [])), found.get("min_clearance_m")
-    walls = f"{contacts} contacts" + ("" if near is None else f", clearance {near:.2f} m")
-    return f"verdict      {'ok' if found.get('ok') else 'not ok'}: {found.get('reason')}; {walls}"
+    parts = [f"{contacts} contacts" + ("" if near is None else f", clearance {near:.2f} m")]
+    for name, words in (("stops", "stops"), ("assists", "requests for assistance")):
+        parts += [f"{found[name]} {words}"] if found.get(name) else []
+    parts += [f"{len(found['faults'])} faults"] if found.get("faults") else []
+    return f"verdict      {'ok' if found.get('ok') else 'not ok'}: {found.get('reason')}; {', '.join(parts)}"
 
 
 _RESULTS = {"pile.json": _pile_line, "plan.json": _plan_line, "verdict.json": _verdict_line}

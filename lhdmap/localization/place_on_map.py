@@ -58,9 +58,13 @@ class Placer:
         weights = 1.0 / (np.atleast_1d(apart) + 0.5)
         return float((weights * self._heights[np.atleast_1d(near), 2]).sum() / weights.sum())
 
+    def node_at(self, pose: FloatArray, height_m: float) -> str:
+        """Return the id of the node that a pose (3,) at a height is in; empty where it is in none."""
+        return self._lookup.nodes_at(np.array([[pose[0], pose[1], height_m]]))[0]
+
     def at(self, pose: FloatArray, height_m: float, speed_mps: float) -> Place:
         """Return the place of a pose (3,) at a height, moving at a signed speed along its heading."""
-        node = self._lookup.nodes_at(np.array([[pose[0], pose[1], height_m]]))[0]
+        node = self.node_at(pose, height_m)
         found = self._topology.nodes.get(node)
         if found is None:
             return Place("", math.nan, math.nan, math.nan, height_m, "", math.nan)

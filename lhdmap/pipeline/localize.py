@@ -327,8 +327,8 @@ class Localizer:
             else:
                 self.start = best_start(self._walls, self._starts, points)
                 tracker.pose, tracker.height_m = self.start.pose.copy(), self.start.height_m
-        place = self._placer.at(tracker.pose, tracker.height_m, 1.0)
-        said = tracker.correct(points, front or len(points), self._walls.quality(place.node))
+        node = self._placer.node_at(tracker.pose, tracker.height_m)
+        said = tracker.correct(points, front or len(points), self._walls.quality(node))
         tracker.height_m = self._placer.height_m(tracker.pose[0], tracker.pose[1], tracker.height_m)
         self._supports.append(said.support)
         self._information = said.information_along
@@ -369,8 +369,8 @@ class Localizer:
     def _wanted_support(self) -> float:
         """Return the share of hits that must agree with the walls where the machine is."""
         assert self._tracker is not None  # noqa: S101  # asked where there is one
-        place = self._placer.at(self._tracker.pose, self._tracker.height_m, 1.0)
-        least = self._walls.quality(place.node).support_least
+        node = self._placer.node_at(self._tracker.pose, self._tracker.height_m)
+        least = self._walls.quality(node).support_least
         return max((least if math.isfinite(least) else _LEAST_SUPPORT) - self._settings.support_drop, 0.15)
 
     def _drop(self, why: str) -> None:

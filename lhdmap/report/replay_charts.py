@@ -52,16 +52,18 @@ def plan_chart(data: ReplayData) -> Figure:
     figure.subplots_adjust(top=1.0 - (0.12 + _LEGEND_ROW_IN * heads) / figure.get_figheight())
     charts.legend_above(axes, columns=_LEGEND_COLUMNS)
     if data.drive is not None:
-        _look_at(figure, axes, whole)
+        _look_at(axes, whole)
         name_places(axes, data.drive, way)
     return figure
 
 
-def _look_at(figure: Figure, axes: Axes, corners_m: FloatArray) -> None:
-    """Set the limits to corners (2, 2), and to more on the sides that have room."""
+def _look_at(axes: Axes, corners_m: FloatArray) -> None:
+    """Set the limits to corners (2, 2) with equal scales, and to more on the sides that have room."""
     low, high = corners_m
-    axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), autoscale_on=False)
-    figure.draw_without_rendering()
+    room = np.array([axes.bbox.width, axes.bbox.height])
+    half = 0.5 * room * float(((high - low) / room).max())
+    x, y = 0.5 * (low + high)
+    axes.set(xlim=(x - half[0], x + half[0]), ylim=(y - half[1], y + half[1]), autoscale_on=False, aspect="equal")
 
 
 def time_chart(data: ReplayData) -> Figure:

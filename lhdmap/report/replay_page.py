@@ -48,6 +48,7 @@ def render(data: ReplayData) -> str:
         markup.section("What happened", markup.cards(_cards(data)) + markup.paragraph(SIMULATED)),
         markup.section("Warnings", markup.listed(data.warnings, "warning")),
         *pictures,
+        markup.section("What navigation decided", _decided(data)),
         markup.section("Stops", _stops(data.stops)),
         markup.section("Contacts", _contacts(data.verdict["contacts"])),
         markup.section("Faults and what followed", _faults(data.verdict["faults"])),
@@ -105,6 +106,12 @@ def _pictures(data: ReplayData) -> Iterator[str]:
 
 def _picture(figure: Figure, caption: str) -> str:
     return markup.picture(charts.svg_uri(figure), caption)
+
+
+def _decided(data: ReplayData) -> str:
+    changes = data.changes.get("navigation", ())[:_MOST_ROWS]
+    rows = [(f"{1e-9 * (one.t_ns - data.start_ns):.2f}", one.state, one.cause) for one in changes]
+    return markup.table(("time, s", "state", "why"), rows, numbers_from=0, numbers_to=1) if rows else ""
 
 
 def _stops(stops: Sequence[StopRow]) -> str:

@@ -70,7 +70,7 @@ def corridor(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Callable[[Strai
     """Have the command drive in the corridor: the file of a scenario."""
 
     def made(operator: Straight) -> Path:
-        def parts_of(_: Scenario) -> Parts:
+        def parts_of(_: Scenario, _folder: Path) -> Parts:
             return parts(operator)
 
         monkeypatch.setattr("lhdmap.replay.run.parts_of", parts_of)

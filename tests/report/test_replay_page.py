@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 import pytest
@@ -33,6 +32,7 @@ def test_it_has_map_legs_plans_place_and_limits(page: str) -> None:
 
 def test_stops_say_why_and_are_escaped(page: str) -> None:
     assert "contact on the braking path" in page
+    assert "<td>driving</td><td>route</td>" in page.replace("\n", "")
     assert "guard: &lt;points&gt;" in page
 
 
@@ -65,8 +65,16 @@ def test_the_plan_looks_at_the_drive_with_all_its_names_within() -> None:
     assert high[0] <= 0.0 <= high[1]
 
 
-@pytest.mark.parametrize("left_out", ["topology", "plans", "places", "legs"])
-def test_what_is_not_known_is_left_out(left_out: str) -> None:
-    empty: dict[str, Any] = {"topology": None, "plans": np.empty((0, 5)), "places": np.empty((0, 5)), "legs": []}
-    assert render(replace(replayed(), drive=replace(drive(), **{left_out: empty[left_out]})))
-    assert "Place on the map" not in render(replace(replayed(), drive=None))
+def test_what_is_not_known_is_left_out() -> None:
+    nothing = replace(drive(), topology=None, plans=np.empty((0, 5)), places=np.empty((0, 5)), legs=[])
+    page = render(replace(replayed(), drive=nothing, stops=(), changes={}))
+    for one in ("Place on the map", "slowed by", "Stops", "States", "What navigation decided"):
+        assert f">{one}<" not in page
+    assert "Way" in page
+
+
+def test_a_drive_by_hand_has_no_map() -> None:
+    with charts.styled():
+        told = charts.svg_text(replay_charts.plan_chart(replace(replayed(), drive=None)))
+    assert "true path" in told
+    assert "tunnel of the map" not in told

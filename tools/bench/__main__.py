@@ -14,6 +14,7 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 from tools.bench.landmarks import landmark_figures
 from tools.bench.movement import movement_figures
+from tools.bench.replay import replay_figures
 from tools.bench.rockbreaker import rockbreaker_figures
 from tools.bench.runs import build_figures, simulate, startup_figures
 from tools.bench.stages import reading_figure, stage_figures
@@ -38,6 +39,7 @@ def measure(durations_s: tuple[float, ...]) -> Iterator[Figure]:
     yield from movement_figures()
     yield from landmark_figures()
     yield from rockbreaker_figures(10_000 if durations_s[-1] > 60.0 else 1_000)
+    yield from replay_figures()
     with tempfile.TemporaryDirectory() as folder:
         logs = [simulate(Path(folder), duration_s) for duration_s in durations_s]
         yield reading_figure(logs[0], stages[0].measured)
