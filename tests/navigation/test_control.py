@@ -134,7 +134,7 @@ def test_a_missed_end_is_an_overrun() -> None:
 def test_another_goal_in_the_other_gear_rests_first() -> None:
     topology = ladder()
     goals = (*topology.waypoints, Waypoint("w2", "P1", "t1", pose(20.0, 0.0, 0.0), "park"))
-    points = {one.id: one.pose for one in (*topology.access_points, *goals)}
+    points = {**{one.id: one.pose for one in topology.access_points}, **{one.id: one.pose for one in goals}}
     more = [connection(points, "t1.start", "w2"), connection(points, "w2", "t1.end")]
     rod = Rod(at(6.0, 0.0, 0.0), replace(topology, waypoints=goals, connections=(*topology.connections, *more)))
     rod.go("t1.end", "t1.start")

@@ -4,25 +4,28 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
 from lhdmap.guidance.directive import ROUTE, SPEED, WAY
+from lhdmap.movement.route import Route
 from lhdmap.movement.routes import RouteOptions, RoutePlanner
 from lhdmap.navigation.leg import Leg, legs_of
 from lhdmap.navigation.room import room_m, with_room
 from lhdmap.navigation.settings import NavigationSettings
-from lhdmap.topology.model import TopologicalMap
+from lhdmap.topology.model import Preference, TopologicalMap
 
 from tests.movement.mines import with_connection
 from tests.topology.maps import ladder
 
+WALLS: list[tuple[Preference, float]] = [("left", 1.0), ("right", -1.0), ("centre", 0.0)]
 SETTINGS = NavigationSettings()
 WHEELBASE_M, NOSE_M, TAIL_M = 3.4, 3.2, 6.5
 
 
 def legs(start: str, goal: str, heading: str, goal_heading: str | None = None, topology: TopologicalMap | None = None,
-         **more: float) -> list[Leg]:  # fmt: skip
+         **more: Any) -> list[Leg]:  # fmt: skip
     topology = topology or ladder()
     asked = RouteOptions(heading=heading, goal_heading=goal_heading, alternatives=0)
     route = RoutePlanner(topology).route(start, goal, asked)
@@ -100,9 +103,11 @@ def test_the_route_counts_more_in_and_about_intersections() -> None:
     assert weight.tolist() == [1.0, SETTINGS.crossing_weight, SETTINGS.crossing_weight]
 
 
-@pytest.mark.parametrize(("wall", "sign"), [("left", 1.0), ("right", -1.0), ("centre", 0.0)])
+@pytest.mark.parametrize(("wall", "sign"), WALLS)
 @pytest.mark.parametrize("back", [False, True])
-def test_a_wall_preference_is_of_the_tunnel_whatever_the_direction(wall: str, sign: float, *, back: bool) -> None:
+def test_a_wall_preference_is_of_the_tunnel_whatever_the_direction(
+    wall: Preference, sign: float, *, back: bool
+) -> None:
     topology = ladder()
     wide = [
         replace(one, wall_preference=wall, half_widths_m=np.full_like(one.half_widths_m, 3.0))
@@ -130,7 +135,7 @@ def test_a_change_of_gear_without_room_is_avoided() -> None:
     asked = RouteOptions(heading="against", goal_heading="along", alternatives=0)  # into the street the other way round
     seen: list[tuple[str, ...]] = []
 
-    def ask(avoid: tuple[str, ...]):
+    def ask(avoid: tuple[str, ...]) -> Route:
         seen.append(avoid)
         return planner.route("t1.end", "t2.start", replace(asked, avoid=avoid))
 
