@@ -8,13 +8,12 @@ import pytest
 from lhdmap.config import Settings
 from lhdmap.replay.assemble import parts_of
 
-from tests.replay.tiny import PLAN, tram
+from tests.replay.short import tram
 
 
 @pytest.fixture(scope="session")
 def taught(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Return a folder with a plan, and its map as an operator has taught it."""
-    folder = tmp_path_factory.mktemp("tiny")
-    (folder / "tiny.toml").write_text(PLAN, encoding="utf-8")
+    """Return a folder with the map of the mine `short` as an operator has taught it."""
+    folder = tmp_path_factory.mktemp("short")
     parts_of(tram(folder), folder, Settings())
     return folder

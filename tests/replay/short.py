@@ -1,4 +1,4 @@
-"""A drift of 46 m with a bend, taught once a session: the smallest mine in which a machine drives itself."""
+"""Drives in the mine `short`, a drift of 46 m with a bend, which is taught once a session."""
 
 from __future__ import annotations
 
@@ -13,40 +13,9 @@ from lhdmap.replay.scenario import Scenario
 from lhdmap.settings_tree import tree_from
 from lhdmap.simulation.history import START_NS
 
-PLAN = """
-name = "tiny"
-seed = 5
-
-[walls]
-roughness_m = 0.10
-
-[floor]
-undulation_m = 0.01
-
-[[drift]]
-name = "T1"
-line_m = [[0, 0, 0], [24, 0, 0], [44, 12, 0]]
-bend_radius_m = 14.0
-width_m = 4.4
-height_m = 3.8
-
-[[place]]
-drift = "T1"
-kind = "park"
-side = "end"
-at_m = 0.0
-name = "P1"
-
-[[place]]
-drift = "T1"
-kind = "dump"
-side = "end"
-name = "OP1"
-"""
-
 
 def tram(folder: Path, **table: Any) -> Scenario:
-    """Return a scenario in the drift whose plan and map are in a folder."""
+    """Return a scenario in the mine `short`, whose map is in a folder."""
     given = {
         "mine": str(folder / "tiny.toml"),
         "map": str(folder / "tiny.map"),
