@@ -12,7 +12,7 @@ from lhdmap.replay.processes.station import Station
 from lhdmap.replay.processes.told import Word
 from lhdmap.simulation.history import START_NS
 
-from tests.replay.tiny import drive, tram
+from tests.replay.short import drive, tram
 
 FOR_S = 8.0
 WATCH = ("monitor", "engine", "faults")
