@@ -23,6 +23,7 @@ from lhdmap.odometry.trust_settings import TrustSettings
 from lhdmap.pile.figure9_settings import Figure9Constants, RepairedConstants
 from lhdmap.pile.settings import PileSettings
 from lhdmap.proprioception.attitude import AttitudeSettings
+from lhdmap.proprioception.gyro import GyroSettings
 from lhdmap.proprioception.slip import SlipSettings
 from lhdmap.proprioception.wheels import WheelSettings
 from lhdmap.report.recording import RecordingSettings
@@ -48,6 +49,7 @@ class Settings:
     trust: TrustSettings = field(default_factory=TrustSettings)
     cloud_odometry: CloudOdometrySettings = field(default_factory=CloudOdometrySettings)
     attitude: AttitudeSettings = field(default_factory=AttitudeSettings)
+    gyro: GyroSettings = field(default_factory=GyroSettings)
     wheels: WheelSettings = field(default_factory=WheelSettings)
     slip: SlipSettings = field(default_factory=SlipSettings)
     integration: IntegrationSettings = field(default_factory=IntegrationSettings)

@@ -53,6 +53,7 @@ class Inclination(NamedTuple):
     """Roll and pitch of the front body from `sensor_msgs/Imu` (orientation; its yaw is ignored), radians.
 
     Sign by REP 103: positive pitch points the nose down. `angular_velocity_rps` and `acceleration_mps2`: shape (3,) or None.
+    `angular_velocity_std_rps`: of its noise, where the message tells it.
     """
 
     stamp_ns: int
@@ -61,6 +62,7 @@ class Inclination(NamedTuple):
     pitch_rad: float
     angular_velocity_rps: FloatArray | None
     acceleration_mps2: FloatArray | None
+    angular_velocity_std_rps: float | None = None
 
 
 class Joints(NamedTuple):

@@ -146,6 +146,7 @@ def trajectory_table(found: TrajectoryEvaluation) -> str:
         [
             f"{head}, reach {100 * found.reach:.1f} % of the true path",
             f"end point error  {end}",
+            f"heading drift    {_drift(found.heading_drift_deg)}",
             f"mean error       along {parts.along_m:.4f}, across {parts.across_m:.4f}, height {parts.height_m:.4f} m",
             "",
             f"{'':22}{'rmse':>10}{'mean':>10}{'median':>10}{'std':>10}{'min':>10}{'max':>10}",
@@ -156,6 +157,10 @@ def trajectory_table(found: TrajectoryEvaluation) -> str:
             *_segment_rows(found.segments),
         ]
     )
+
+
+def _drift(drift_deg: float | None) -> str:
+    return "standing still" if drift_deg is None else f"{drift_deg:.4f} deg over 100 m"
 
 
 def relations_table(found: RelationEvaluation) -> str:

@@ -19,10 +19,16 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_settings(parser)
     add_topics(parser)
     parser.add_argument("--machine", type=Path, metavar="FILE.toml", help="machine description")
+    parser.add_argument("--method", choices=("surface", "paper"), help="how it tracks (default: localization.method)")
     parser.add_argument(
         "--start",
         metavar="X,Y,DEG|NAME",
         help="about where the drive begins: a pose or a waypoint (default: it is searched for)",
+    )
+    parser.add_argument(
+        "--smoother",
+        action="store_true",
+        help="poses of a fixed-lag smoother: each is final once the machine is 15 m farther",
     )
 
 
@@ -39,18 +45,23 @@ def run(arguments: argparse.Namespace, console: Console) -> int:
             arguments.logs,
             arguments.map,
             arguments.output or beside(arguments.logs[0], "localization"),
-            load_settings(arguments.config, arguments.set),
+            load_settings(arguments.config, [*arguments.set, *_method(arguments)]),
             topic_overrides(arguments.topic),
             load_machine(arguments.machine) if arguments.machine else None,
             start_of(arguments.start, arguments.map) if arguments.start else None,
             progress_of(console),
             arguments.force,
+            arguments.smoother,
         )
     )
     for text in result.summary["warnings"]:
         console.warn(text)
     console.result({"run": str(result.folder), **result.summary}, _text(result.folder, result.summary))
     return 0
+
+
+def _method(arguments: argparse.Namespace) -> list[str]:
+    return [f"localization.method={arguments.method}"] if arguments.method else []
 
 
 def _text(folder: Path, summary: dict[str, Any]) -> str:

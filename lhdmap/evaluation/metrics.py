@@ -19,6 +19,8 @@ from lhdmap.messages import FloatArray
 SEGMENT_START_STEP_M = 0.5
 """Segments start each half metre of the true path: a machine that stands does not weigh more."""
 
+_DRIFT_M = 100.0
+
 
 class Statistics(NamedTuple):
     """Summary of an array of errors, in the unit of the errors."""
@@ -146,6 +148,22 @@ def _rows_apart(along: FloatArray, step_m: float) -> IndexArray:
         if row >= len(along):
             return np.array(rows, dtype=np.int64)
         rows.append(row)
+
+
+def heading_drift_deg(estimate: Poses, truth: Poses, along_m: FloatArray) -> float | None:
+    """Return the mean of how much the heading's error changes over 100 m of way `along_m` (N,), degrees; None on no way.
+
+    Shorter drives have one stretch, from end to end, and the figure is what 100 m of it would have.
+    """
+    length_m = min(_DRIFT_M, float(along_m[-1]))
+    if length_m <= 0.0:
+        return None
+    error = np.unwrap(headings(estimate) - headings(truth))
+    starts = np.concatenate([[0], _rows_apart(along_m, SEGMENT_START_STEP_M)[1:]]).astype(np.int64)
+    stops = np.searchsorted(along_m, along_m[starts] + length_m * (1.0 - 1e-12))
+    start, stop = starts[stops < len(along_m)], stops[stops < len(along_m)]
+    change = np.degrees(np.abs(error[stop] - error[start]))
+    return float(np.mean(change / (along_m[stop] - along_m[start])) * _DRIFT_M)
 
 
 def end_error_m(estimate: Poses, truth: Poses) -> float:

@@ -47,7 +47,7 @@ class Profile(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class TrajectoryEvaluation:
-    """What `evaluate_trajectory` found; `reach` is a share, `end_pct` per cent of the distance."""
+    """What `evaluate_trajectory` found; `reach` is a share, `end_pct` per cent of the distance, `heading_drift_deg` over 100 m."""
 
     alignment: str
     pairs: int
@@ -58,6 +58,7 @@ class TrajectoryEvaluation:
     reach: float
     end_pct: float | None
     components: metrics.Components
+    heading_drift_deg: float | None
     profile: Profile
     motion: Alignment
     warnings: tuple[str, ...]
@@ -83,6 +84,7 @@ class TrajectoryEvaluation:
             "reach": self.reach,
             "end_pct": self.end_pct,
             **self.components._asdict(),
+            "heading_drift_deg_per_100m": self.heading_drift_deg,
             "warnings": list(self.warnings),
         }
 
@@ -142,6 +144,7 @@ def _compared(
         reach=reach,
         end_pct=100.0 * metrics.end_error_m(estimate, truth) / distance_m if distance_m > 0 else None,
         components=metrics.Components(*(float(value) for value in np.abs(errors).mean(axis=0))),
+        heading_drift_deg=metrics.heading_drift_deg(estimate, truth, along),
         profile=Profile(along, truth.positions_m, moved.positions_m, errors),
         motion=alignment,
         warnings=(*remarks, *(text for text in hints if text)),

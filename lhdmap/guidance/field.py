@@ -1,9 +1,11 @@
-"""The field: for each cell around the predicted way the nearest hit, by two sweeps; distances are to that hit, not to a cell.
+"""The field: for each cell around the predicted way the nearest hit; distances are to that hit, not to a cell.
+
+Nearest hits are found in each row first, across the rows by the lower envelope of parabolas (Felzenszwalb, Huttenlocher 2012).
 
 Of the hits in a cell the one nearest to the predicted way stays, so that thinning makes no room. Whether a point of an outline
 is beyond a wall is told from within: from the body's axis one walks outward by as much as is known to be free (sphere tracing);
-a wall that is met before the outline is a wall that the outline has crossed. The sign needs neither normals nor a flood, which
-leaks through the gaps between hits far ahead.
+a hit that is passed before the outline is one of a wall that the outline has crossed. The sign needs neither normals nor a flood,
+which leaks through the gaps between hits far ahead.
 """
 
 from __future__ import annotations
@@ -19,7 +21,8 @@ from lhdmap.messages import FloatArray
 
 CELL_M = 0.10
 FAR_M = 3.0
-_TOUCH_M = 0.05
+_TOUCH_M = 0.12  # thinned hits of a wall are up to two cells apart: no look slips between them
+_PAST_M = 0.02
 _MARGIN_M = 5.5
 _MOST_CELLS = 400_000
 
@@ -46,52 +49,91 @@ def field_around(hits: FloatArray, way: FloatArray) -> Field:
 
 @nb.njit(cache=True, nogil=True)
 def _nearest(hits: FloatArray, way: FloatArray, low: FloatArray, rows: int, columns: int) -> npt.NDArray[np.int32]:
-    """Return the index of the nearest hit of each cell: seeds, then a sweep down and one up over eight neighbours."""
-    found = np.full((rows, columns), -1, np.int32)
-    aside = np.empty(len(hits))
-    for n in range(len(hits)):
-        best = math.inf
-        for k in range(len(way)):
-            dx, dy = hits[n, 0] - way[k, 0], hits[n, 1] - way[k, 1]
-            best = min(best, dx * dx + dy * dy)
-        aside[n] = best
-        i, j = int((hits[n, 0] - low[0]) / CELL_M), int((hits[n, 1] - low[1]) / CELL_M)
-        if found[i, j] < 0 or best < aside[found[i, j]]:
-            found[i, j] = n
+    """Return the index of the nearest hit of each cell: the nearest one of each row first, of those the nearest across rows."""
+    in_row = np.full((rows, columns), -1, np.int32)
+    _seed(in_row, hits, way, low)
     for i in range(rows):
-        for j in range(columns):
-            _nearer(found, hits, low, i, j, -1)
-        for j in range(columns - 2, -1, -1):
-            _from(found, hits, low, i, j, i, j + 1)
-    for i in range(rows - 1, -1, -1):
-        for j in range(columns - 1, -1, -1):
-            _nearer(found, hits, low, i, j, 1)
-        for j in range(1, columns):
-            _from(found, hits, low, i, j, i, j - 1)
+        _spread(in_row[i], hits, low[1])
+    found = np.full((rows, columns), -1, np.int32)
+    chosen, until = np.empty(rows, np.int32), np.empty(rows)
+    for j in range(columns):
+        count = _envelope(in_row[:, j], hits, low[1] + (j + 0.5) * CELL_M, chosen, until)
+        k = 0
+        for i in range(rows):
+            x = low[0] + (i + 0.5) * CELL_M
+            while k + 1 < count and until[k] < x:
+                k += 1
+            if k < count:
+                dx, dy = hits[chosen[k], 0] - x, hits[chosen[k], 1] - low[1] - (j + 0.5) * CELL_M
+                if dx * dx + dy * dy < FAR_M * FAR_M:
+                    found[i, j] = chosen[k]
     return found
 
 
 @nb.njit(cache=True, nogil=True)
-def _nearer(found: npt.NDArray[np.int32], hits: FloatArray, low: FloatArray, i: int, j: int, way: int) -> None:
-    _from(found, hits, low, i, j, i, j + way)
-    for dj in (-1, 0, 1):
-        _from(found, hits, low, i, j, i + way, j + dj)
+def _seed(found: npt.NDArray[np.int32], hits: FloatArray, way: FloatArray, low: FloatArray) -> None:
+    """Put the hit of each cell that is nearest to the way into it."""
+    aside = np.full(found.shape, math.inf)
+    for n in range(len(hits)):
+        i, j = int((hits[n, 0] - low[0]) / CELL_M), int((hits[n, 1] - low[1]) / CELL_M)
+        best = math.inf
+        for k in range(len(way)):
+            dx, dy = hits[n, 0] - way[k, 0], hits[n, 1] - way[k, 1]
+            best = min(best, dx * dx + dy * dy)
+        if best < aside[i, j]:
+            found[i, j], aside[i, j] = n, best
 
 
 @nb.njit(cache=True, nogil=True)
-def _from(found: npt.NDArray[np.int32], hits: FloatArray, low: FloatArray, i: int, j: int, oi: int, oj: int) -> None:
-    """Take a neighbour's hit where it is nearer, and not too far."""
-    if oi < 0 or oj < 0 or oi >= found.shape[0] or oj >= found.shape[1] or found[oi, oj] < 0:
-        return
-    other, own = found[oi, oj], found[i, j]
-    if other == own:
-        return
-    x, y = low[0] + (i + 0.5) * CELL_M, low[1] + (j + 0.5) * CELL_M
-    there = (hits[other, 0] - x) ** 2 + (hits[other, 1] - y) ** 2
-    if there > FAR_M * FAR_M:
-        return
-    if own < 0 or there < (hits[own, 0] - x) ** 2 + (hits[own, 1] - y) ** 2:
-        found[i, j] = other
+def _spread(row: npt.NDArray[np.int32], hits: FloatArray, low_y: float) -> None:
+    """Give each cell of a row the hit that is nearest along the row."""
+    left = -1
+    for j in range(len(row)):
+        if row[j] >= 0:
+            left = row[j]
+        row[j] = left
+    right = -1
+    for j in range(len(row) - 1, -1, -1):
+        y = low_y + (j + 0.5) * CELL_M
+        here = row[j]
+        if here >= 0 and abs(hits[here, 1] - y) <= 0.5 * CELL_M + 1e-9:
+            right = here
+        if here < 0 or (right >= 0 and abs(hits[right, 1] - y) < abs(hits[here, 1] - y)):
+            row[j] = right
+
+
+@nb.njit(cache=True, nogil=True)
+def _envelope(
+    column: npt.NDArray[np.int32], hits: FloatArray, y: float, chosen: npt.NDArray[np.int32], until: FloatArray
+) -> int:
+    """Return how many hits are the nearest ones somewhere along a column: `chosen`, each `until` an x; the lower envelope."""
+    count = 0
+    for i in range(len(column)):
+        n = column[i]
+        if n < 0:
+            continue
+        x, square = hits[n, 0], (hits[n, 1] - y) ** 2
+        if square > FAR_M * FAR_M:
+            continue
+        while count > 0:
+            m = chosen[count - 1]
+            apart = x - hits[m, 0]
+            if apart > 1e-9:
+                middle = 0.5 * (x + hits[m, 0]) + 0.5 * (square - (hits[m, 1] - y) ** 2) / apart
+                if count == 1 or middle > until[count - 2]:
+                    until[count - 1] = middle
+                    break
+            elif square >= (hits[m, 1] - y) ** 2:
+                break
+            count -= 1
+        else:
+            chosen[0], until[0] = n, math.inf
+            count = 1
+            continue
+        if x - hits[chosen[count - 1], 0] > 1e-9:
+            chosen[count], until[count] = n, math.inf
+            count += 1
+    return count
 
 
 @nb.njit(cache=True, nogil=True)
@@ -120,11 +162,17 @@ def clearance(px: float, py: float, ax: float, ay: float, field: Field) -> tuple
     length = math.sqrt(wx * wx + wy * wy)
     wx, wy = wx / length, wy / length
     gone, _ = distance(ax, ay, field)
+    gone = max(gone - 0.5 * _TOUCH_M, 0.0)
     while gone < length:
-        free, _ = distance(ax + gone * wx, ay + gone * wy, field)
-        if free < _TOUCH_M:
-            return gone - length, -wx, -wy
-        gone += free
+        qx, qy = ax + gone * wx, ay + gone * wy
+        free, n = distance(qx, qy, field)
+        if free >= _TOUCH_M:
+            gone += free - 0.5 * _TOUCH_M
+            continue
+        before = (field.hits[n, 0] - qx) * wx + (field.hits[n, 1] - qy) * wy
+        if before <= 0.0:
+            return gone + before - length, -wx, -wy
+        gone += max(before, _PAST_M) + 1e-3
     d, n = distance(px, py, field)
     if n < 0:
         return FAR_M, 0.0, 0.0

@@ -22,6 +22,7 @@ from lhdmap.guidance.directive import Directive
 from lhdmap.guidance.field import Field, field_around
 from lhdmap.guidance.outline import Outline, outline_of
 from lhdmap.guidance.paper import PaperCost
+from lhdmap.guidance.prediction import Prediction, Slopes, predicted
 from lhdmap.guidance.profile import Speeds, before_nose_m, sight_m, speeds_of
 from lhdmap.guidance.settings import GuidanceSettings
 from lhdmap.guidance.solver import Problem, Solution, rolled, solve
@@ -46,6 +47,7 @@ class Plan(NamedTuple):
     begin_ns: int
     solution: Solution
     speeds: Speeds
+    slopes: Slopes
 
     @property
     def clearance_m(self) -> float:
@@ -111,20 +113,20 @@ class Guidance:
         begin_ns = now_ns + _COMPUTING_NS + round(self.model.dead_time_s * _SECOND_NS)
         start, speed, before = self._rolled_to(begin_ns, motion, sent, lead)
         at = int(np.hypot(directive.path[:, 0] - start[0], directive.path[:, 1] - start[1]).argmin())
-        rates, speeds = self._guess(begin_ns, directive, at, speed)
+        ahead = self._ahead(begin_ns, directive, start, at, speed)
         vehicle = Vehicle(lead.lead_m, lead.trail_m, self.model.steering_lag_s, self.model.max_articulation_rad)
-        way = rolled(start, rates, speeds, settings.stage_s, vehicle)[:, :2]
+        way = rolled(start, ahead.rates, ahead.speed_mps, ahead.step_s, vehicle)[:, :2]
         tail = start[:2] - (lead.lead_m + lead.trail_m) * np.array([math.cos(start[2]), math.sin(start[2])])
         field = field_around(hits, np.vstack([tail, way]))
         limit = math.radians(settings.rate_dps)
-        problem = Problem(start, speeds, before, limit, settings.stage_s, directive.path, at)
-        solution = self._method(problem, rates, vehicle, self._outlines[directive.gear], field)
+        problem = Problem(start, ahead.speed_mps, before, limit, ahead.step_s, directive.path, at)
+        solution = self._method(problem, ahead.rates, vehicle, self._outlines[directive.gear], field)
         seen = self._sight(directive, lead, start, at, field)
-        rise = 0.0 if len(speeds) < 2 else (speeds[1] - speeds[0]) / settings.stage_s
-        ahead = before_nose_m(solution.states, field, float(lead.leading_m[:, 0].max()))
-        told = speeds_of(solution, speeds, (speed, rise), directive, seen, ahead, self.model, settings)
-        setpoints = self._setpoints(now_ns + _COMPUTING_NS, before, solution, told, directive.gear)
-        self._last = Plan(now_ns, directive.gear, setpoints, begin_ns, solution, told)
+        nose_m = before_nose_m(solution.states, field, float(lead.leading_m[:, 0].max()))
+        start_at = (speed, self._rise(begin_ns))
+        told = speeds_of(solution, ahead, start_at, directive, seen, nose_m, self._speeds(), self.model, settings)
+        setpoints = self._setpoints(now_ns + _COMPUTING_NS, before, told, directive.gear)
+        self._last = Plan(now_ns, directive.gear, setpoints, begin_ns, solution, told, slopes_of(solution, ahead))
         return self._last
 
     def _rolled_to(
@@ -152,38 +154,58 @@ class Guidance:
             speed, at_ns = after, at_ns + step_ns
         return np.array(state), max(speed, 0.0), rate
 
-    def _guess(self, begin_ns: int, directive: Directive, at: int, speed: float) -> tuple[FloatArray, FloatArray]:
-        """Return rates and speeds (K,) to start from: the last plan's, or straight on and speeding up."""
-        settings = self.settings
-        count, step = settings.stages, settings.stage_s
-        t = step * np.arange(count)
-        last = self._last
+    def _ahead(self, begin_ns: int, directive: Directive, start: FloatArray, at: int, speed: float) -> Prediction:
+        """Return what to predict with: as the last plan went on, or straight on and speeding up."""
+        settings, last = self.settings, self._last
+        left_m = directive.stop_m - float(directive.path[at, 5])
+        t: FloatArray = settings.stage_s * np.arange(settings.stages + 1, dtype=np.float64)
         if last is None or last.gear != directive.gear or begin_ns - last.begin_ns > _OLD_NS:
-            allowed = directive.path[at:, 3].min() if at < len(directive.path) else 0.0
-            return np.zeros(count), np.minimum(speed + settings.accelerate_mps2 * t, max(float(allowed), speed))
-        gone = (begin_ns - last.begin_ns) / _SECOND_NS
-        rates = np.interp(t + gone, t, last.solution.rates)
-        speeds = np.interp(t + gone, step * np.arange(count + 1), last.speeds.speed_mps)
-        speeds += (speed - speeds[0]) * np.exp(-t / 0.5)  # what the machine really drives
-        return rates, np.maximum(speeds, 0.0)
+            self._last = None
+            allowed = float(directive.path[at:, 3].min()) if at < len(directive.path) else 0.0
+            rising: FloatArray = np.minimum(speed + settings.accelerate_mps2 * t, max(allowed, speed))
+            return predicted((rising, t), None, left_m, settings)
+        gone_s = (begin_ns - last.begin_ns) / _SECOND_NS
+        at_s: FloatArray = last.speeds.step_s * np.arange(len(last.speeds.speed_mps), dtype=np.float64) - gone_s
+        off = speed - float(np.interp(0.0, at_s, last.speeds.speed_mps))
+        coming = last.speeds.speed_mps + off * np.exp(-np.maximum(at_s, 0.0) / 0.5)  # what it really drives
+        expected: FloatArray = np.maximum(coming, 0.0)
+        gone_m = float(np.linalg.norm(start[:2] - last.solution.states[0, :2]))
+        return predicted((expected, at_s), last.slopes._replace(at_m=last.slopes.at_m - gone_m), left_m, settings)
+
+    def _rise(self, begin_ns: int) -> float:
+        """Return the acceleration that the last plan has at a time."""
+        if self._last is None:
+            return 0.0
+        speeds = self._last.speeds
+        k = int((begin_ns - self._last.begin_ns) / _SECOND_NS / speeds.step_s)
+        return float(np.diff(speeds.speed_mps)[min(k, len(speeds.speed_mps) - 2)]) / speeds.step_s
+
+    def _speeds(self) -> Speeds | None:
+        return None if self._last is None else self._last.speeds
 
     def _sight(self, directive: Directive, lead: Lead, start: FloatArray, at: int, field: Field) -> float:
         eye = self._eyes_m[directive.gear]
         place = start[0] + eye * math.cos(start[2]), start[1] + eye * math.sin(start[2])
         return sight_m(place, directive, at, field, float(lead.leading_m[:, 0].max()))
 
-    def _setpoints(self, from_ns: int, before: float, solution: Solution, speeds: Speeds, gear: int) -> Setpoints:
+    def _setpoints(self, from_ns: int, before: float, told: Speeds, gear: int) -> Setpoints:
         """Return the setpoints: speeds at the ends of the stages, rates in their middles, on one time line."""
-        step, count = self.settings.stage_s, len(solution.rates)
+        step, count = told.step_s, len(told.rates)
         ends, middles = step * np.arange(count + 1), step * (np.arange(count) + 0.5)
         knots = np.concatenate([[0.0], middles])
-        rates = np.concatenate([[0.5 * (before + solution.rates[0])], solution.rates])
+        rates = np.concatenate([[0.5 * (before + told.rates[0])], told.rates])
         times = np.unique(np.concatenate([ends, middles]))
-        speed, rate = np.interp(times, ends, speeds.speed_mps), np.interp(times, knots, rates)
+        speed, rate = np.interp(times, ends, told.speed_mps), np.interp(times, knots, rates)
         return tuple(
             Setpoint(from_ns + round(t * _SECOND_NS), gear * v, gear * w)
             for t, v, w in zip(times.tolist(), speed.tolist(), rate.tolist(), strict=True)
         )
+
+
+def slopes_of(solution: Solution, ahead: Prediction) -> Slopes:
+    """Return the way of a solution as slopes of the joint."""
+    way = ahead.speed_mps * ahead.step_s
+    return Slopes(np.cumsum(way) - 0.5 * way, solution.rates / np.maximum(ahead.speed_mps, 0.01))
 
 
 def method_of(settings: GuidanceSettings) -> Method:

@@ -21,6 +21,20 @@ class GuidanceSettings:
     )
     stages: int = setting(24, minimum=5, maximum=60, source=_MEASURED, doc="Stages of the horizon.")
     stage_s: float = setting(0.15, unit="s", minimum=0.05, maximum=0.5, source=_MEASURED, doc="Time of a stage.")
+    reach_m: float = setting(
+        8.0,
+        unit="m",
+        minimum=1.0,
+        maximum=40.0,
+        doc="Way that the horizon covers at least: stages take longer where the machine is slow.",
+    )
+    creep_mps: float = setting(
+        0.4,
+        unit="m/s",
+        minimum=0.1,
+        maximum=2.0,
+        doc="Speed that is predicted with at least, where the way seems blocked too.",
+    )
     iterations: int = setting(6, minimum=1, maximum=30, source=_MEASURED, doc="Gauss-Newton steps of a cycle at most.")
     rate_dps: float = setting(
         12.0,

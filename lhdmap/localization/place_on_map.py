@@ -73,6 +73,11 @@ class Placer:
             name, far = self._next_across(node, pose, pose[2] + (math.pi if backward else 0.0))
         return Place(node, rho, lateral, math.remainder(heading, 2.0 * math.pi), height_m, name, far)
 
+    def along(self, tunnel: Tunnel, pose: FloatArray, height_m: float) -> tuple[float, float]:
+        """Return how far along a tunnel's line a pose (3,) is, and how far to its left, whichever node it is in."""
+        rho, lateral, _ = self._in_tunnel(tunnel, pose, height_m)
+        return rho, lateral
+
     def _in_tunnel(self, tunnel: Tunnel, pose: FloatArray, height_m: float) -> tuple[float, float, float]:
         """Return distance along the line, to its left, and heading against it; the line may cross above or below itself."""
         line, along = tunnel.line_m[:, :2], self._along[tunnel.id]

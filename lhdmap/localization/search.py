@@ -113,7 +113,7 @@ class GlobalSearch:
             self._candidate(one, rival - one.cost, self._machine(costs.path(one.place), live, asked.T_odom_base))
             for one, rival in zip(places, rivals, strict=True)
         ]
-        refused = self._refused(places[0], candidates[0], window.length_m)
+        refused = self._refused(places[0], candidates[0], asked)
         if not refused:
             candidates[0] = self._refined(candidates[0], window, asked.T_odom_base)
         said = said._replace(candidates=tuple(candidates), refused=refused)
@@ -129,7 +129,7 @@ class GlobalSearch:
         denied = ""
         if place is not None:
             own = self._candidate(place, min(-best.evidence, 0.0) - place.cost, claimed[:3])
-            if own.evidence < -self._settings.gap:
+            if own.evidence < -self._settings.gap and place.compared >= _LEAST_COMPARED:
                 denied = f"other walls than there, {-own.evidence:.0f} nats"
         off = se2.between(claimed[:3], best.pose)
         if not said.refused and (math.hypot(off[0], off[1]) > _SAME_M or abs(off[2]) > _SAME_RAD):
@@ -148,13 +148,14 @@ class GlobalSearch:
         height, node = float(self._strips.heights_m[place.place]), self._strips.node_at(place.place)
         return Candidate(pose, height, node, place.probability, place.chi2, -place.cost, gap, math.nan)
 
-    def _refused(self, place: PlaceOnStrips, best: Candidate, window_m: float) -> str:
-        """Return why the best place is not believed."""
+    def _refused(self, place: PlaceOnStrips, best: Candidate, asked: Question) -> str:
+        """Return why the best place is not believed; one that was found by the whole rule is confirmed by the gap alone."""
+        window_m = asked.window.length_m
         if window_m < self._settings.search_m:
             return f"{window_m:.1f} m of way are too few"
         if place.compared < _LEAST_COMPARED:
             return f"{place.compared:.0%} of the walls are in the map"
-        told = best.gap / max(best.chi2, 1.0)
+        told = best.gap if asked.purpose == CONFIRM else best.gap / max(best.chi2, 1.0)
         if told <= self._settings.gap:
             return f"the next place is less likely by {told:.0f} of {self._settings.gap:.0f} nats"
         return ""

@@ -11,6 +11,13 @@ from lhdmap.settings import setting
 class LocalizationSettings:
     """Tracking against the map's walls, loss, and the search over the whole map."""
 
+    method: str = setting(
+        "surface",
+        doc="'surface': scans against the map's fused walls, carried on by the odometry; 'paper': distance along the tunnel by "
+        "wheels and landmarks (topological_navigation, Section 3.3).",
+        choices=("surface", "paper"),
+        source="measured: prototypes",
+    )
     range_m: float = setting(
         12.0,
         unit="m",

@@ -66,7 +66,14 @@ def _imu(cursor: Cursor) -> tuple[Message, ...]:
     if covariance == -1.0 or not 0.5 < sum([value * value for value in quaternion]) < 2.0:
         raise InputError("no orientation in an Imu message")
     roll, pitch = se3.roll_pitch(*quaternion)
-    return (Inclination(stamp, frame, roll, pitch, _measured(numbers[13:17]), _measured(numbers[25:29])),)
+    rate, std = numbers[13:17], _deviation(numbers[16:25:4])
+    return (Inclination(stamp, frame, roll, pitch, _measured(rate), _measured(numbers[25:29]), std),)
+
+
+def _deviation(variances: tuple[float, ...]) -> float | None:
+    """Return the largest standard deviation of variances, None where they are not known: zeros."""
+    largest = max(variances)
+    return math.sqrt(largest) if math.isfinite(largest) and largest > 0.0 else None
 
 
 def _measured(numbers: tuple[float, ...]) -> np.ndarray[tuple[int], np.dtype[np.float64]] | None:

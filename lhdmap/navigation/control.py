@@ -257,7 +257,8 @@ class NavigationControl:
         self._speed_mps = motion.speed_mps
         place = np.array([motion.x_m, motion.y_m])
         if self._before is not None:
-            self._driven_m += float(np.linalg.norm(place - self._before))
+            step_m = float(np.linalg.norm(place - self._before))
+            self._driven_m += -step_m if self.state == BACKING else step_m  # what is backed up is driven again
         self._before = place
 
     def _ask(self, why: str) -> None:

@@ -12,6 +12,7 @@ from lhdmap.messages import FloatArray, LaserScan
 from lhdmap.odometry.anchored import AnchoredMatcher
 from lhdmap.odometry.clock import ScanClock
 from lhdmap.odometry.flow_matcher import FlowMatcher
+from lhdmap.odometry.gyro_turn import GyroTurn
 from lhdmap.odometry.motion import Motion
 from lhdmap.odometry.rear_view import NO_POINTS, NOTHING_BEHIND, Behind, RearView, behind
 from lhdmap.odometry.settings import AnchorSettings, OdometrySettings, RangeFlowSettings, SearchSettings
@@ -35,7 +36,7 @@ class View(NamedTuple):
 
     `height_m` of `base_link` in `odom`; `boxes_m` (K, 6): own bodies; `rear`: tells what the rear scanner sees at the same
     time, asked for the scans that are processed only; `rise` (2,): of the scanner's plane (`slant.rise_of`); `levelled`: an
-    inclinometer tells roll and pitch.
+    inclinometer tells roll and pitch; `turn_rad`: since the scan before, by a gyroscope.
     """
 
     height_m: float = 0.0
@@ -43,6 +44,7 @@ class View(NamedTuple):
     rear: Callable[[], RearView | None] | None = None
     rise: FloatArray = NO_RISE
     levelled: bool = True
+    turn_rad: float | None = None
 
 
 class _Judged(NamedTuple):
@@ -79,7 +81,7 @@ class PlanarOdometry:
     ) -> None:
         self._settings = settings or OdometrySettings()
         self._motion = Motion(self._settings, velocity)
-        self.wheels = WheelModel(self._settings, self._motion)
+        self.wheels, self.gyro = WheelModel(self._settings, self._motion), GyroTurn(self._motion)
         self._matcher: AnchoredMatcher | FlowMatcher
         if self._settings.method == "range_flow":
             self._matcher = FlowMatcher(self._motion, self._settings, range_flow or RangeFlowSettings())
@@ -105,6 +107,7 @@ class PlanarOdometry:
         dt_s = self._clock.step(scan.stamp_ns)
         self._motion.predict(dt_s)
         self.wheels.fuse(wheels, dt_s)
+        self.gyro.fuse(view.turn_rad, dt_s)
         if not self._rate.due(dt_s, self._motion.velocity) and not self._clock.bunched:
             return self._skipped(scan)
         if not isinstance(T_level_sensor, np.ndarray):
@@ -121,6 +124,9 @@ class PlanarOdometry:
         judged = self._judged(matched)
         held = matched.support > _WALLS_ALONE and not judged.weak
         self.wheels.learn(self._motion.pose, matched, held=held and not matched.lost)
+        self.gyro.learn(
+            self._motion.pose, held=not (matched.lost or matched.doubtful or self._blind(judged.information))
+        )
         self._error = self._errors.of(self._motion.pose, matched, judged.covariance, levelled=view.levelled)
         return self._step(scan, matched, judged)
 
@@ -195,13 +201,17 @@ class PlanarOdometry:
             not self.wheels.use.used and (matched.lost or matched.doubtful or self._errors.noise > _MOSTLY_NOISE),
         )
 
+    def _blind(self, information: FloatArray) -> bool:
+        """Return whether the heading is not observed well enough."""
+        return 1.0 / math.sqrt(max(float(information[2]), 1e-12)) > math.radians(self._settings.weak_sigma_deg)
+
     def _weak(self, information: FloatArray) -> bool:
         """Return whether a direction or the heading is not observed well enough by this scan alone."""
         s = self._settings
-        along, across, heading = (1.0 / math.sqrt(max(value, 1e-12)) for value in information.tolist())
+        along, across = (1.0 / math.sqrt(max(value, 1e-12)) for value in information[:2].tolist())
         worse, better = max(along, across), min(along, across)
         one_sided = worse > s.weak_sigma_m and worse > s.weak_ratio * better
-        return one_sided or worse > s.blind_sigma_m or heading > math.radians(s.weak_sigma_deg)
+        return one_sided or worse > s.blind_sigma_m or self._blind(information)
 
 
 def _planar_mount(T_level_sensor: FloatArray) -> FloatArray:

@@ -31,6 +31,7 @@ from lhdmap.pipeline.mounts import Mounts, level_sensor
 from lhdmap.pipeline.rear import AT_ONCE_NS, RearScans
 from lhdmap.pipeline.sweep_times import SweepTimes
 from lhdmap.proprioception.attitude import AttitudeFilter
+from lhdmap.proprioception.gyro import Gyro
 from lhdmap.proprioception.wheels import WheelOdometry
 from lhdmap.scan_matching.scan_points import NO_BOXES
 from lhdmap.scan_matching.slant import rise_of
@@ -44,10 +45,10 @@ class FrontEnd:
     """Takes the messages of all sensors but the primary scanner; tells what holds at the time of a scan."""
 
     def __init__(self, settings: Settings, machine: Machine | None) -> None:
-        self._settings = settings.attitude
+        self._settings, self._gyro_settings = settings.attitude, settings.gyro
         self.machine = machine or DEFAULT_MACHINE
         self.mounts = Mounts(machine)
-        self.attitude = AttitudeFilter(settings.attitude)
+        self.attitude, self.gyro = AttitudeFilter(settings.attitude), Gyro(settings.gyro, settings.attitude.lag_s)
         self.wheels = WheelOdometry(settings.wheels, self.machine)
         self.rear = RearScans(self.mounts, self.wheels, self.machine)
         self.sweep_times = SweepTimes()
@@ -85,7 +86,8 @@ class FrontEnd:
         """Return a scan with all that is known of the machine at `time_ns`, the middle of its sweep."""
         rear = partial(self.behind_at, time_ns) if self.has_inclinometer else None
         rise = rise_of(self.mounts.of(scan.frame_id, "front").T_parent_child)
-        view = View(height_m, self.boxes, rear, rise, self.has_inclinometer)
+        turn_rad = self.gyro.turn_between(before_ns, time_ns) if self.gyro.there else None
+        view = View(height_m, self.boxes, rear, rise, self.has_inclinometer, turn_rad)
         return ScanInput(scan, partial(self.placement, scan, time_ns), self._wheel_step(before_ns, time_ns), view)
 
     def placement(self, scan: LaserScan, time_ns: int) -> FloatArray:
@@ -122,6 +124,7 @@ class FrontEnd:
         return [
             *self.mounts.warnings,
             *self.attitude.texts(),
+            *self.gyro.texts(),
             *self.wheels.warnings.texts(),
             *self.sweep_times.warnings,
         ]
@@ -134,6 +137,7 @@ class FrontEnd:
             self._mount_inclinometer()
         else:
             self.attitude.update(message)
+            self.gyro.update(message)
 
     def _mount_inclinometer(self) -> None:
         """Begin the attitude, with the inclinometer's mount if it is known; once more where that comes late."""
@@ -143,8 +147,10 @@ class FrontEnd:
         if self.mounts.known(frame):
             R_base_sensor = self.mounts.of(frame, "inclinometer").T_parent_child[:3, :3]
         self.attitude = AttitudeFilter(self._settings, R_base_sensor)
+        self.gyro = Gyro(self._gyro_settings, self._settings.lag_s, R_base_sensor)
         for message in self._early:
             self.attitude.update(message)
+            self.gyro.update(message)
 
     def behind_at(self, time_ns: int, within_ns: int = AT_ONCE_NS) -> RearView | None:
         """Return what the rear scanner saw at `time_ns`, None where it saw nothing `within_ns` or the joint is not known."""

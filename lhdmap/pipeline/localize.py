@@ -6,7 +6,6 @@ messages -> MappingPipeline (odometry alone) -> steps -> Tracker against the map
 
 from __future__ import annotations
 
-import copy
 import math
 import time
 from collections import deque
@@ -25,6 +24,10 @@ from lhdmap.landmarks.model import Landmarks
 from lhdmap.landmarks.store import read_landmarks
 from lhdmap.localization.changes import WorldChanges
 from lhdmap.localization.finder import Finder
+from lhdmap.localization.fixed_lag import Belief, FixedLag, Step, placed_row
+from lhdmap.localization.method import Tracks, Wheels
+from lhdmap.localization.paper import PaperTracker
+from lhdmap.localization.paper_nodes import PaperNodes
 from lhdmap.localization.place_on_map import Placer
 from lhdmap.localization.rows import CANDIDATE, LOST, NOWHERE, TRACKING, UNKNOWN, Row
 from lhdmap.localization.search import CHECK, CONFIRM, FIND, Candidate, GlobalSearch, Search
@@ -36,6 +39,7 @@ from lhdmap.machine import Machine
 from lhdmap.mapfolder import MapFolder
 from lhdmap.messages import FloatArray, Message
 from lhdmap.odometry.planar import PlanarOdometry
+from lhdmap.odometry.rear_view import behind
 from lhdmap.odometry.steps import OdometryStep
 from lhdmap.pipeline.mapping import MappingPipeline
 from lhdmap.topology.files import read_topology
@@ -44,6 +48,9 @@ from lhdmap.topology.sheet import Sheet, read_sheets
 
 _HITS_ABOVE_M = 1.0  # hits are flat: where they are shown over the floor
 _LEAST_LEFT = 0.25  # of the hits must be of walls that the map has, or nothing corrects the place
+_DENIALS = 2  # checks in a row
+_GUESSED = np.array([0.5, 0.1, 0.1])  # m/s, m/s, rad/s: a step that neither walls nor wheels told
+_HELD = 1.0 / 0.02**2  # 1/m²: less along the machine, and walls hardly hold it
 _LOOK_NS, _NEAR_M, _SAME_M, _CLEARLY, _LEAST_HITS = 400_000_000, 5.0, 0.3, 0.05, 40
 _LEAST_SUPPORT = 0.35  # where a node's own scans tell of none
 
@@ -65,7 +72,7 @@ class KnownMap(NamedTuple):
     def search(self, walls: MapWalls, settings: Settings) -> GlobalSearch:
         """Return what searches it, with walls of its own: it works in a thread of its own."""
         strips = strips_of(self.topology, self.landmarks, settings.landmarks)
-        return GlobalSearch(strips, copy.copy(walls), settings.localization, settings.landmarks)
+        return GlobalSearch(strips, walls.apart(), settings.localization, settings.landmarks)
 
 
 class Where(NamedTuple):
@@ -103,7 +110,8 @@ class Localizer:
 
     `start` (4,): x, y, yaw (rad) and height about where the machine begins, or several (K, 4) of which the first scan chooses;
     None: it is searched for. `live`: a running machine, where nothing waits for a search; of a log each is waited for, so that
-    the rows are the same each time. A context manager.
+    the rows are the same each time. With `smoother` a row's pose is that of the fixed-lag smoother once the machine is some metres
+    farther. A context manager.
     """
 
     def __init__(
@@ -115,25 +123,31 @@ class Localizer:
         listener: Listener | None = None,
         *,
         live: bool = False,
+        smoother: bool = False,
     ) -> None:
+        self._lag = FixedLag() if smoother else None
         # What lies beyond the map does not count: no loop is closed, no pile looked for.
         settings = replace(settings, pile=replace(settings.pile, method="off"))
-        self._settings = settings.localization
+        self._settings, self._floor_m = settings.localization, settings.odometry.min_height_m
         self.pipeline = MappingPipeline(settings, machine, cloud=False, on_step=self.take)
         self._walls, self._placer = MapWalls(known.topology, known.landmarks), Placer(known.topology)
         search = known.search(self._walls, settings)
         self.world = WorldChanges(known.topology, known.sheets, self._walls)
         self._finder = Finder(search, self._settings, settings.landmarks, waits=not live)
-        self._tracker = None if start is None else self._started(start)
+        paper = self._settings.method == "paper"
+        self._paper = PaperNodes(known.topology, known.landmarks, settings.landmarks) if paper else None
+        self._tracker: Tracks | None = None if start is None else self._started(start)
         self._turnable = start is not None  # a waypoint's heading is its node's: the machine may face the other way
         self._starts = None if start is None or start.ndim == 1 else start
         self._status = UNKNOWN if start is None else TRACKING
         self._trial: _Trial | None = None
+        self._denials = 0
         self._supports: deque[float] = deque(maxlen=self._settings.support_scans)
         self._before: FloatArray | None = None
         self._lost_m, self._look_ns = 0.0, 0
         self._near: tuple[FloatArray, FloatArray] | None = None
         self._listener = listener
+        self._time_ns = 0
         self.start: Start | None = None  # which of several it was
         self._travelled_m = 0.0
         self._probability = 0.0 if start is None else 1.0
@@ -170,6 +184,8 @@ class Localizer:
     def finish(self) -> None:
         """Say that the log has ended."""
         self.pipeline.finish()
+        for one in self._lag.restart() if self._lag is not None else ():
+            self.rows[one.row] = placed_row(self.rows[one.row], one, self._placer)
 
     def pose_at(self, now_ns: int) -> Where:
         """Return where the machine is now: the newest place carried on as the odometry is (`MappingPipeline.pose_at`)."""
@@ -189,11 +205,21 @@ class Localizer:
         pose, height = self._tracker.pose.copy(), self._tracker.height_m
         return Fix(stamp_ns, status, pose, self._before.copy(), self._tracker.P.copy(), height)
 
-    def _started(self, start: FloatArray) -> Tracker:
+    @property
+    def support(self) -> float | None:
+        """Share of the newest scan's hits that agreed with the walls; None before the first that was matched."""
+        return self._supports[-1] if self._supports else None
+
+    def _started(self, start: FloatArray) -> Tracks:
         std = np.array([self._settings.start_std_m] * 2 + [math.radians(self._settings.start_std_deg)])
         start = start if start.ndim == 1 else start[0]
         height = float(start[3]) if len(start) > 3 else 0.0
-        return Tracker(self._walls, self._settings, start[:3], np.diag(std**2), height)
+        return self._tracks(start[:3], std, height)
+
+    def _tracks(self, pose: FloatArray, std: FloatArray, height_m: float) -> Tracks:
+        """Return what tracks by the method of the settings from a pose (3,) with these deviations (3,)."""
+        tracker = Tracker(self._walls, self._settings, pose, np.diag(std**2), height_m)
+        return tracker if self._paper is None else PaperTracker(self._paper, self._placer, tracker)
 
     def take(self, stamp_ns: int, step: OdometryStep, odometry: PlanarOdometry) -> None:
         """Take what the odometry says of a front scan."""
@@ -204,11 +230,13 @@ class Localizer:
             moved = se2.between(self._before, step.T_odom_base)
             self._travelled_m += math.hypot(moved[0], moved[1])
             if self._tracker is not None:
-                self._tracker.predict(moved, step.error.covariance if step.processed else np.zeros((3, 3)))
+                self._tracker.predict(moved, *self._carried(step))
+        self._time_ns = step.time_ns
         self._before = step.T_odom_base.copy()
+        predicted = self._belief()
         source, points = "", np.zeros((0, 2))
         if step.processed:
-            points, front = self._hits(odometry)
+            points, front = self._hits(step, odometry)
             told, told_front = self._of_the_map(points, front)
             self._finder.add(step.T_odom_base, told)
             source = self._correct(told, told_front) if len(told) > _LEAST_LEFT * len(points) else "odometry"
@@ -220,9 +248,25 @@ class Localizer:
         self.rows.append(
             self._row(stamp_ns, step, source, 1e3 * (time.perf_counter() - began - self._finder.waited_s + waited_s))
         )
+        if self._lag is not None:
+            said = Step(len(self.rows) - 1, step.T_odom_base, step.error.covariance, odometry.gyro.turn_rad)
+            self._smooth(self._lag, said, predicted)
         self._set_against_the_map(stamp_ns, points)  # the place has not waited for it
         if self._listener is not None:
             self._listener(stamp_ns, step, odometry)
+
+    def _belief(self) -> Belief | None:
+        return None if self._tracker is None else Belief(self._tracker.pose.copy(), self._tracker.P.copy())
+
+    def _smooth(self, lag: FixedLag, step: Step, predicted: Belief | None) -> None:
+        """Hand a scan to the smoother; rewrite the rows that are final."""
+        believed = self._belief()
+        if believed is None or predicted is None or self._status != TRACKING:
+            final = lag.restart()
+        else:
+            final = lag.take(step, predicted, believed)
+        for one in final:
+            self.rows[one.row] = placed_row(self.rows[one.row], one, self._placer)
 
     def _set_against_the_map(self, stamp_ns: int, points: FloatArray) -> None:
         """Note what is not as in the map, where the place is known, or was until a moment ago."""
@@ -242,12 +286,34 @@ class Localizer:
         kept = ~self.world.stands_in(self._tracker.pose, self._tracker.height_m, points)
         return points[kept], int(kept[:front].sum())
 
-    def _hits(self, odometry: PlanarOdometry) -> tuple[FloatArray, int]:
+    def _carried(self, step: OdometryStep) -> tuple[FloatArray, Wheels]:
+        """Return the covariance (3, 3) of the odometry's step, and the wheels' motion over it.
+
+        Where a scan could not be placed the step is the wheels' own, or a guess, and as sure as these are.
+        """
+        covariance = step.error.covariance if step.processed else np.zeros((3, 3))
+        dt_s = (step.time_ns - self._time_ns) * 1e-9
+        motion = self.pipeline.wheels.motion_between(self._time_ns, step.time_ns)
+        if step.lost:
+            covariance = covariance + (np.diag((_GUESSED * dt_s) ** 2) if motion is None else motion.covariance)
+        if motion is None:
+            return covariance, Wheels(dt_s, math.nan, math.nan)
+        forward_m = math.copysign(math.hypot(motion.delta[0], motion.delta[1]), motion.delta[0])
+        turn_rad = math.nan if motion.source == "tachometer" else float(motion.delta[2])
+        return covariance, Wheels(dt_s, forward_m, turn_rad)
+
+    def _hits(self, step: OdometryStep, odometry: PlanarOdometry) -> tuple[FloatArray, int]:
         """Return hits (N, 2) of both scanners near the machine, thinned, and how many are the front one's."""
-        parts = []
-        for points in (odometry.points, odometry.points_behind):
+        parts, rear = [], odometry.points_behind
+        if not len(rear) or not len(
+            odometry.points
+        ):  # where nothing tilts, or the front one is blind, it has no use for it
+            view = self.pipeline.front_end.behind_at(step.time_ns)
+            rear = rear if view is None else behind(view, step.velocity, 0.0, self._floor_m, self._settings.hits).points
+        most = self._settings.hits * (1 if self._information > _HELD else 2)  # smooth walls tell a little with each hit
+        for points in (odometry.points, rear):
             near = points[np.hypot(points[:, 0], points[:, 1]) < self._settings.range_m, :2]
-            parts.append(near[:: max(-(-2 * len(near) // self._settings.hits), 1)])
+            parts.append(near[:: max(-(-2 * len(near) // most), 1)])
         return np.concatenate(parts), len(parts[0])
 
     def _correct(self, points: FloatArray, front: int) -> str:
@@ -266,7 +332,7 @@ class Localizer:
         tracker.height_m = self._placer.height_m(tracker.pose[0], tracker.pose[1], tracker.height_m)
         self._supports.append(said.support)
         self._information = said.information_along
-        return "walls" if said.support > 0.0 else "odometry"
+        return said.source if said.support > 0.0 else "odometry"
 
     def _judge(self) -> None:
         """Decide by the support whether the place still holds."""
@@ -296,7 +362,7 @@ class Localizer:
         if math.hypot(off[0], off[1]) > _SAME_M:
             return
         std = np.array([0.15, 0.15, math.radians(1.0)])
-        tracker.pose, tracker.P = found.pose.copy(), np.diag(std**2)
+        self._tracker = self._tracks(found.pose.copy(), std, tracker.height_m)
         self._status, self._near = TRACKING, None
         self._supports.clear()
 
@@ -311,6 +377,7 @@ class Localizer:
         """Give a place up: a trial that failed, or one that was lost."""
         self.reasons.append((self._stamp_ns, why))
         self._supports.clear()
+        self._denials = 0
         self._probability = 0.0
         self._finder.again()
         if self._trial is not None:
@@ -352,15 +419,24 @@ class Localizer:
             self.withheld += bool(said.candidates)
         elif said.purpose == CONFIRM and said.confirms:
             self._status, self._trial = TRACKING, None
-        elif said.purpose == CONFIRM or said.denied:
+        elif said.purpose == CONFIRM or self._denied_again(said):
             self._drop(said.denied or said.refused or "a search finds another place")
+
+    def _denied_again(self, said: Search) -> bool:
+        """Return whether two checks in a row say that the machine is not where it is tracked: one may be of a bend or a niche.
+
+        That another place fits counts always; that this one does not, where the walls are smooth: in others their support tells.
+        """
+        tells = not said.refused or self._information < _HELD
+        self._denials = self._denials + 1 if said.denied and tells else 0
+        return self._denials >= _DENIALS
 
     def _try(self, found: Candidate) -> None:
         std = np.array([0.1, 0.1, math.radians(1.0)])
         height = self._placer.height_m(found.pose[0], found.pose[1], found.height_m)
         if self._tracker is not None:
             self.world.found(self._travelled_m, self._tracker.pose, found.pose)
-        self._tracker = Tracker(self._walls, self._settings, found.pose, np.diag(std**2), height)
+        self._tracker = self._tracks(found.pose, std, height)
         self._trial = _Trial(self._travelled_m)
         self._status, self._probability = CANDIDATE, found.probability
         self._supports.clear()

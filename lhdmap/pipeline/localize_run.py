@@ -37,7 +37,10 @@ KIND = "localization"
 
 @dataclass(frozen=True, slots=True)
 class LocalizeRequest:
-    """What is asked for: logs, map folder, the folder to make, settings, about where the drive starts (4,: x, y, yaw, z)."""
+    """What is asked for: logs, map folder, the folder to make, settings, about where the drive starts (4,: x, y, yaw, z).
+
+    `smoother`: rows are those of the fixed-lag smoother.
+    """
 
     logs: Sequence[Path]
     map: Path
@@ -48,6 +51,7 @@ class LocalizeRequest:
     start: FloatArray | None = None
     progress: Progress | None = None
     force: bool = False
+    smoother: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -105,7 +109,10 @@ def localize(request: LocalizeRequest) -> LocalizeResult:
         folder.write_json("changes.json", table)
         write_localization_report(folder.path / "report.html", data)
         folder.finished(folder.path / "report.html")
-        options = {**settings_table(request.settings), "request": {"map": str(request.map.resolve())}}
+        options = {
+            **settings_table(request.settings),
+            "request": {"map": str(request.map.resolve()), "smoother": request.smoother},
+        }
         path = folder.complete(RunInfo(request.logs, options, summary, told))
     return LocalizeResult(path, summary | {"warnings": told}, localizer.rows)
 
@@ -114,7 +121,7 @@ def _localized(
     request: LocalizeRequest, known: KnownMap, source: LogSource, machine: Machine | None, recording: RecordingWriter
 ) -> Localizer:
     """Send the log through a localizer; scans that have a place are recorded."""
-    with Localizer(known, request.settings, machine, request.start) as localizer:
+    with Localizer(known, request.settings, machine, request.start, smoother=request.smoother) as localizer:
         messages = source.messages([role for role in ROLES_READ if role in source.roles])
         for role, message in request.progress(messages, source.duration_s) if request.progress else messages:
             localizer.update(role, message)

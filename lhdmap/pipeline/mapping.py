@@ -35,6 +35,7 @@ from lhdmap.pipeline.track import Track
 from lhdmap.proprioception.slip import SkidFactor
 from lhdmap.smoothing.realign import AlignedScan
 from lhdmap.smoothing.smoother import Smoother
+from lhdmap.smoothing.turns import Turns
 from lhdmap.topology.views import Views
 
 _PATIENCE_SCANS = 3  # after a pause of the whole log, wheels may come within as many scans before they count as silent
@@ -78,6 +79,8 @@ class MappingPipeline:
         self.path = FinalPath(self.track)
         self.sweeps = SweepIntegration(settings, machine, self.mounts, on_sweep, worker)
         self.smoother = Smoother(settings.smoothing)
+        self.turns = Turns()  # by the gyroscope, where there is one
+        self.told: list[str] = []  # what came out once the drive was over
         self.said: list[tuple[int, str]] = []  # names of nodes, each where the operator begins to say it
         self.views = Views()  # of the drift, for the free space that the topology is found in
         looked_for = primary == "front" and settings.pile.method != "off"
@@ -136,8 +139,15 @@ class MappingPipeline:
     @property
     def warnings(self) -> list[str]:
         """What the stages found odd, in words."""
-        fused = self.odometry.wheels.warnings() if self.odometry is not None else []
-        return [*self.front_end.warnings, *fused]
+        if self.odometry is None:
+            return self.front_end.warnings
+        gyro = self.odometry.gyro.warning()
+        return [
+            *self.front_end.warnings,
+            *self.odometry.wheels.warnings(),
+            *([] if gyro is None else [gyro]),
+            *self.told,
+        ]
 
     @property
     def has_inclinometer(self) -> bool:
@@ -185,6 +195,8 @@ class MappingPipeline:
     def _take(self, scan: LaserScan, time_ns: int, step: OdometryStep, odometry: PlanarOdometry) -> None:
         """Hand a processed scan on to all that live by its pose."""
         self.track.append(time_ns, step.T_odom_base, *self.front_end.attitude_at(time_ns))
+        if self.front_end.gyro.there:
+            self.turns.append(time_ns, self.front_end.gyro.turned_at(np.array([time_ns]))[0])
         believed = odometry.wheels.use.used
         self._newest = Newest(step.covariance, step.velocity, odometry.wheels.scale if believed else None)
         self.smoother.keys.update(time_ns, step.T_odom_base, odometry.points, step.error, unseen=step.unseen)

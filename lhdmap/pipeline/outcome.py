@@ -25,6 +25,7 @@ from lhdmap.pile.result import PileReport
 from lhdmap.pipeline.beside import HelperDied
 from lhdmap.pipeline.closures import closure_rows
 from lhdmap.pipeline.given import GROUND_TRUTH
+from lhdmap.pipeline.heading import gyro_correction
 from lhdmap.pipeline.identify import identify_along
 from lhdmap.pipeline.landmarks import landmarks_for, with_stretches
 from lhdmap.pipeline.mapping import MappingPipeline
@@ -53,6 +54,7 @@ _OF_ODOMETRY = ("odometry:", "wheels:", "wheel odometry:", "tachometer:", "incli
 _WITNESSES = {"articulated": "tachometer", "tachometer": "tachometer", "wheel_pose": "wheel odometry"}
 _FEWEST_TOLD = 0.1  # of the scans
 _GAP_S = 10.0
+_FLOOR = [2, 3, 4]  # of a pose: height, roll, pitch
 _HOLE_S, _HOLE_M = 1.0, 2.0
 
 
@@ -75,7 +77,7 @@ class Inputs(NamedTuple):
 class Ways(NamedTuple):
     """The way by odometry alone and the final one, at the scans; the final `rows`, whether they `moved`, closed loops.
 
-    `end_covariance` (3, 3): of the last key scan once loops were closed.
+    `end_covariance` (3, 3) and `end_height_std_m`: of the last key scan once loops were closed.
     """
 
     odometry: Trajectory
@@ -84,6 +86,7 @@ class Ways(NamedTuple):
     moved: bool
     closures: int
     end_covariance: FloatArray | None = None
+    end_height_std_m: float | None = None
 
 
 def odometry_of(pipeline: MappingPipeline) -> Trajectory:
@@ -100,7 +103,10 @@ def ways_of(pipeline: MappingPipeline, given: Rows | None) -> Ways:
     """
     stamps, times = _moments(pipeline)
     rows = pipeline.path.final.rows() if given is None else given
-    correction = None if given is not None else _correction(pipeline, rows)
+    steadied = None if given is not None else gyro_correction(pipeline, rows)
+    if steadied is not None:
+        rows = Rows(rows.times_ns, corrected(rows.poses, rows.times_ns, steadied))
+    correction = None if given is not None else _correction(pipeline, rows, steadied)
     if given is not None and not any(map(FinalTrack(given).covers, times.tolist())):
         raise InputError(
             f"the given poses are of {given.times_ns[0] / 1e9:.3f} to {given.times_ns[-1] / 1e9:.3f} s, "
@@ -109,18 +115,24 @@ def ways_of(pipeline: MappingPipeline, given: Rows | None) -> Ways:
     if correction is not None:
         rows = Rows(rows.times_ns, corrected(rows.poses, rows.times_ns, correction))
     final = trajectory_of(resample(rows, times), stamps)
-    moved = given is not None or correction is not None
-    closed = (0, None) if correction is None else (correction.closures, correction.end_covariance)
-    return Ways(odometry_of(pipeline), final, rows, moved, *closed)
+    moved = given is not None or correction is not None or steadied is not None
+    if correction is not None:
+        end: tuple[int, FloatArray | None, float | None] = (
+            correction.closures, correction.end_covariance, correction.height_std_m
+        )  # fmt: skip
+    else:
+        end = 0, None if steadied is None else pipeline.smoother.end_covariance([steadied]), None
+    return Ways(odometry_of(pipeline), final, rows, moved, *end)
 
 
-def _correction(pipeline: MappingPipeline, rows: Rows) -> Correction | None:
+def _correction(pipeline: MappingPipeline, rows: Rows, steadied: Correction | None) -> Correction | None:
     """Return how closed loops move the path; heights close where an inclinometer tells them."""
 
-    def heights_m(times_ns: npt.NDArray[np.int64]) -> FloatArray:
-        return resample(rows, times_ns).poses[:, 2]
+    def floor(times_ns: npt.NDArray[np.int64]) -> FloatArray:
+        return resample(rows, times_ns).poses[:, _FLOOR]
 
-    return pipeline.smoother.correction(pipeline.path.correction(), heights_m if pipeline.has_inclinometer else None)
+    moved = [one for one in (pipeline.path.correction(), steadied) if one is not None]
+    return pipeline.smoother.correction(moved, floor if pipeline.has_inclinometer else None)
 
 
 class Outcome:
@@ -172,6 +184,8 @@ class Outcome:
         """Return how far the map may be off at its end; None of clouds of a 3D scanner, whose drift nobody measures."""
         pipeline = self.pipeline
         height_std_m = pipeline.front_end.attitude.height_std_m(distance_m) if pipeline.has_inclinometer else None
+        if height_std_m is not None and self.ways.end_height_std_m is not None:
+            height_std_m = min(height_std_m, self.ways.end_height_std_m)
         found = expected_error(pipeline.smoother.keys, height_std_m, self.ways.end_covariance)
         return None if found is None else found._asdict()
 

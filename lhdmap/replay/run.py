@@ -16,9 +16,11 @@ from lhdmap.replay.assemble import Run, Watchers, assemble, parts_of
 from lhdmap.replay.journal import Journal
 from lhdmap.replay.parts import Parts
 from lhdmap.replay.processes.film import Film
+from lhdmap.replay.processes.film_drive import DriveFilm
 from lhdmap.replay.processes.recorder import Recorder
 from lhdmap.replay.scenario import Scenario, scenario_toml
 from lhdmap.replay.series import Timeline
+from lhdmap.replay.stops import Stops
 from lhdmap.report.replay_data import ReplayData
 from lhdmap.report.replay_page import write_replay_report
 from lhdmap.report.replay_recording import ReplayRecording
@@ -80,13 +82,13 @@ class _Replay:
 
     def __init__(self, request: ReplayRequest, parts: Parts, folder: RunFolderWriter) -> None:
         self._request, self._parts, self._folder = request, parts, folder
-        self._timeline = Timeline()
+        self._timeline, self._stops = Timeline(), Stops()
         self._recording: ReplayRecording | None = None
 
     def run(self, interruption: Interruption) -> dict[str, Any]:
         """Run, write all files, return the verdict."""
         journal = Journal(self._folder.path / JOURNAL)
-        journal.listeners.append(self._timeline)
+        journal.listeners += [self._timeline, self._stops]
         with ExitStack() as open_files:
             open_files.callback(journal.close)
             log = open_files.enter_context(LogWriter(self._folder.path / LOG))
@@ -111,7 +113,9 @@ class _Replay:
             self._recording = ReplayRecording(path, request.name, START_NS, machine, request.live_port)
             expected_s = self._parts.expected_s or request.scenario.limits.time_s
             self._recording.begin(self._parts.lines_m, expected_s)
-        film = Film(machine, self._recording, live=request.live_port is not None)
+        given = self._parts.autonomous
+        drive = None if given is None else DriveFilm(given.known.topology)
+        film = Film(machine, self._recording, live=request.live_port is not None, drive=drive)
         journal.listeners.append(film.take)
         return film
 
@@ -161,10 +165,12 @@ class _Replay:
         }
         left_out = self._timeline.left_out
         warnings = [f"{left_out} changes of state are in journal.jsonl alone: there are too many to draw"]
+        rows = film.series.rows()
+        drive = None if film.drive is None else film.drive.data(rows, self._parts.machine)
         return ReplayData(
-            f"Replay {self._request.name}", verdict, film.series.rows(), START_NS, self._timeline.changes,
+            f"Replay {self._request.name}", verdict, rows, START_NS, self._timeline.changes,
             self._parts.lines_m, film.believed_m(), self._parts.goal_m, made, scenario_toml(scenario),
-            warnings if left_out else (),
+            warnings if left_out else (), drive, self._stops.rows(),
         )  # fmt: skip
 
 

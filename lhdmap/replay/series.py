@@ -12,6 +12,8 @@ from lhdmap.report.replay_data import Change
 
 MOST_ROWS, MOST_CHANGES = 20_000, 2_000
 
+_PARTS = ("modes", "watchdog", "guard")
+
 
 class Series:
     """Rows of `width` figures, evenly thinned; at most `most` are kept."""
@@ -52,10 +54,19 @@ class Timeline:
 
     def __call__(self, event: Event) -> None:
         """Take an event; only changes of state count."""
-        if event.event != "state":
+        lane, state = (event.process, event.after) if event.event == "state" else _part(event)
+        if not state:
             return
-        changes = self.changes.setdefault(event.process, [])
+        changes = self.changes.setdefault(lane, [])
+        if changes and changes[-1].state == state:
+            return
         if len(changes) >= self._most:
             self.left_out += 1
             return
-        changes.append(Change(event.t_ns, event.after, event.cause))
+        changes.append(Change(event.t_ns, state, event.cause))
+
+
+def _part(event: Event) -> tuple[str, str]:
+    """Return a part of the executor that has states of its own, and which one it is in now; nothing of other events."""
+    who, _, _ = event.event.partition(": ")
+    return (who, str(event.values.get("after", ""))) if who in _PARTS else ("", "")

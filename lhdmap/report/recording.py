@@ -106,6 +106,7 @@ class RecordingWriter:
         self._drawn: set[str] = set()
         self._legend: dict[str, None] = {}  # in the order of the first mention
         self.curves, self.has_topology = RUN_CURVES, False
+        self.beside_topology: tuple[str, ...] = ()
         self._scans: deque[tuple[int, FloatArray, str]] = deque()
         loader = ThreadPoolExecutor(max_workers=1, thread_name_prefix="recording")
         self._opened = loader.submit(_open, path, title, start_ns, live_port)  # loading Rerun takes most of a second
@@ -280,7 +281,9 @@ class RecordingWriter:
 
     def _lay_out(self, used: Curves, duration_ns: int) -> None:
         words, graph = bool(self._legend), self.has_topology
-        self._stream.send_blueprint(blueprint(self._bounds, duration_ns, used, legend=words, topology=graph))
+        beside = self.beside_topology
+        layout = blueprint(self._bounds, duration_ns, used, legend=words, topology=graph, beside=beside)
+        self._stream.send_blueprint(layout)
 
     def _has(self, pattern: str) -> bool:
         """Return whether a curve of this entity, or below it (`…/**`), was recorded."""

@@ -24,21 +24,31 @@ RUN_CURVES: Curves = (
 )
 REPLAY_CURVES: Curves = (
     ("Speed, km/h", ("motion/speed/**",)),
-    ("Articulation, deg", ("motion/articulation",)),
-    ("Clearance, m", ("motion/clearance",)),
+    ("Joint, deg, and steering, deg/s", ("motion/articulation", "motion/steering")),
+    ("Clearance, m", ("motion/clearance/**",)),
     ("States", ("state/**",)),
+    ("Place by localization less the true one", ("place/**",)),
 )
+REPLAY_GRAPH = ("map/base_link/**", "map/plan/**", "map/path/**")
+"""Of a drive on a map: what is seen beside the map."""
 GRAPH = ("+ map/topology/**", "+ map/route/**", "+ map/pile/**")
 LOG_CURVES: Curves = (("Speed, m/s", ("motion/speed/**",)), ("Angles, deg", ("angles/**",)))
 
 
 def blueprint(
-    bounds_m: FloatArray | None, duration_ns: int, curves: Curves, *, legend: bool = False, topology: bool = False
+    bounds_m: FloatArray | None,
+    duration_ns: int,
+    curves: Curves,
+    *,
+    legend: bool = False,
+    topology: bool = False,
+    beside: Sequence[str] = (),
 ) -> Any:
     """Return the layout for a map within `bounds_m` (lower and upper corner, (2, 3); None: not known) and its drive.
 
     It opens at the end of the drive, where the whole cloud is seen; the views of `curves` (name and entities of each)
-    show the whole drive. `topology`: it has a view of its own, in front of that from above, and is left out of the others.
+    show the whole drive. `topology`: it has a view of its own, in front of that from above, and is left out of the others;
+    `beside`: entities that this view has, too.
     """
     import rerun.blueprint as rrb
 
@@ -47,10 +57,13 @@ def blueprint(
     scene = ["+ map/**", *(["- map/topology/**"] if topology else [])]
     above = _view("From above", scene, bounds_m, oblique=False)
     if topology:
-        above = rrb.Tabs(_view("Topology", GRAPH, bounds_m, oblique=False), above, active_tab=0)
+        above = rrb.Tabs(
+            _view("Topology", (*GRAPH, *(f"+ {one}" for one in beside)), bounds_m, oblique=False), above, active_tab=0
+        )
     views = rrb.Vertical(_view("Map", scene, bounds_m, oblique=True), above, row_shares=[1, 1] if topology else [3, 2])
     plots = [rrb.TimeSeriesView(name=name, contents=list(entities), axis_x=whole) for name, entities in curves]
-    groups = [rrb.Vertical(*group, name=name) for name, group in (("Drive", plots[:4]), ("Pile", plots[4:])) if group]
+    later = "Place" if any("place/**" in entities for _, entities in curves) else "Pile"
+    groups = [rrb.Vertical(*group, name=name) for name, group in (("Drive", plots[:4]), (later, plots[4:])) if group]
     middle = [rrb.Tabs(*groups) if len(groups) > 1 else group for group in groups[:1]]
     words = [rrb.TextDocumentView(name="What is drawn", origin="legend")] if legend else []
     shares = [2.0] * len(words) + [float(min(len(plots), 4))] * len(middle) + [1.0]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -10,6 +10,7 @@ from lhdmap.messages import FloatArray
 from lhdmap.report import charts
 from lhdmap.report.path_charts import plan_axes
 from lhdmap.report.replay_data import Change, ReplayData
+from lhdmap.report.replay_drive_charts import draw_drive, extent_m, name_places
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -17,6 +18,9 @@ if TYPE_CHECKING:
 
 _SECOND_NS = 1e9
 _MOST_BARS = 400
+_GAP_S = 1.0
+_LEGEND_COLUMNS, _LEGEND_ROW_IN = 6, 0.19
+NOT_PLANNED = ""
 _LANE_IN, _NAMES_IN = 0.42, 1.15
 _SHADES = (charts.FINAL, charts.ODOMETRY, charts.TRUTH, charts.FLAGGED, charts.WHEELS, "#8a949e", "#b7d3ea", "#f0c419")
 
@@ -24,10 +28,13 @@ _SHADES = (charts.FINAL, charts.ODOMETRY, charts.TRUTH, charts.FLAGGED, charts.W
 def plan_chart(data: ReplayData) -> Figure:
     """Draw walls, true path, what perception believed, start, end, goal, contacts and where faults began."""
     way = data.rows[:, 1:4]
-    figure = charts.new_figure(charts.plan_height_in(np.vstack([way, *data.lines_m])))
+    whole = np.vstack([way, *data.lines_m]) if data.drive is None else extent_m(data.drive, way)
+    figure = charts.new_figure(charts.plan_height_in(whole, least=3.0) + _LEGEND_ROW_IN)
     axes = figure.add_subplot()
     for line in data.lines_m:
         axes.plot(line[:, 0], line[:, 1], color=charts.INK, linewidth=0.6, alpha=0.35)
+    if data.drive is not None:
+        draw_drive(axes, data.drive)
     rows = charts.thinned(len(way))
     axes.plot(way[rows, 0], way[rows, 1], color=charts.FINAL, label="true path")
     if len(data.believed_m):
@@ -41,40 +48,77 @@ def plan_chart(data: ReplayData) -> Figure:
     begun = [fault["began_s"] for fault in data.verdict["faults"] if fault["began_s"] is not None]
     _marks(axes, [_place_at(data, at_s) for at_s in begun], "v", charts.FLAGGED, "fault begins")
     plan_axes(axes)
-    charts.legend_above(axes, columns=7)
+    heads = -(-len(axes.get_legend_handles_labels()[0]) // _LEGEND_COLUMNS)
+    figure.subplots_adjust(top=1.0 - (0.12 + _LEGEND_ROW_IN * heads) / figure.get_figheight())
+    charts.legend_above(axes, columns=_LEGEND_COLUMNS)
+    if data.drive is not None:
+        _look_at(figure, axes, whole)
+        name_places(axes, data.drive, way)
     return figure
 
 
+def _look_at(figure: Figure, axes: Axes, corners_m: FloatArray) -> None:
+    """Set the limits to corners (2, 2), and to more on the sides that have room."""
+    low, high = corners_m
+    axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), autoscale_on=False)
+    figure.draw_without_rendering()
+
+
 def time_chart(data: ReplayData) -> Figure:
-    """Draw speed, articulation, and where it is known clearance over time; faults shaded."""
-    time_s, clearance_m = data.column("time_s"), data.column("clearance_m")
+    """Draw speed, joint and steering, and where it is known clearance over time; faults shaded."""
+    time_s, clearance_m, drive = data.column("time_s"), data.column("clearance_m"), data.drive
     seen = bool(np.isfinite(clearance_m).any())
     count = 3 if seen else 2
-    figure = charts.new_figure(0.6 + 1.7 * count)
-    figure.subplots_adjust(hspace=0.22)
+    figure = charts.new_figure(0.6 + 1.9 * count)
+    figure.subplots_adjust(hspace=0.32)
     panels = figure.subplots(count, 1, sharex=True)
     wanted_kmh, speed_kmh = 3.6 * data.column("wanted_mps"), 3.6 * data.column("speed_mps")
-    panels[0].plot(*charts.envelope(time_s, wanted_kmh), color=charts.ODOMETRY, linewidth=1.0, label="commanded")
-    panels[0].plot(*charts.envelope(time_s, speed_kmh), color=charts.FINAL, label="true")
+    if drive is not None and len(drive.plans):
+        _curve(panels[0], *_with_gaps(drive.plan("time_s"), 3.6 * drive.plan("planned_mps")), charts.TRUTH, "planned")
+        if seen:
+            _curve(
+                panels[2], *_with_gaps(drive.plan("time_s"), drive.plan("clearance_m")), charts.ODOMETRY, "predicted"
+            )
+    _curve(panels[0], time_s, wanted_kmh, charts.ODOMETRY, "commanded", linewidth=1.0)
+    _curve(panels[0], time_s, speed_kmh, charts.FINAL, "true")
     panels[0].set_ylabel("speed, km/h")
-    angle_deg = np.degrees(data.column("articulation_rad"))
-    panels[1].plot(*charts.envelope(time_s, angle_deg), color=charts.TRUTH, label="articulation, left +")
-    panels[1].set_ylabel("angle, °")
+    _curve(
+        panels[1],
+        time_s,
+        np.degrees(data.column("steering_rps")),
+        charts.ODOMETRY,
+        "steering command, °/s",
+        linewidth=0.9,
+    )
+    _curve(panels[1], time_s, np.degrees(data.column("articulation_rad")), charts.TRUTH, "articulation, left +, °")
+    panels[1].set_ylabel("joint, °, °/s")
     if seen:
-        panels[2].plot(*charts.envelope(time_s, clearance_m), color=charts.WHEELS, label="least distance to a wall")
+        _curve(panels[2], time_s, clearance_m, charts.WHEELS, "true: least distance of a body to a wall")
         panels[2].set(ylabel="clearance, m", ylim=(0.0, None))
     for axes in panels:
         _shade_faults(axes, data)
         axes.yaxis.set_label_coords(-0.065, 0.5)
+        charts.legend_above(axes)
     panels[-1].set_xlabel("time, s")
     panels[-1].set_xlim(0.0, max(data.verdict["duration_s"], 1.0))
-    charts.legend_above(panels[0])
     return figure
+
+
+def _curve(axes: Axes, x: FloatArray, y: FloatArray, colour: str, label: str, **more: Any) -> None:
+    axes.plot(*charts.envelope(x, y), color=colour, label=label, **more)
+
+
+def _with_gaps(time_s: FloatArray, values: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return a curve (N,) with a gap where nothing was planned for more than a second, or five steps of a thinned one."""
+    steps = np.diff(time_s)
+    gap = max(_GAP_S, 5.0 * float(np.median(steps)) if len(steps) else 0.0)
+    at = np.flatnonzero(steps > gap) + 1
+    return np.insert(time_s, at, time_s[at - 1]), np.insert(values, at, np.nan)
 
 
 def state_chart(data: ReplayData) -> Figure:
     """Draw the states of each process as bars over time."""
-    lanes = list(data.changes.items())
+    lanes = [*data.changes.items(), *limit_lane(data)]
     figure = charts.new_figure(0.8 + _LANE_IN * len(lanes))
     figure.subplots_adjust(left=_NAMES_IN / charts.WIDTH_IN)
     axes = figure.add_subplot()
@@ -89,11 +133,30 @@ def state_chart(data: ReplayData) -> Figure:
     return figure
 
 
+def limit_lane(data: ReplayData) -> list[tuple[str, list[Change]]]:
+    """Return what limited the speed as changes of state; nothing where nobody plans."""
+    drive = data.drive
+    if drive is None or not len(drive.plans):
+        return []
+    time_s, which = drive.plan("time_s"), drive.plan("limit").astype(int)
+    steps = np.diff(time_s)
+    ends = np.append(steps > max(_GAP_S, 5.0 * float(np.median(steps)) if len(steps) else 0.0), True)
+    changes: list[Change] = []
+    for row, (at_s, name) in enumerate(zip(time_s.tolist(), [drive.limits[k] for k in which], strict=True)):
+        if not changes or changes[-1].state != name:
+            changes.append(Change(data.start_ns + round(at_s * _SECOND_NS), name, ""))
+        if ends[row]:
+            changes.append(Change(data.start_ns + round(at_s * _SECOND_NS), NOT_PLANNED, ""))
+    return [("speed limited by", changes)]
+
+
 def _lane(axes: Axes, row: int, changes: list[tuple[float, Change]], end_s: float) -> None:
     """Draw the bars of one process; the name of a state stands in those that are wide enough."""
     names = list(dict.fromkeys(change.state for _, change in changes))
     ends = [at_s for at_s, _ in changes[1:]] + [end_s]
     for (at_s, change), until_s in list(zip(changes, ends, strict=True))[:_MOST_BARS]:
+        if change.state == NOT_PLANNED:
+            continue
         width_s = max(until_s - at_s, end_s / 800)
         colour = _SHADES[names.index(change.state) % len(_SHADES)]
         axes.barh(row, width_s, left=at_s, height=0.7, color=colour, alpha=0.55)

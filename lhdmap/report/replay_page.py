@@ -7,14 +7,27 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from lhdmap.report import charts, markup, replay_charts
-from lhdmap.report.replay_data import ReplayData
+import numpy as np
+
+from lhdmap.report import charts, markup, replay_charts, replay_drive_charts
+from lhdmap.report.replay_data import DriveData, ReplayData, StopRow
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 PLAN = "The way from above: what truly happened, and where perception believed the machine, placed at the true start."
-TIME = "Speed, joint angle and clearance as they truly were; what was commanded beside it. Stretches with a fault are shaded."
+DRIVE = (
+    "The map that is driven on, the legs that navigation asked for, and each way of the leading axle that guidance predicted, "
+    "drawn from where the machine truly was. Map and truth are laid over each other, for this picture alone, as they fit best."
+)
+PLACE = (
+    "Place by localization less the true one, in the axes of the machine; map and truth are laid over each other as they fit best "
+    "over the drive: errors of localization and of the map."
+)
+TIME = (
+    "Speed, joint angle and clearance as they truly were; what was planned, predicted and commanded beside it. Stretches with a "
+    "fault are shaded."
+)
 STATES = (
     "States of the processes over time, from the journal; journal.jsonl has the cause and the figures of each change."
 )
@@ -32,9 +45,10 @@ def render(data: ReplayData) -> str:
     with charts.styled():
         pictures = list(_pictures(data))
     parts = [
-        markup.section("What happened", markup.cards(_cards(data.verdict)) + markup.paragraph(SIMULATED)),
+        markup.section("What happened", markup.cards(_cards(data)) + markup.paragraph(SIMULATED)),
         markup.section("Warnings", markup.listed(data.warnings, "warning")),
         *pictures,
+        markup.section("Stops", _stops(data.stops)),
         markup.section("Contacts", _contacts(data.verdict["contacts"])),
         markup.section("Faults and what followed", _faults(data.verdict["faults"])),
         markup.section("Verdict", _verdict(data.verdict)),
@@ -43,8 +57,9 @@ def render(data: ReplayData) -> str:
     return markup.document(data.title, "".join(parts))
 
 
-def _cards(verdict: Mapping[str, Any]) -> Iterator[tuple[str, str, str]]:
+def _cards(data: ReplayData) -> Iterator[tuple[str, str, str]]:
     """Yield name, value and meaning of the headline figures."""
+    verdict = data.verdict
     yield "verdict", "ok" if verdict["ok"] else "not ok", str(verdict["reason"])
     yield "driven", f"{verdict['distance_m']:.1f} m", f"in {verdict['duration_s']:.1f} s of simulated time"
     fastest = f"mean of the whole run; at most {verdict['max_speed_kmh']:.1f} km/h"
@@ -59,19 +74,52 @@ def _cards(verdict: Mapping[str, Any]) -> Iterator[tuple[str, str, str]]:
     yield "stops", str(verdict["stops"]), "rests on the way, without those of start and end"
     yield "assistance", str(verdict["assists"]), f"requests; {verdict['assist_s']:.0f} s until they were answered"
     yield "faults", str(len(verdict["faults"])), "injected by the scenario"
+    if data.drive is not None:
+        yield from _drive_cards(data.drive)
+
+
+def _drive_cards(drive: DriveData) -> Iterator[tuple[str, str, str]]:
+    if len(drive.places):
+        off_cm = 100.0 * np.hypot(drive.place("along_m"), drive.place("across_m"))
+        most = f"of the place on the map, in 95 % of the time; at most {off_cm.max():.0f} cm"
+        yield "error of the place", f"{np.percentile(off_cm, 95):.0f} cm", most
+    shares = replay_drive_charts.limit_shares(drive)
+    if shares:
+        others = ", ".join(f"{name} {100.0 * share:.0f} %" for name, share in shares[1:])
+        meaning = f"limits the speed in {100.0 * shares[0][1]:.0f} % of the plans" + (f"; {others}" if others else "")
+        yield "slowed by", shares[0][0], meaning
 
 
 def _pictures(data: ReplayData) -> Iterator[str]:
     if not len(data.rows):
         return
-    yield markup.section("Way", _picture(replay_charts.plan_chart(data), PLAN))
+    words = PLAN if data.drive is None else f"{PLAN} {DRIVE}"
+    yield markup.section("Way", _picture(replay_charts.plan_chart(data), words))
     yield markup.section("Over time", _picture(replay_charts.time_chart(data), TIME))
+    if data.drive is not None and len(data.drive.places):
+        chart = replay_drive_charts.place_chart(data.drive, data.verdict["duration_s"])
+        yield markup.section("Place on the map", _picture(chart, PLACE))
     if data.changes:
         yield markup.section("States", _picture(replay_charts.state_chart(data), STATES))
 
 
 def _picture(figure: Figure, caption: str) -> str:
     return markup.picture(charts.svg_uri(figure), caption)
+
+
+def _stops(stops: Sequence[StopRow]) -> str:
+    rows = [
+        (
+            f"{one.from_s:.2f}",
+            "the end" if one.to_s is None else f"{one.to_s:.2f}",
+            f"{one.speed_kmh:.1f}",
+            one.cause,
+            one.said,
+        )
+        for one in stops[:_MOST_ROWS]
+    ]
+    head = ("from, s", "to, s", "speed before, km/h", "why, by the executor", "what watchdog and guard said")
+    return markup.table(head, rows, numbers_from=0, numbers_to=3) if rows else ""
 
 
 def _contacts(contacts: Sequence[Mapping[str, Any]]) -> str:

@@ -1,6 +1,7 @@
 """A replay in a Rerun recording, written while it goes on: machine, newest scan, curves, events as texts, states as steps.
 
-Entities: `map/base_link/…` (the machine as it truly is), `map/scan/…`, `map/walls`, `map/path/…`, `motion/…`, `state/…`, `log`.
+Entities: `map/base_link/…` (the machine as it truly is), `map/scan/…`, `map/walls`, `map/path/…`, `motion/…`, `state/…`, `log`; of
+a machine that drives itself `map/topology/…`, `map/route/…` (its legs), `map/plan/horizon` (what guidance predicts), `place/…`.
 """
 
 from __future__ import annotations
@@ -13,20 +14,33 @@ import numpy as np
 from lhdmap.machine import Machine
 from lhdmap.messages import FloatArray
 from lhdmap.report.recording import PathStyle, RecordingWriter
-from lhdmap.report.recording_layout import REPLAY_CURVES
-from lhdmap.report.replay_data import COLUMNS, ReplayData
+from lhdmap.report.recording_layout import REPLAY_CURVES, REPLAY_GRAPH
+from lhdmap.report.replay_data import COLUMNS, DriveData, ReplayData
+from lhdmap.report.topology_recording import add_topology, raised
+from lhdmap.topology.model import TopologicalMap
 from lhdmap.trajectory import Trajectory
 
 _BLUE, _ORANGE, _GREEN, _RED, _GREY = 0x2F86C9FF, 0xE69F00FF, 0x009E73FF, 0xD55E00FF, 0x8A949EFF
-_COLOURS = (_BLUE, _ORANGE, _GREEN, _RED, 0xCC79A7FF, _GREY)
+_PINK, _DEG = 0xCC79A7FF, 180.0 / np.pi
+BATCH_COLUMNS = (*COLUMNS, "planned_mps", "predicted_m")
+_COLOURS = (_BLUE, _ORANGE, _GREEN, _RED, _PINK, _GREY)
 _TRUE = PathStyle("true path", "blue", _BLUE, 0.5)
 _BELIEVED = PathStyle("path by perception", "orange", _ORANGE, 0.25)
 _CURVES = (
     ("motion/speed/true", "speed_mps", 3.6, _BLUE, "true, km/h"),
     ("motion/speed/wanted", "wanted_mps", 3.6, _ORANGE, "commanded, km/h"),
-    ("motion/articulation", "articulation_rad", 180.0 / np.pi, _GREEN, "articulation, deg"),
-    ("motion/clearance", "clearance_m", 1.0, _RED, "clearance, m"),
+    ("motion/speed/planned", "planned_mps", 3.6, _GREEN, "planned, km/h"),
+    ("motion/articulation", "articulation_rad", _DEG, _GREEN, "joint, deg"),
+    ("motion/steering", "steering_rps", _DEG, _ORANGE, "steering command, deg/s"),
+    ("motion/clearance/true", "clearance_m", 1.0, _RED, "true, m"),
+    ("motion/clearance/predicted", "predicted_m", 1.0, _ORANGE, "predicted, m"),
 )
+_PLACE = (
+    ("along", 100.0, _BLUE, "along, cm"),
+    ("across", 100.0, _ORANGE, "across, cm"),
+    ("heading", _DEG, _GREEN, "heading, deg"),
+)
+_GEARS = {"forward": (_GREEN, "green"), "reverse": (_ORANGE, "orange")}
 
 
 class ReplayRecording:
@@ -34,8 +48,9 @@ class ReplayRecording:
 
     def __init__(self, path: Path, title: str, start_ns: int, machine: Machine, live_port: int | None = None) -> None:
         self._writer = RecordingWriter(path, title, start_ns, live_port=live_port)
-        self._writer.curves = REPLAY_CURVES
+        self._writer.curves, self._writer.beside_topology = REPLAY_CURVES, REPLAY_GRAPH
         self._machine, self._start_ns, self._live = machine, start_ns, live_port is not None
+        self._planned = False
 
     def begin(self, lines_m: Sequence[FloatArray], expected_s: float) -> None:
         """Record the machine's bodies and the walls as lines (N, 3); viewers that follow get their layout."""
@@ -51,13 +66,13 @@ class ReplayRecording:
             self._writer.lay_out(expected_s)
 
     def add_rows(self, rows: FloatArray, attitudes_rad: FloatArray) -> None:
-        """Record rows (M, 9) of `replay_data.COLUMNS`, with roll and pitch (M, 2)."""
+        """Record rows (M, 12) of `BATCH_COLUMNS`, with roll and pitch (M, 2)."""
         stamps_ns = self._start_ns + np.round(1e9 * rows[:, 0]).astype(np.int64)
         quaternions = _quaternions(rows, attitudes_rad)
         self._writer.add_moving("map/base_link", stamps_ns, rows[:, 1:4], quaternions)
         self._writer.add_joint(stamps_ns, rows[:, COLUMNS.index("articulation_rad")], self._machine)
         for entity, column, scale, rgba, name in _CURVES:
-            values = scale * rows[:, COLUMNS.index(column)]
+            values = scale * rows[:, BATCH_COLUMNS.index(column)]
             known = np.isfinite(values)
             if known.any():
                 self._writer.add_curve(entity, stamps_ns[known], values[known], rgba, name)
@@ -69,6 +84,21 @@ class ReplayRecording:
     def add_scan(self, stamp_ns: int, points_map: FloatArray) -> None:
         """Record the points (N, 3) of a scan."""
         self._writer.add_scan(stamp_ns, points_map)
+
+    def add_map(self, topology: TopologicalMap) -> None:
+        """Record the topological map that is driven on."""
+        add_topology(self._writer, topology)
+
+    def add_horizon(self, stamp_ns: int, way_m: FloatArray) -> None:
+        """Record the way (K, 3) that guidance predicts at a time; empty: none."""
+        import rerun as rr
+
+        if len(way_m) or self._planned:
+            lines = [way_m] if len(way_m) else []
+            strip = rr.LineStrips3D(lines, colors=_PINK, radii=rr.Radius.ui_points(3.0))
+            self._writer.add_at(stamp_ns, "map/plan/horizon", strip)
+            self._writer.explain("pink line", "way of the leading axle that guidance predicts")
+        self._planned = bool(len(way_m))
 
     def add_text(self, text: str, stamp_ns: int, *, grave: bool = False) -> None:
         """Record an event."""
@@ -83,6 +113,8 @@ class ReplayRecording:
         if data is not None:
             self._add_paths(data)
             self._add_states(data)
+        if data is not None and data.drive is not None:
+            self._add_drive(data.drive)
         self._writer.close()
 
     def _add_paths(self, data: ReplayData) -> None:
@@ -98,6 +130,24 @@ class ReplayRecording:
             points = rr.Points3D(spots, colors=_RED, radii=rr.Radius.ui_points(6.0))
             self._writer.add_shape("map/contacts", points)
             self._writer.explain("red points", "contacts")
+
+    def _add_drive(self, drive: DriveData) -> None:
+        """Record the map where it fits best, the legs that were asked for, and by how much the place on the map was off."""
+        import rerun as rr
+
+        if drive.topology is not None:
+            self.add_map(drive.topology)
+        for gear, (rgba, colour) in _GEARS.items():
+            lines = [raised(leg.line_m) for leg in drive.legs if leg.gear == gear]
+            if lines:
+                self._writer.add_shape(
+                    f"map/route/{gear}", rr.LineStrips3D(lines, colors=rgba, radii=rr.Radius.ui_points(2.5))
+                )
+                self._writer.explain(f"{colour} line", f"leg of the route, {gear}")
+        if len(drive.places):
+            stamps = self._start_ns + np.round(1e9 * drive.place("time_s")).astype(np.int64)
+            for column, (name, scale, rgba, label) in enumerate(_PLACE, start=1):
+                self._writer.add_curve(f"place/{name}", stamps, scale * drive.places[:, column], rgba, label)
 
     def _add_states(self, data: ReplayData) -> None:
         """Record the states of each process as steps; the legend says which step is which."""

@@ -36,6 +36,11 @@ class StepError(NamedTuple):
         """What of it stands on the diagonal, as standard deviations, shape (3,): asked for at each scan."""
         return np.sqrt(self.walk.diagonal() + self.pull * self.pull)
 
+    def steadied(self, share: float, pull_rad: float) -> StepError:
+        """Return the error where a gyroscope leaves a share of the heading's variance, and pulls it by its own bias."""
+        keep = np.array([1.0, 1.0, np.sqrt(share)])
+        return StepError(self.walk * np.outer(keep, keep), self.pull + np.array([0.0, 0.0, pull_rad]), self.jitter)
+
     def then(self, step: FloatArray, after: StepError) -> StepError:
         """Return the error of this step and the next one, `step` (3,), together."""
         return StepError(*_added(self.walk, self.pull, step, after.walk, after.pull), after.jitter)

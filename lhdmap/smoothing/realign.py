@@ -21,14 +21,14 @@ from lhdmap.messages import FloatArray
 from lhdmap.smoothing.height_pairs import Joint, wall_lines
 from lhdmap.smoothing.moves import Moves
 from lhdmap.smoothing.settings import SmoothingSettings
-from lhdmap.smoothing.window import Node, Window, solved
+from lhdmap.smoothing.window import Node, Offset, Window, solved
 
 _SOLVE_SHARE = 0.3  # of the lag between two solutions
 _REST_SHARE = 0.2  # of the lag in time between nodes at rest
 _MOST_FINAL = 300  # of a machine that stands
-_ANCHOR_M = 18.0  # of final poses that the others are tied to: as far as the rear scanner looks back
+_ANCHOR_M = 30.0  # of final poses that the others are tied to: farther than the rear scanner looks back
 _MOST_HITS = 400  # of a scan
-_FRONT_STEP = 6  # of the front hits so many are looked up once: the rear ones tell more
+_FRONT_STEP = 2  # of the front hits so many are looked up once: the rear ones tell more
 # Random walk of the odometry of tilted scanners (m, m, deg per root metre), measured on simulated drives; where a direction
 # was weak or the scan lost, so many times as much.
 _WALK, _WEAK = np.array([0.02, 0.01, math.radians(0.03)]), 5.0
@@ -53,7 +53,7 @@ class Realigner:
 
     def __init__(self, settings: SmoothingSettings, joint_x_m: float = 0.0) -> None:
         self._settings = settings
-        self._joint = Joint(joint_x_m, 0.0)
+        self._joint, self._offset = Joint(joint_x_m, 0.0), Offset()
         self._nodes: deque[Node] = deque()  # final ones that others are tied to, then those that are still moved
         self._poses: deque[FloatArray] = deque()
         self._final = self._paired = 0  # so many of the nodes are final, have been compared with the others
@@ -142,7 +142,7 @@ class Realigner:
         self._solved_m = self._travelled_m
         first = max(self._final, 1)  # the first pose of all stays
         if first < len(self._nodes):
-            window = Window(list(self._nodes), np.array(self._poses), self._joint, first, self._paired)
+            window = Window(list(self._nodes), np.array(self._poses), self._joint, first, self._paired, self._offset)
             self._pending = self._worker.submit(solved, window)
 
     def _collect(self) -> None:
@@ -153,7 +153,7 @@ class Realigner:
         poses, nodes = deque(found.poses), list(self._nodes)
         for before, node in zip(nodes[len(poses) - 1 :], nodes[len(poses) :], strict=False):
             poses.append(se2.compose(poses[-1], se2.between(before.pose, node.pose)))
-        self._poses, self._joint, self._paired = poses, found.joint, found.unpaired
+        self._poses, self._joint, self._paired, self._offset = poses, found.joint, found.unpaired, found.offset
 
 
 def _thinned(points: FloatArray) -> FloatArray:

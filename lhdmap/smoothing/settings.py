@@ -20,7 +20,7 @@ class SmoothingSettings:
         0.2, unit="m", doc="Travel between the scans that are aligned.", minimum=0.05, source="measured"
     )
     lag_m: float = setting(
-        40.0, unit="m", doc="Travel after which an aligned pose is final.", minimum=1.0, source="measured"
+        80.0, unit="m", doc="Travel after which an aligned pose is final.", minimum=1.0, source="measured"
     )
     lag_s: float = setting(30.0, unit="s", doc="... or time, whichever comes first.", minimum=1.0)
     key_m: float = setting(1.0, unit="m", doc="Travel between key scans.", minimum=0.1)

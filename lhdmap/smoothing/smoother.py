@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -13,11 +13,11 @@ from lhdmap.messages import FloatArray
 from lhdmap.scan_matching.key_scan import KeyScan
 from lhdmap.smoothing.closures import Closure, Refusal, find_closures
 from lhdmap.smoothing.evidence import Evidence, evidence_of
-from lhdmap.smoothing.graph import smoothed
-from lhdmap.smoothing.heights import closed_heights
+from lhdmap.smoothing.graph import chained, smoothed
 from lhdmap.smoothing.keys import KeyScans
 from lhdmap.smoothing.robust import Tie, judged
 from lhdmap.smoothing.settings import SmoothingSettings
+from lhdmap.smoothing.space import smoothed_in_space
 from lhdmap.smoothing.steps import step_covariances
 
 _PLANAR = [0, 1, 5]  # of a pose: x, y, heading
@@ -27,7 +27,9 @@ _BLOCK = 50_000  # poses moved at a time: what is needed on the way is ten times
 class Correction(NamedTuple):
     """Planar corrections of the odometry: `T_map_odom` (N, 3) at `times_ns` (N,), and the number of closures behind them.
 
-    `end_covariance` (3, 3): of the last key, in its axes, where closures were used; `raised_m` (N,): what the heights change by.
+    `end_covariance` (3, 3): of the last key, in its axes, where closures were used; `raised_m` (N,): what the heights change by;
+    `left` (N, 2): what a gyroscope leaves of the error of a step's heading: share of its variance, and what adds up with time
+    (rad/s); `height_std_m`: of the last key, where loops were closed in space.
     """
 
     times_ns: npt.NDArray[np.int64]
@@ -35,6 +37,8 @@ class Correction(NamedTuple):
     closures: int
     end_covariance: FloatArray | None = None
     raised_m: FloatArray | None = None
+    left: FloatArray | None = None
+    height_std_m: float | None = None
 
 
 class Smoother:
@@ -47,25 +51,39 @@ class Smoother:
 
     def correction(
         self,
-        realigned: Correction | None = None,
-        heights_m: Callable[[npt.NDArray[np.int64]], FloatArray] | None = None,
+        moved: Sequence[Correction] = (),
+        floor: Callable[[npt.NDArray[np.int64]], FloatArray] | None = None,
     ) -> Correction | None:
         """Return how the path is to be moved, or None where no place was seen twice.
 
-        The path is the odometry's, or what the realignment has made of it. `heights_m` tells that of the floor at times (N,).
+        The path is the odometry's, as realignment and gyroscope have `moved` it, one after the other. `floor` tells height (m),
+        roll and pitch (rad) at times (N,) as (N, 3), where an inclinometer does: then the graph is one in space.
         """
-        keys = self.keys.keys if realigned is None else _moved_keys(self.keys.keys, realigned)
+        keys = self._moved(moved)
         refused: list[Refusal] = []
         found = find_closures(keys, self._settings, refused) if self._settings.closures else []
         closures = self._believed(keys, found, refused)
         if not closures:
             return None
-        poses, end = smoothed(keys, closures, self._settings)
-        moved = np.array([se2.compose(pose, se2.inverse(key.pose)) for pose, key in zip(poses, keys, strict=True)])
-        moved[:, 2] = np.unwrap(moved[:, 2])
         times_ns = np.array([key.time_ns for key in keys], dtype=np.int64)
-        raised = None if heights_m is None else closed_heights(keys, heights_m(times_ns), closures)
-        return Correction(times_ns, moved, len(closures), end, raised)
+        raised, height_std_m = None, None
+        if floor is None:
+            poses, end = smoothed(keys, closures, self._settings)
+        else:
+            poses, raised, end, height_std_m = smoothed_in_space(keys, floor(times_ns), closures, self._settings)
+        moves = np.array([se2.compose(pose, se2.inverse(key.pose)) for pose, key in zip(poses, keys, strict=True)])
+        moves[:, 2] = np.unwrap(moves[:, 2])
+        return Correction(times_ns, moves, len(closures), end, raised, height_std_m=height_std_m)
+
+    def end_covariance(self, moved: Sequence[Correction]) -> FloatArray:
+        """Return the covariance (3, 3) of the last key on the path as it was `moved`, without closures."""
+        return chained(self._moved(moved)).covariance
+
+    def _moved(self, moved: Sequence[Correction]) -> list[KeyScan]:
+        keys = self.keys.keys
+        for one in moved:
+            keys = moved_keys(keys, one)
+        return keys
 
     def _believed(self, keys: list[KeyScan], found: list[Closure], refused: list[Refusal]) -> list[Closure]:
         """Return the closures that agree with odometry and each other, and note what speaks for and against each."""
@@ -103,12 +121,22 @@ def _planar(poses: FloatArray, times_ns: npt.NDArray[np.int64], correction: Corr
     )
 
 
-def _moved_keys(keys: list[KeyScan], correction: Correction) -> list[KeyScan]:
+def moved_keys(keys: list[KeyScan], correction: Correction) -> list[KeyScan]:
+    """Return the keys as a correction moves them, with what it leaves of their errors."""
     poses = np.zeros((len(keys), 6))
     poses[:, [0, 1, 5]] = np.array([key.pose for key in keys]).reshape(-1, 3)
     times_ns = np.array([key.time_ns for key in keys], dtype=np.int64)
     moved = corrected(poses, times_ns, correction)[:, [0, 1, 5]]
-    return [key._replace(pose=pose) for key, pose in zip(keys, moved, strict=True)]
+    out = [key._replace(pose=pose) for key, pose in zip(keys, moved, strict=True)]
+    if correction.left is None:
+        return out
+    at = np.searchsorted(correction.times_ns, times_ns).clip(max=len(correction.left) - 1)
+    step_s = np.diff(times_ns, prepend=times_ns[:1]) * 1e-9
+    left = correction.left[at]
+    return [
+        key._replace(error=key.error.steadied(share, rate_rps * dt_s))
+        for key, (share, rate_rps), dt_s in zip(out, left.tolist(), step_s.tolist(), strict=True)
+    ]
 
 
 def _moved(T: FloatArray, planar: FloatArray) -> FloatArray:

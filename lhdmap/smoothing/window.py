@@ -16,9 +16,10 @@ from lhdmap.messages import FloatArray
 from lhdmap.smoothing.height_pairs import Indices, Joint, Pairs, add_pairs, add_steps, same_height
 
 _ROUNDS = 2  # the next window begins where this one ended
-_APART_M = 3.0  # scans nearer to each other share the error that is to be found
+_APART_M = 1.5  # scans nearer to each other share the error that is to be found
 _NOISE_M = 0.015
 _JOINT_STD_RAD = math.radians(0.3)
+_FEWEST_STD_RAD, _MOST_WINDOWS = math.radians(0.01), 40.0
 
 
 class Seen(NamedTuple):
@@ -44,14 +45,41 @@ class Node(NamedTuple):
     seen: list[Seen]
 
 
+class Offset(NamedTuple):
+    """What the windows so far say of the joint's encoder: mean of their offsets (rad), and how many windows it is of.
+
+    In one window an offset looks like a bend: it is off by 0.03 degrees, and turns the heading with it. Over many it is known.
+    """
+
+    mean_rad: float = 0.0
+    windows: float = 0.0
+
+    @property
+    def std_rad(self) -> float:
+        """How far the offset of a window may be from the mean."""
+        return max(_JOINT_STD_RAD / (1.0 + self.windows), _FEWEST_STD_RAD)
+
+    def and_another(self, offset_rad: float, variance: float) -> Offset:
+        """Return it with what a window says, from its solution under this prior and its variance (rad²)."""
+        prior = 1.0 / self.std_rad**2
+        told = max(1.0 / variance - prior, 1e-6 * prior)
+        alone_rad = (offset_rad / variance - prior * self.mean_rad) / told
+        windows = min(self.windows + 1.0, _MOST_WINDOWS)
+        return Offset(self.mean_rad + (alone_rad - self.mean_rad) / windows, windows)
+
+
 class Window(NamedTuple):
-    """Nodes in a row with their poses (K, 3) and the joint; those before `first` are final, those from `unpaired` on are new."""
+    """Nodes in a row with their poses (K, 3) and the joint; those before `first` are final, those from `unpaired` on are new.
+
+    `offset`: what is known of the joint's encoder.
+    """
 
     nodes: Sequence[Node]
     poses: FloatArray
     joint: Joint
     first: int
     unpaired: int
+    offset: Offset = Offset()
 
 
 def solved(window: Window) -> Window:
@@ -63,17 +91,21 @@ def solved(window: Window) -> Window:
     pairs = _pairs_of(nodes, first, starts)
     steps = np.array([se2.between(a.pose, b.pose) for a, b in pairwise(nodes)])
     sigmas = np.array([node.step_sigmas for node in nodes[1:]])
-    size = 3 * len(nodes) + 1
+    size, known = 3 * len(nodes) + 1, window.offset
     for _ in range(_ROUNDS):
         H, g = np.zeros((size, size)), np.zeros(size)
         add_pairs(lines, owners, pairs, poses, joint, _NOISE_M, H, g)
         add_steps(poses, steps, sigmas, H, g)
-        H[-1, -1] += 1.0 / _JOINT_STD_RAD**2
-        g[-1] -= joint.offset_rad / _JOINT_STD_RAD**2
-        change = solve(H[3 * first :, 3 * first :], g[3 * first :], assume_a="pos")
+        H[-1, -1] += 1.0 / known.std_rad**2
+        g[-1] -= (joint.offset_rad - known.mean_rad) / known.std_rad**2
+        last = np.zeros(size - 3 * first)
+        last[-1] = 1.0
+        both = solve(H[3 * first :, 3 * first :], np.column_stack([g[3 * first :], last]), assume_a="pos")
+        change = both[:, 0]
         poses[first:] += change[:-1].reshape(-1, 3)
         joint = joint._replace(offset_rad=joint.offset_rad + float(change[-1]))
-    return window._replace(poses=poses, joint=joint, unpaired=len(nodes))
+    offset = known.and_another(joint.offset_rad, float(both[-1, 1]))
+    return window._replace(poses=poses, joint=joint, unpaired=len(nodes), offset=offset)
 
 
 def _pair(window: Window, lines: FloatArray, owners: Indices, starts: Indices) -> None:

@@ -191,7 +191,7 @@ def test_a_fault_is_told_and_debug_shows_where(
     def broken(*_: object) -> None:
         raise ZeroDivisionError("broken on purpose")
 
-    monkeypatch.setattr("lhdmap.pipeline.build.build_map", broken)
+    monkeypatch.setattr("lhdmap.pipeline.join.build_drives", broken)
     assert main(["build-map", str(files["log"])]) == 3
     told = capsys.readouterr().err
     assert "broken on purpose" in told

@@ -90,11 +90,24 @@ def test_reach_is_the_share_of_the_true_path_that_is_covered(kept: slice, share:
     assert found.reach == pytest.approx(share, abs=0.03)  # half a second at 2.5 m/s beyond the last pose still counts
 
 
+@pytest.mark.parametrize("length_m", [250.0, 60.0])
+def test_heading_drift_is_that_of_a_hundred_metres(length_m: float) -> None:
+    """A heading that is off by 0.1 mrad more each metre drifts by 10 mrad over 100 m, however long the drive is."""
+    found = evaluate_trajectory(arc(40.0, length_m, bias_rad_per_m=1e-4), arc(40.0, length_m))
+    assert found.heading_drift_deg == pytest.approx(math.degrees(1e-2), rel=1e-3)
+    assert found.to_json()["heading_drift_deg_per_100m"] == found.heading_drift_deg
+
+
 def test_reach_counts_a_hole_in_the_middle() -> None:
     truth = straight(100.0)
     rows = np.r_[0:600, 1400:2001]
     found = evaluate_trajectory(part(truth, rows), truth)
     assert found.reach == pytest.approx(0.6, abs=0.03)
+
+
+def test_standing_still_has_no_heading_drift() -> None:
+    still = trajectory(np.zeros((10, 3)), np.zeros((10, 3)))
+    assert evaluate_trajectory(still, still).heading_drift_deg is None
 
 
 def test_standing_still_is_no_division_by_zero() -> None:

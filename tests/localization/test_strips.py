@@ -67,7 +67,7 @@ def test_a_way_runs_on_through_the_intersection() -> None:
             last, first = made.poses[made.starts[before + 1] - 1], made.poses[made.starts[s]]
             assert math.dist(last[:2], first[:2]) < 0.3
             assert abs(math.remainder(last[2] - first[2], 2.0 * math.pi)) < 0.1
-    into = {name: [] for name in ("x", *ARMS)}
+    into: dict[str, list[int]] = {name: [] for name in ("x", *ARMS)}
     for s, name in enumerate(made.nodes):
         into[name].append(int(made.before_starts[s + 1] - made.before_starts[s]))
     assert sorted(into["x"]) == [1] * 6

@@ -8,8 +8,9 @@ import math
 import numpy as np
 import pytest
 from lhdmap.geometry import se2
+from lhdmap.localization.method import Corrected
 from lhdmap.localization.settings import LocalizationSettings
-from lhdmap.localization.tracker import Corrected, Tracker
+from lhdmap.localization.tracker import Tracker
 from lhdmap.localization.walls import MapWalls
 from lhdmap.messages import FloatArray
 
@@ -98,7 +99,7 @@ def test_perfectly_straight_walls_say_nothing_of_along() -> None:
     for _ in range(10):
         tracker.correct(points, len(points), walls.quality("s"))
     assert tracker.pose == pytest.approx([20.0, 0.0, 0.0], abs=0.01)
-    assert tracker.deviations[0] == pytest.approx(0.2, rel=0.1)
+    assert 0.19 < tracker.deviations[0] < 0.23  # as before, and what walls that say nothing may be wrong by
     assert tracker.deviations[1] < 0.02
 
 
@@ -108,7 +109,7 @@ def test_without_walls_the_prediction_stays() -> None:
     said = tracker.correct(np.array([[x, 2.0] for x in np.arange(0.0, 5.0, 0.1)]), 50, walls.quality(""))
     assert said.support == 0.0
     assert tracker.pose == pytest.approx([0.0, 900.0, 0.0])
-    assert pytest.approx(np.eye(3)) == tracker.P
+    assert pytest.approx(np.eye(3), abs=1e-4) == tracker.P  # the map's own error stands beside it
 
 
 def test_a_step_is_carried_on_with_its_covariance() -> None:
@@ -121,4 +122,6 @@ def test_a_step_is_carried_on_with_its_covariance() -> None:
     tracker.predict(np.array([10.0, 0.0, 0.0]), np.zeros((3, 3)))
     assert tracker.pose == pytest.approx([1.0, 12.0, 0.5 * math.pi])
     assert tracker.deviations[1] == pytest.approx(10.0 * heading_std, rel=0.02)
-    assert tracker.deviations[0] < 0.03
+    assert tracker.deviations[0] == pytest.approx(
+        0.1, rel=0.05
+    )  # the odometry may be off by 1 % where walls told nothing yet

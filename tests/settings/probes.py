@@ -31,10 +31,12 @@ from lhdmap.movement.routes import RouteOptions, route
 from lhdmap.odometry.cloud_odometry import CloudStep
 from lhdmap.odometry.steps import OdometryStep
 from lhdmap.pile.stage import ScanHits
+from lhdmap.pipeline.heading import gyro_correction
 from lhdmap.pipeline.inspection import Inspection
 from lhdmap.pipeline.localize import Localizer
 from lhdmap.pipeline.mapping import MappingPipeline
 from lhdmap.pipeline.pile import PileWatch, PlacedScan
+from lhdmap.pipeline.track import Rows
 from lhdmap.rockbreaker.machine import Rockbreaker
 from lhdmap.simulation.grizzly import simulate_grizzly
 from lhdmap.smoothing.trust import expected_error
@@ -48,6 +50,7 @@ from tests.movement.mines import fast_ladder
 from tests.report.synthetic import START_NS, report_data
 from tests.report.test_recording import read
 from tests.settings import streams
+from tests.settings.guided import plans, remembered, stops, trips
 from tests.settings.streams import Stream
 
 Probe = Callable[[Settings], str]
@@ -108,6 +111,22 @@ def run(settings: Settings, stream: Stream, primary: Literal["front", "points"] 
         pipeline.warnings,
         pipeline.sweeps.warnings,
     )
+
+
+def turning(settings: Settings) -> str:
+    """Return the digest of how a gyroscope moves a path whose scans drift in heading."""
+    pipeline = MappingPipeline(settings)
+    for k, message in enumerate(streams.turning()):
+        pipeline.front_end.update("inclinometer", message)
+        late_ns = message.stamp_ns - 200_000_000
+        if k % 5 == 0 and late_ns > 0 and pipeline.front_end.gyro.there:
+            pipeline.turns.append(late_ns, pipeline.front_end.gyro.turned_at(np.array([late_ns]))[0])
+    t = np.arange(0.5, 119.0, 0.1)
+    heading = 0.4 * (1.0 - np.cos(0.5 * t)) + 1e-3 * np.cumsum(np.random.default_rng(9).standard_normal(len(t)))
+    x, y = 0.3 * np.cumsum(np.cos(heading)), 0.3 * np.cumsum(np.sin(heading))
+    zero = np.zeros(len(t))
+    rows = Rows(np.round(t * 1e9).astype(np.int64), np.column_stack([x, y, zero, zero, zero, heading]))
+    return digest(gyro_correction(pipeline, rows))
 
 
 def lap(settings: Settings) -> str:
@@ -236,7 +255,8 @@ def localized(settings: Settings, *, way_m: float, jump_m: float = 0.0, known_st
         localizer.update(role, message)
     localizer.finish()
     rows = [row._replace(latency_ms=0.0) for row in localizer.rows]
-    return digest(rows, localizer.withheld, localizer.lost_stretches, localizer.first_fix)
+    searches = [(one.stamp_ns, one.purpose) for one in localizer.searches]
+    return digest(rows, localizer.withheld, localizer.lost_stretches, localizer.first_fix, searches)
 
 
 def driven(settings: Settings) -> str:
@@ -284,6 +304,16 @@ def driven(settings: Settings) -> str:
     return digest(told)
 
 
+def guided(settings: Settings) -> str:
+    """Return the digest of what guidance commands in a narrow bend, and on the way to a stop."""
+    return digest(plans(settings.guidance), stops(settings.guidance), remembered(settings.guidance))
+
+
+def navigated(settings: Settings) -> str:
+    """Return the digest of what navigation control says and asks for on trips over a small map."""
+    return digest(trips(settings))
+
+
 def _mapped(stream: Callable[[], Stream], primary: Literal["front", "points"] = "front", *, own: bool = False) -> Probe:
     return lambda settings: run(settings, stream(), primary, own=own)
 
@@ -293,6 +323,7 @@ PROBES: dict[str, Probe] = {
     "unlevelled": _mapped(streams.unlevelled, own=True),
     "faulty": _mapped(streams.faulty, own=True),
     "rare": _mapped(streams.rare, own=True),
+    "turning": turning,
     "level": _mapped(streams.planar),
     "smooth": _mapped(partial(streams.planar, 0.005)),
     "tachometer": _mapped(partial(streams.planar, wheels="tachometer")),
@@ -303,6 +334,8 @@ PROBES: dict[str, Probe] = {
     "cut": _mapped(streams.cut, "points"),
     "lap": lap,
     "driven": driven,
+    "guided": guided,
+    "navigated": navigated,
     "landmarks": landmarks,
     "pile": pile,
     "recording": recording,

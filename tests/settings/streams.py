@@ -67,6 +67,19 @@ def tilted() -> Stream:
     return tuple((role, one.message) for one in records(DriftWorld(TILTED)) if (role := _role(one)))
 
 
+def turning() -> tuple[Inclination, ...]:
+    """Return two minutes of a gyroscope at 50 Hz in bends, with noise, a gap of 0.15 s and a reading of two turns a second."""
+    rng, period_ns = np.random.default_rng(8), 20_000_000
+    out = []
+    for k in range(6000):
+        rate = 0.2 * math.sin(0.01 * k) + 0.0005 + 0.001 * rng.standard_normal()
+        if k == 3000:
+            rate = 2.5
+        if not 2000 < k < 2008:
+            out.append(Inclination(k * period_ns, "imu", 0.0, 0.0, np.array([0.0, 0.0, rate]), None))
+    return tuple(out)
+
+
 def _role(record: Record) -> str:
     match record.message:
         case LaserScan():

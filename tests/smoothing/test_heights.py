@@ -10,7 +10,8 @@ from lhdmap.geometry import se2
 from lhdmap.messages import FloatArray
 from lhdmap.scan_matching.key_scan import KeyScan
 from lhdmap.smoothing.closures import Closure
-from lhdmap.smoothing.heights import closed_heights
+from lhdmap.smoothing.settings import SmoothingSettings
+from lhdmap.smoothing.space import InSpace, smoothed_in_space
 
 COVARIANCE = np.diag([1e-4, 1e-4, 1e-6])
 NO_POINTS = np.zeros((1, 3), np.float32)
@@ -19,6 +20,17 @@ NO_POINTS = np.zeros((1, 3), np.float32)
 def keys_at(poses: FloatArray) -> list[KeyScan]:
     way = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(poses[:, :2], axis=0).T))])
     return [KeyScan(k, pose, float(way[k]), NO_POINTS) for k, pose in enumerate(poses)]
+
+
+def closed(keys: list[KeyScan], told: FloatArray, closures: list[Closure]) -> InSpace:
+    """Solve the graph of keys on a floor whose heights were told; the body pitches as they say."""
+    way = np.array([key.travelled_m for key in keys])
+    pitch = -np.arctan(np.gradient(told, way))
+    return smoothed_in_space(keys, np.column_stack([told, np.zeros(len(keys)), pitch]), closures, SmoothingSettings())
+
+
+def closed_heights(keys: list[KeyScan], told: FloatArray, closures: list[Closure]) -> FloatArray:
+    return closed(keys, told, closures).raised_m
 
 
 def ring(count: int = 120) -> FloatArray:

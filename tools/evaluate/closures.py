@@ -100,7 +100,8 @@ def counted(drive: Drive) -> Counted:
     smoother = Smoother(SmoothingSettings())
     smoother.keys.keys = drive.keys
     began = time.perf_counter()
-    smoother.correction(heights_m=lambda _: drive.heights_m)
+    level = np.zeros((len(drive.keys), 2))
+    smoother.correction(floor=lambda _: np.column_stack([drive.heights_m, level]))
     spent = time.perf_counter() - began
     accepted = [one for one in smoother.evidence if one.accepted]
     right = {one.current_ns for one in accepted if is_right(one, drive)}

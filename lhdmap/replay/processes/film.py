@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Sequence
+from typing import Any
 
 import numpy as np
 
@@ -24,6 +25,7 @@ from lhdmap.replay.process import (
     Process,
     Received,
 )
+from lhdmap.replay.processes.film_drive import TOPICS, DriveFilm
 from lhdmap.replay.series import Series
 from lhdmap.report.replay_data import COLUMNS
 from lhdmap.report.replay_recording import ReplayRecording
@@ -40,21 +42,33 @@ class Film(Process):
     """A row each 0.1 s; `recording` is None where none is wanted."""
 
     name, period_ns, priority, site = FILM, 100 * MILLISECOND_NS, 80, EVERYWHERE
-    reads = (STATE, CONTACT, POSE, _COMMAND, _SCAN)
+    reads = (STATE, CONTACT, _COMMAND, _SCAN, *TOPICS)
 
-    def __init__(self, machine: Machine, recording: ReplayRecording | None = None, *, live: bool = False) -> None:
+    def __init__(
+        self,
+        machine: Machine,
+        recording: ReplayRecording | None = None,
+        *,
+        live: bool = False,
+        drive: DriveFilm | None = None,
+    ) -> None:
+        """`drive`: what is watched of a machine that drives itself; None: it does not."""
         self.series, self._believed = Series(len(COLUMNS)), Series(4)
         self._machine, self._recording = machine, recording
         self._most = _LIVE_BATCH if live else _BATCH
         self._batch: list[tuple[float, ...]] = []
         self._attitudes: list[tuple[float, float]] = []
-        self._wanted_mps = self._clearance_m = math.nan
+        self.drive = drive
+        self._wanted_mps = self._steering_rps = self._clearance_m = math.nan
         self._start: State | None = None
+        self._mapped = False
 
     def step(self, now_ns: int, inbox: Sequence[Received]) -> Iterable[Outgoing]:
         """Take what has come."""
         state: State | None = None
         for topic, _, message in inbox:
+            if self.drive is not None:
+                self._watch(topic, message)
             if topic == STATE:
                 state = message
             elif topic == POSE:
@@ -62,12 +76,14 @@ class Film(Process):
                 self._believed.add((message.stamp_ns * 1e-9, x, y, z))
             elif topic == _COMMAND:
                 self._wanted_mps = message.propel * self._machine.dimensions.max_speed_kmh / 3.6
+                self._steering_rps = message.steering_rate_rps
             elif topic == CONTACT:
                 nearest_m = 0.0 if message.touches else message.clearance_m
                 self._clearance_m = self._clearance_m if nearest_m is None else nearest_m
         if state is not None:
             self._row(state)
             self._scan(state, inbox)
+            self._look(state)
         return ()
 
     def finish(self, now_ns: int, inbox: Sequence[Received]) -> None:
@@ -96,10 +112,11 @@ class Film(Process):
         self._start = self._start or state
         time_s = (state.time_ns - START_NS) / SECOND_NS
         own = (state.yaw_rad, state.articulation_rad, state.speed_mps)
-        row = (time_s, *_place(state), *own, self._wanted_mps, self._clearance_m)
+        row = (time_s, *_place(state), *own, self._wanted_mps, self._clearance_m, self._steering_rps)
         self.series.add(row)
         if self._recording is not None:
-            self._batch.append(row)
+            planned = (math.nan,) * 2 if self.drive is None else (self.drive.planned_mps, self.drive.predicted_m)
+            self._batch.append((*row, *planned))
             self._attitudes.append((state.roll_rad, state.pitch_rad))
             if len(self._batch) >= self._most:
                 self._flush()
@@ -108,6 +125,26 @@ class Film(Process):
         if self._recording is not None and self._batch:
             self._recording.add_rows(np.array(self._batch), np.array(self._attitudes))
             self._batch, self._attitudes = [], []
+
+    def _watch(self, topic: str, message: Any) -> None:
+        """Let what is watched of a drive see it, the true states first."""
+        assert self.drive is not None  # noqa: S101  # asked for by the caller
+        if topic == STATE:
+            self.drive.truth.add(message)
+        elif topic in TOPICS:
+            self.drive.take(topic, message)
+
+    def _look(self, state: State) -> None:
+        """Record what is planned now; the map, once it is aligned."""
+        if self.drive is None:
+            return
+        way = self.drive.look(state.time_ns, state.pitch_rad)
+        if self._recording is None or way is None:
+            return
+        self._recording.add_horizon(state.time_ns, way)
+        if self.drive.map is not None and not self._mapped:
+            self._mapped = True
+            self._recording.add_map(self.drive.map)
 
     def _scan(self, state: State, inbox: Sequence[Received]) -> None:
         """Record the newest scan where the machine is now: it is a picture, not a measurement."""

@@ -6,6 +6,7 @@ The centre lines give the height, blended where drifts overlap; waves and stones
 from __future__ import annotations
 
 import math
+from itertools import pairwise
 from typing import NamedTuple
 
 import numba as nb
@@ -21,6 +22,7 @@ _CELL_M = 4.0
 _BEYOND_M = 1.0  # a drift's floor counts so far beyond its wall
 _OTHER_LEVEL_M = 2.6  # stations this far above or below a point are another level's
 _MOST = 12  # drifts that overlap at one place, at most
+_BLOCK, _TOLERANCE_M = 8, 1e-6  # stations that are passed over at once
 _MEAN_SQUARE = 151.0 / 315.0  # of a sum of cubic B-splines with independent unit coefficients, per dimension
 
 # Knot spacing (m), as in the drift scenario: what a machine of 3.4 m wheelbase rides up and down, and stones.
@@ -32,14 +34,19 @@ _GAINS = (0.6, 0.7)
 class Stations(NamedTuple):
     """Points of all centre lines, `rows` (N, 7): x, y, z, x and y of the direction, half width, tube; and a grid to find them.
 
-    `starts` (columns · rows + 1,) and `members` list the stations of each cell; `corner_m` (2,) is the grid's.
+    `starts` (columns · rows + 1,) lists the blocks of each cell, `blocks` (B + 1,) the `members` of each block: a few stations of
+    one tube. `places` (N, 3): of the members; `rounds` (B, 4): a circle around each block and its tube (x, y, radius, tube).
+    `corner_m` (2,) is the grid's.
     """
 
     rows: FloatArray
     corner_m: FloatArray
     shape: tuple[int, int]
     starts: npt.NDArray[np.int64]
+    blocks: npt.NDArray[np.int64]
     members: npt.NDArray[np.int64]
+    places: FloatArray
+    rounds: FloatArray
     cell_m: float
 
 
@@ -55,14 +62,8 @@ class Floor:
         """Return the floor's height (N,) under points (N, 3); their z says which level."""
         points = np.ascontiguousarray(points_m, dtype=float)
         out = np.empty(len(points))
-        s = self._stations
-        _heights(points, (s.rows, s.corner_m, s.shape, s.starts, s.members, s.cell_m), self._octaves, self._seed, out)
+        _heights(points, self._stations, self._octaves, self._seed, out)
         return out
-
-    @property
-    def arrays(self) -> tuple[Stations, FloatArray, np.uint64]:
-        """What the kernels need."""
-        return self._stations, self._octaves, self._seed
 
 
 def _octaves(settings: FloorPlan) -> FloatArray:
@@ -95,8 +96,25 @@ def _stations(network: Network) -> Stations:
     shape = tuple((cells.max(axis=0) + 2).tolist())
     flat = cells[:, 0] * shape[1] + cells[:, 1]
     order = np.lexsort((np.arange(len(rows)), rows[:, 6], flat))
-    starts = np.searchsorted(flat[order], np.arange(shape[0] * shape[1] + 1))
-    return Stations(rows, corner, (shape[0], shape[1]), starts.astype(np.int64), order.astype(np.int64), cell_m)
+    ends = _block_ends(flat[order], rows[order, 6])
+    starts = np.searchsorted(flat[order][ends[:-1]], np.arange(shape[0] * shape[1] + 1))
+    places = np.ascontiguousarray(rows[order, :3])
+    rounds = np.array([_round(places[a:b], rows[order[a], 6]) for a, b in pairwise(ends.tolist())])
+    members = order.astype(np.int64)
+    return Stations(rows, corner, (shape[0], shape[1]), starts.astype(np.int64), ends, members, places, rounds, cell_m)
+
+
+def _block_ends(cells: npt.NDArray[np.int64], tubes: FloatArray) -> npt.NDArray[np.int64]:
+    """Return where blocks of members begin, and the end of the last: each of one cell and one tube, of a few stations."""
+    new = np.flatnonzero((np.diff(cells) != 0) | (np.diff(tubes) != 0)) + 1
+    runs = pairwise([0, *new.tolist(), len(cells)])
+    return np.array([*(k for a, b in runs for k in range(a, b, _BLOCK)), len(cells)], dtype=np.int64)
+
+
+def _round(places: FloatArray, tube: float) -> tuple[float, float, float, float]:
+    """Return a circle around stations (N, 3): x, y, radius, and their tube."""
+    x, y = places[:, :2].mean(axis=0).tolist()
+    return x, y, float(np.hypot(places[:, 0] - x, places[:, 1] - y).max()) + _TOLERANCE_M, tube
 
 
 @nb.njit(cache=True, nogil=True)
@@ -126,30 +144,44 @@ def _line_height(x, y, z, stations):  # type: ignore[no-untyped-def]
 @nb.njit(cache=True, nogil=True)
 def _nearest_of_each(x, y, z, stations, best, station):  # type: ignore[no-untyped-def]
     """Write the nearest station of each tube near a place, and its squared distance; return how many tubes there are."""
-    rows, corner, shape, starts, members, cell_m = stations
+    _, corner, shape, starts, blocks, members, places, rounds, cell_m = stations
     ci, cj = int(math.floor((x - corner[0]) / cell_m)), int(math.floor((y - corner[1]) / cell_m))
+    tubes = np.empty(_MOST)
     count = 0
     for i in range(max(ci - 1, 0), min(ci + 2, shape[0])):
         for j in range(max(cj - 1, 0), min(cj + 2, shape[1])):
-            for m in range(starts[i * shape[1] + j], starts[i * shape[1] + j + 1]):
-                row = members[m]
-                if abs(rows[row, 2] - z) <= _OTHER_LEVEL_M:
-                    count = _kept(row, (rows[row, 0] - x) ** 2 + (rows[row, 1] - y) ** 2, rows, best, station, count)
+            for k in range(starts[i * shape[1] + j], starts[i * shape[1] + j + 1]):
+                q = 0
+                while q < count and tubes[q] != rounds[k, 3]:
+                    q += 1
+                if q == _MOST or (q < count and _beyond(x, y, rounds[k], best[q])):
+                    continue
+                if _nearest_of_block(x, y, z, blocks[k], blocks[k + 1], places, best, station, q) and q == count:
+                    tubes[q] = rounds[k, 3]
+                    count += 1
+    for q in range(count):
+        station[q] = members[station[q]]
     return count
 
 
 @nb.njit(cache=True, nogil=True)
-def _kept(row, square, rows, best, station, count):  # type: ignore[no-untyped-def]
-    """Keep a station if it is the nearest of its tube; return how many tubes there are now."""
-    for q in range(count):
-        if rows[station[q], 6] == rows[row, 6]:
+def _beyond(x, y, circle, square):  # type: ignore[no-untyped-def]
+    """Return whether all of a circle is farther away than a squared distance."""
+    reach = math.sqrt(square) + circle[2]
+    return (circle[0] - x) ** 2 + (circle[1] - y) ** 2 > reach * reach
+
+
+@nb.njit(cache=True, nogil=True)
+def _nearest_of_block(x, y, z, first, end, places, best, station, q):  # type: ignore[no-untyped-def]
+    """Keep, as that of tube `q`, the nearest station of a block, if it is nearer; return whether any is on this level."""
+    found = False
+    for m in range(first, end):
+        if abs(places[m, 2] - z) <= _OTHER_LEVEL_M:
+            found = True
+            square = (places[m, 0] - x) ** 2 + (places[m, 1] - y) ** 2
             if square < best[q]:
-                best[q], station[q] = square, row
-            return count
-    if count == _MOST:
-        return count
-    best[count], station[count] = square, row
-    return count + 1
+                best[q], station[q] = square, m
+    return found
 
 
 @nb.njit(cache=True, nogil=True)

@@ -1,0 +1,157 @@
+"""Guidance alone in planar tunnels, many times: `python -m tools.evaluate.guidance --runs 20 --json OUT.json`.
+
+Each run draws a tunnel, a direction, a load and errors of the machine (pose noise 1 cm and 0.1 degrees, joint offset 0.5 degrees,
+steering gain +-5 %, lags +-10 %, the route off by 0.15 m) from its seed.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import math
+import sys
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from lhdmap.config import settings_from
+from lhdmap.guidance.settings import GuidanceSettings
+from tests.guidance.planar_drive import Drive, Errors, drive
+from tests.guidance.tunnels import MACHINE, tunnel
+
+
+@dataclass(frozen=True)
+class Class:
+    """A class of tunnels: least room (drawn between both), radii, roughness, speed limit."""
+
+    room_m: tuple[float, float]
+    radii_m: tuple[float, float] = (5.5, 15.0)
+    length_m: float = 70.0
+    rms_m: float = 0.10
+    limit_kmh: float = 10.1
+    limit_loaded_kmh: float = 7.9
+
+
+CLASSES = {
+    "c 0.10-0.25": Class((0.10, 0.25)),
+    "c 0.25": Class((0.25, 0.25)),
+    "c 0.50": Class((0.5, 0.5)),
+    "c 0.15, R 12-40": Class((0.15, 0.15), (12.0, 40.0), 180.0),
+    "c 0.5, R 30-60": Class((0.5, 0.5), (30.0, 60.0), 100.0, 0.10, 20.0, 18.0),
+}
+
+
+@dataclass(frozen=True)
+class Row:
+    """A run."""
+
+    seed: int
+    gear: int
+    load_kg: float
+    c_m: float
+    arrived: bool
+    contact: bool
+    least_m: float
+    mean_kmh: float
+    top_kmh: float
+    acd: float
+    asd: float
+    msd: float
+    work_ms: float
+    work_p99_ms: float
+    duration_s: float
+
+
+def errors_of(seed: int) -> Errors:
+    """Draw the errors of a run."""
+    rng = np.random.default_rng([seed, 9])
+    return Errors(
+        gain=1.0 + 0.05 * rng.uniform(-1.0, 1.0),
+        lag=1.0 + 0.10 * rng.uniform(-1.0, 1.0),
+        bend_offset_rad=math.radians(0.5) * float(rng.choice([-1.0, 1.0])),
+        jitter_m=0.01,
+        jitter_rad=math.radians(0.1),
+        route_m=float(rng.normal(0.0, 0.15)),
+        seed=seed,
+    )
+
+
+def row_of(kind: Class, seed: int, settings: GuidanceSettings) -> tuple[Row, Drive]:
+    """Run a seed of a class: even seeds forward; of four, two carry a load."""
+    gear, load = (1, -1)[seed % 2], MACHINE.drive.payload_kg * (seed // 2 % 2)
+    c = float(np.random.default_rng([seed, 3]).uniform(*kind.room_m))
+    line, walls = tunnel(seed // 2, c, kind.radii_m, kind.length_m, kind.rms_m)
+    limit = (kind.limit_loaded_kmh if load else kind.limit_kmh) / 3.6
+    out = drive(
+        line, walls, gear, limit_mps=limit, settings=settings, errors=errors_of(seed), load_kg=load, seconds=240.0
+    )
+    speeds, bends = np.array(out.speeds_mps), np.degrees([one[3] for one in out.states])
+    row = Row(
+        seed, gear, load, c, out.arrived, out.contact, min(out.rooms_m), float(np.abs(speeds).mean() * 3.6),
+        float(np.abs(speeds).max() * 3.6), *smoothness(out), float(np.median(out.work_ms)),
+        float(np.quantile(out.work_ms, 0.99)), len(bends) / 10.0,
+    )  # fmt: skip
+    return row, out
+
+
+def smoothness(out: Drive) -> tuple[float, float, float]:
+    """Return ACD, ASD and MSD, Eqs. (22) and (23): at 10 Hz, commands as shares, speed in km/h, joint in degrees."""
+    speed = 3.6 * np.array(out.speeds_mps)
+    states = np.column_stack([speed, np.degrees([one[3] for one in out.states])])
+    told = np.array([(c.speed_mps * 3.6 / 24.0, math.degrees(c.steering_rate_rps) / 15.0) for c in out.commands[1::5]])
+    jolts = second(states)
+    return float(second(told).mean()), float(jolts.mean()), float(jolts.max())
+
+
+def second(values: np.ndarray[Any, Any]) -> np.ndarray[Any, Any]:
+    """Return what changes of the change are, squared and summed over the columns (navigation tables' E)."""
+    change: np.ndarray[Any, Any] = (np.diff(values, axis=0) ** 2).sum(axis=1)
+    return change
+
+
+def summary(name: str, rows: list[Row]) -> str:
+    """Return a line of the table."""
+    least, mean = [row.least_m for row in rows], [row.mean_kmh for row in rows if row.arrived and not row.load_kg]
+    loaded = [row.mean_kmh for row in rows if row.arrived and row.load_kg]
+    return (
+        f"| {name} | {len(rows)} | {sum(r.arrived for r in rows)} | {sum(r.contact for r in rows)} "
+        f"| {np.median(least):.3f} / {min(least):.3f} | {_mean(mean):.2f} / {_mean(loaded):.2f} "
+        f"| {max(r.top_kmh for r in rows):.1f} | {_mean([r.acd for r in rows]):.5f} | {_mean([r.asd for r in rows]):.4f} "
+        f"| {np.median([r.work_ms for r in rows]):.1f} / {max(r.work_p99_ms for r in rows):.1f} |"
+    )
+
+
+def _mean(values: list[float]) -> float:
+    return float(np.mean(values)) if values else math.nan
+
+
+def main() -> int:
+    """Run the classes; print the table."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--runs", type=int, default=20)
+    parser.add_argument("--first", type=int, default=0)
+    parser.add_argument("--only", default="")
+    parser.add_argument("--set", action="append", default=[], metavar="NAME=VALUE", dest="changed")
+    parser.add_argument("--json", type=Path)
+    asked = parser.parse_args()
+    chosen = {f"guidance.{one.split('=')[0]}": json.loads(one.split("=")[1]) for one in asked.changed}
+    settings = replace(settings_from(chosen).guidance)
+    every: dict[str, list[Row]] = {}
+    for name, kind in CLASSES.items():
+        if asked.only and name not in asked.only.split(";"):
+            continue
+        rows = every[name] = []
+        for seed in range(asked.first, asked.first + asked.runs):
+            row, _ = row_of(kind, seed, settings)
+            rows.append(row)
+            if row.contact or not row.arrived:
+                print("  ", row, file=sys.stderr, flush=True)
+        print(summary(name, rows), flush=True)
+        if asked.json:
+            asked.json.write_text(json.dumps({key: [asdict(row) for row in rows] for key, rows in every.items()}))
+    return 0
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())

@@ -1,0 +1,141 @@
+"""Real logs that pass places again: the first part teaches, the second is localized; relations set by hand compare both."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+from lhdmap.config import settings_from
+from lhdmap.errors import InputError
+from lhdmap.evaluation.localization import planar
+from lhdmap.evaluation.relations import Relations, evaluate_relations, read_relations
+from lhdmap.localization.rows import LOST, TRACKING, Row
+from lhdmap.logs.source import LogSource
+from lhdmap.logs.writer import LogWriter
+from lhdmap.mapfolder import MapFolder
+from lhdmap.messages import Mount
+from lhdmap.pipeline.build import BuildRequest, build_map
+from lhdmap.pipeline.localize import KnownMap, Localizer
+from lhdmap.pipeline.localize_run import trajectory_of
+from lhdmap.pipeline.outcome import ROLES_READ
+from lhdmap.roles import ROLES
+from lhdmap.trajectory import Trajectory
+
+from tools.evaluate.localization_faults import Messages
+
+
+class Log(NamedTuple):
+    """A log, its relations, and which share of its scans teaches."""
+
+    name: str
+    path: str
+    relations: str
+    teaches: float
+
+
+LOGS = (
+    Log("intel", "01_carmen_intel/intel.clf.bz2", "01_carmen_intel/intel.relations", 0.5),
+    Log("aces", "02_carmen_aces/aces.clf.bz2", "02_carmen_aces/aces.relations", 0.6),
+)
+_SETTINGS = settings_from({"pile.method": "off", "recording.scan_interval_s": 20.0})
+_MOVED_NS = 1_000_000
+_INTRO = """\
+The first share of a log's scans teaches, the rest is localized on that map, from where the first part ended. The robots drive into
+places that the first part never saw: there nothing can be tracked, and after a loss the search has to find the place again.
+"Relations": motions between a pose of the first part (in the map) and one of the second (tracked), as people have set them by hand
+(Freiburg benchmark); their error holds that of the map.
+"""
+_COLUMNS = (
+    "log", "teaches", "scans after it", "tracked", "losses", "withheld", "support, 5th percentile / median",
+    "relations between both", "error, median (mean)",
+)  # fmt: skip
+
+
+def real(data: Path, folder: Path) -> Iterator[str]:
+    """Yield the lines of the section."""
+    yield _INTRO
+    yield f"| {' | '.join(_COLUMNS)} |"
+    yield "|" + " --- |" * len(_COLUMNS)
+    for log in LOGS:
+        yield row(log, data, folder)
+
+
+def row(log: Log, data: Path, folder: Path) -> str:
+    """Teach with the first part of a log, localize the second, and return the line of it."""
+    first, second = _parts(data / log.path, log.teaches)
+    made = folder / f"{log.name}.map"
+    if not made.exists():
+        _write(folder / f"{log.name}.mcap", first)
+        build_map(BuildRequest([folder / f"{log.name}.mcap"], made, _SETTINGS))
+    supports: list[float] = []
+    start = planar(MapFolder.open(made).trajectory())[-1][[0, 1, 3, 2]]
+    with Localizer(KnownMap.read(made), _SETTINGS, None, start) as localizer:
+        for role, message in second:
+            localizer.update(role, message)
+            if localizer.rows and localizer.rows[-1].status == TRACKING and localizer.support is not None:
+                supports.append(localizer.support)
+        localizer.finish()
+    rows = localizer.rows
+    tracked, lost = (100 * np.mean([one.status == status for one in rows]) for status in (TRACKING, LOST))
+    cells = (
+        log.name,
+        f"{100 * log.teaches:.0f} %",
+        str(len(rows)),
+        f"{tracked:.0f} % (lost {lost:.0f} %)",
+        str(localizer.lost_stretches),
+        str(localizer.withheld),
+        f"{np.quantile(supports, 0.05):.2f} / {np.median(supports):.2f}" if supports else "",
+        *_agreement(MapFolder.open(made).trajectory(), rows, read_relations(data / log.relations)),
+    )
+    return f"| {' | '.join(cells)} |"
+
+
+def _parts(log: Path, share: float) -> tuple[Messages, Messages]:
+    """Return the messages of a log before and after a share of its front scans; what is mounted belongs to both."""
+    with LogSource([log]) as source:
+        messages = list(source.messages([role for role in ROLES_READ if role in source.roles]))
+    scans = [k for k, (role, _) in enumerate(messages) if role == "front"]
+    cut = scans[round(share * len(scans))]
+    mounts = [one for one in messages[:cut] if one[0] == "tf_static"]
+    return messages[:cut], [*mounts, *messages[cut:]]
+
+
+def _write(log: Path, messages: Messages) -> None:
+    log.unlink(missing_ok=True)
+    with LogWriter(log) as writer:
+        for role, message in messages:
+            writer.write(ROLES[role].topic, [message] if isinstance(message, Mount) else message)
+
+
+def _agreement(taught: Trajectory, rows: list[Row], relations: Relations) -> tuple[str, str]:
+    """Return how many relations join both parts, and by how much these are off."""
+    found = trajectory_of(rows)
+    stamps = np.concatenate([taught.stamps_ns, found.stamps_ns])
+    both = Trajectory(
+        stamps,
+        np.concatenate([taught.positions_m, found.positions_m]),
+        np.concatenate([taught.quaternions_xyzw, found.quaternions_xyzw]),
+    )
+    end = int(taught.stamps_ns.max()) + _MOVED_NS
+    joins = (np.minimum(relations.first_ns, relations.second_ns) <= end) & (
+        np.maximum(relations.first_ns, relations.second_ns) > end
+    )
+    kept = np.flatnonzero(joins)
+    if not len(kept) or not len(found.stamps_ns):
+        return "0", ""
+    chosen = Relations(
+        relations.first_ns[kept],
+        relations.second_ns[kept],
+        type(relations.T_first_second)(*(part[kept] for part in relations.T_first_second)),
+    )
+    try:
+        told = evaluate_relations(both, chosen)
+    except InputError:
+        return f"0 of {len(kept)}", ""
+    group = told.groups[0]
+    if group.translation_m is None or group.rotation_deg is None:
+        return f"0 of {len(kept)}", ""
+    t, r = group.translation_m, group.rotation_deg
+    return f"{told.matched} of {len(kept)}", f"{t.median:.3f} m, {r.median:.2f}° (mean {t.mean:.3f} m, {r.mean:.2f}°)"
