@@ -10,10 +10,12 @@ from lhdmap.replay.assemble import parts_of
 from lhdmap.replay.journal import Event
 from lhdmap.replay.processes.station import Station
 from lhdmap.replay.processes.told import Word
+from lhdmap.replay.scenario import load_scenario
 from lhdmap.simulation.history import START_NS
 
 from tests.replay.short import drive, tram
 
+KEPT = Path(__file__).parent / "kept"
 FOR_S = 8.0
 WATCH = ("monitor", "engine", "faults")
 
@@ -105,6 +107,14 @@ def test_without_arming_nothing_moves(taught: Path, monkeypatch: pytest.MonkeyPa
 
 def _silent(now_ns: int) -> Word:
     return Word(now_ns)
+
+
+@pytest.mark.parametrize("path", sorted(KEPT.glob("*.toml")), ids=lambda path: path.stem)
+def test_runs_that_failed_once_do_not_again(taught: Path, path: Path) -> None:
+    run, _ = drive(load_scenario(path, map=str(taught / "short.map")), taught)
+    assert run.monitor.tally.reason == "arrived"
+    assert run.monitor.tally.min_clearance_m is not None
+    assert run.monitor.tally.min_clearance_m > 0.08
 
 
 def test_names_that_the_map_lacks_are_refused(taught: Path) -> None:
