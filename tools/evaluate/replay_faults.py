@@ -190,7 +190,15 @@ def main() -> None:
     parser.add_argument(
         "--keep", type=Path, default=Path("replay_faults"), help="folder for the map and runs that miss"
     )
+    parser.add_argument(
+        "--lines", type=Path, nargs="*", default=[], help="what runs before have printed, for the page alone"
+    )
+    parser.add_argument("--page", type=Path, help="page to write")
     arguments = parser.parse_args()
+    if arguments.lines:
+        texts = [line for path in arguments.lines for line in path.read_text(encoding="utf-8").splitlines()]
+        arguments.page.write_text(page([one for one in map(json.loads, texts) if "seed" in one]), encoding="utf-8")
+        return
     arguments.keep.mkdir(parents=True, exist_ok=True)
     base = load_scenario(arguments.scenario)
     base = replace(base, map=base.map or str(arguments.keep / "map"), limits=replace(base.limits, time_s=90.0))
@@ -212,6 +220,38 @@ def main() -> None:
             (arguments.keep / f"missed_{seed}.toml").write_text(scenario_toml(told), encoding="utf-8")
     least, seed = min(worst)
     _say({"runs": arguments.runs, "failed": failed, "arrived": arrived, "least_clearance_m": least, "of_seed": seed})
+
+
+def page(lines: Sequence[dict[str, Any]]) -> str:
+    """Return the page of so many runs."""
+    stops = [one["worst_stop"] for one in lines if one["worst_stop"] > 0.0]
+    least = sorted(lines, key=lambda one: float(one["clearance_m"]))
+    clear_m = [float(one["clearance_m"]) for one in least]
+    kinds = sorted({fault.split()[0] for one in lines for fault in one["faults"]})
+    moved = [what for one in lines for what in one["missed"] if "moves" in what or "moved" in what]
+    rows = {
+        "runs": len(lines),
+        "faults": sum(len(one["faults"]) for one in lines),
+        "arrived": sum(one["reason"] == "arrived" for one in lines),
+        "contacts": sum(one["reason"].startswith("contact") for one in lines),
+        "motion on old data, or before arming": len(moved),
+        "stops of the watchdog": sum(one["stops"] for one in lines),
+        "their way over the stopping distance, median and worst": f"{np.median(stops):.2f}, {max(stops):.2f}"
+        if stops
+        else "",
+        "least clearance of a run, least and median": f"{clear_m[0]:.3f} m, {np.median(clear_m):.2f} m",
+    }
+    table = "\n".join(f"| {name} | {value} |" for name, value in rows.items())
+    worst = "\n".join(
+        f"| {one['seed']} | {one['reason']} | {one['clearance_m']:.3f} | {'; '.join(one['faults'])} |"
+        for one in least[:8]
+    )
+    return (
+        "# Random faults\n\nWritten by `tools/evaluate/replay_faults.py`: drives of 34 m through the mine `short`, one to three "
+        f"faults each, at chance times ({', '.join(kinds)}).\n\n| | |\n| --- | --- |\n{table}\n\n"
+        "## The nearest to a wall\n\n| seed | what came of it | least clearance, m | faults (kind, target, begin + s) |\n"
+        f"| --- | --- | --- | --- |\n{worst}\n"
+    )
 
 
 def _say(line: dict[str, Any]) -> None:
