@@ -23,7 +23,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--start",
         metavar="X,Y,DEG|NAME",
-        help="about where the drive begins: a pose or a waypoint (default: it is searched for)",
+        help="about where the drive begins: a pose, a waypoint, or a node (default: it is searched for)",
     )
     parser.add_argument(
         "--smoother",
@@ -35,7 +35,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace, console: Console) -> int:
     """Localize the drive and print how much of it was tracked."""
     from lhdmap.cli.build_map import progress_of
-    from lhdmap.cli.update_map import start_of
     from lhdmap.config import load_settings
     from lhdmap.machine import load_machine
     from lhdmap.pipeline.localize_run import LocalizeRequest, localize
@@ -48,7 +47,7 @@ def run(arguments: argparse.Namespace, console: Console) -> int:
             load_settings(arguments.config, [*arguments.set, *_method(arguments)]),
             topic_overrides(arguments.topic),
             load_machine(arguments.machine) if arguments.machine else None,
-            start_of(arguments.start, arguments.map) if arguments.start else None,
+            _start(arguments.start, arguments.map) if arguments.start else None,
             progress_of(console),
             arguments.force,
             arguments.smoother,
@@ -62,6 +61,18 @@ def run(arguments: argparse.Namespace, console: Console) -> int:
 
 def _method(arguments: argparse.Namespace) -> list[str]:
     return [f"localization.method={arguments.method}"] if arguments.method else []
+
+
+def _start(text: str, map_folder: Path) -> Any:
+    """Return x, y, yaw and height of a start, or those of all places in a node, of which the first scan chooses."""
+    from lhdmap.cli.update_map import start_of
+    from lhdmap.localization.starting import poses_in
+    from lhdmap.topology.files import read_topology
+    from lhdmap.topology.model import Intersection, Tunnel
+
+    topology = read_topology(map_folder)
+    found = topology.called(text)
+    return poses_in(topology, found.id) if isinstance(found, (Tunnel, Intersection)) else start_of(text, map_folder)
 
 
 def _text(folder: Path, summary: dict[str, Any]) -> str:

@@ -20,6 +20,7 @@ _FREE_M, _BESIDE_M, _NARROW_M, _STOP_M = 0.5, 0.2, 0.05, -0.02
 _STEERING_SHARE = 0.85
 _CREEP_MPS = 0.3
 _NEW_SHARE = 0.3
+_TURN_S = 1.0  # from speeding up to slowing down: lag of the drive, jerk
 _ASIDE_M, _ASIDE_LESS_M = 0.5, 0.15  # of the leading edge: there a wall may be nearer
 _SIGHT_STEP_M, _SIGHT_CLEAR_M = 0.5, 0.10
 
@@ -149,7 +150,9 @@ def _forward(
     speed[0] = start[0]
     for k in range(1, len(cap)):
         rise = min(rise + settings.jerk_mps3 * step, settings.accelerate_mps2)
-        wanted = min(_at(cap, way, gone[k - 1] + speed[k - 1] * step), speed[k - 1] + rise * step)
+        before, here = speed[k - 1], gone[k - 1] + speed[k - 1] * step
+        soon = _at(cap, way, here + before * _TURN_S)  # who speeds up until the cap falls cannot follow it down
+        wanted = min(_at(cap, way, here), before + rise * step, max(before, soon))
         speed[k] = max(wanted, speed[k - 1] - model.deceleration_mps2 * step, 0.0)
         gone[k] = gone[k - 1] + 0.5 * step * (speed[k] + speed[k - 1])
         rise = min(rise, max((speed[k] - speed[k - 1]) / step, 0.0))

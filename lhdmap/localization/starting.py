@@ -10,13 +10,14 @@ import numpy as np
 from lhdmap.geometry import se2
 from lhdmap.localization.walls import MapWalls
 from lhdmap.messages import FloatArray
-from lhdmap.scan_matching.matching import Hits, Match, Prior, match
+from lhdmap.scan_matching.matching import Hits, Prior, match
 from lhdmap.scan_matching.submap import OTHER_VISIT
 from lhdmap.topology.lookup import each_metre
 from lhdmap.topology.model import Point, TopologicalMap, Tunnel
 
 _HEADINGS = 8  # of an intersection
-_FEW_HITS = 150
+_FEW_HITS, _HITS = 150, 500
+_FINER = 4  # of the best are matched anew, with more hits
 _ABOUT_M = 6.0
 _ALONG_M, _ALONG_STEP_M = 4.0, 0.8
 _STD = np.array([0.6, 0.6, math.radians(6.0)])  # poses are a metre apart, and a machine need not stand in the middle
@@ -70,22 +71,34 @@ def poses_along(pose: FloatArray, height_m: float) -> FloatArray:
 
 def best_start(walls: MapWalls, starts: FloatArray, points: FloatArray) -> Start:
     """Return the start of several (K, 4) from which hits (N, 2) in the machine's frame fit the walls best."""
-    few = points[:: max(len(points) // _FEW_HITS, 1)]
-    found = [_matched(walls, one, few) for one in starts]
-    best = max(range(len(found)), key=lambda k: found[k][1].support)
-    pose, matched = found[best]
-    others = [other.support for place, other in found if _apart(place, pose)]
-    return Start(pose, float(starts[best, 3]), float(matched.support), float(max(others, default=0.0)))
+    few, many = (points[:: max(len(points) // most, 1)] for most in (_FEW_HITS, _HITS))
+    found = [(*_matched(walls, one, few, _STD), float(one[3])) for one in starts]
+    found.sort(key=lambda one: -one[1])
+    finer = [_finer(walls, one, many) for one in found[:_FINER]]
+    pose, support, height = max(finer, key=lambda one: one[1])
+    others = [one[1] for one in (*finer, *found[_FINER:]) if _apart(one[0], pose)]
+    return Start(pose, height, support, max(others, default=0.0))
 
 
-def _matched(walls: MapWalls, start: FloatArray, points: FloatArray) -> tuple[FloatArray, Match]:
-    """Return the pose (3,) that a start (4,) leads to, and how its hits match."""
+_Place = tuple[FloatArray, float, float]  # pose (3,), support, height of the floor
+
+
+def _finer(walls: MapWalls, place: _Place, points: FloatArray) -> _Place:
+    """Return a place matched anew with more hits, little held by where it was."""
+    pose, _, height = place
+    for _ in range(2):
+        pose, support = _matched(walls, np.append(pose, height), points, 4.0 * _STD)
+    return pose, support, height
+
+
+def _matched(walls: MapWalls, start: FloatArray, points: FloatArray, std: FloatArray) -> tuple[FloatArray, float]:
+    """Return the pose (3,) that a start (4,) leads to, and the share of its hits that agree."""
     around, origin = walls.around(start[[0, 1, 3]])
     shift = np.array([origin[0], origin[1], 0.0])
     hits = Hits(np.column_stack([points, np.zeros(len(points))]), len(points), layered=False)
-    prior = Prior(start[:3] - shift, np.diag(_KAPPA / _STD**2))
+    prior = Prior(start[:3] - shift, np.diag(_KAPPA / std**2))
     found = match(around, hits, prior, start[:3] - shift, OTHER_VISIT)
-    return found.pose + shift, found
+    return found.pose + shift, float(found.support)
 
 
 def _apart(one: FloatArray, other: FloatArray) -> bool:

@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 
 from lhdmap.messages import FloatArray
 from lhdmap.movement.route import Route
+from lhdmap.movement.routes import RouteOptions, RoutePlanner
+from lhdmap.navigation.along import facing
+from lhdmap.navigation.room import with_room
 from lhdmap.topology.lookup import Lookup
 from lhdmap.topology.model import Point, TopologicalMap, Tunnel
 
@@ -22,6 +27,34 @@ class Begin(NamedTuple):
     point: str
     away_m: float
     towards_m: Mapping[str, float] = {}
+
+
+class Errand(NamedTuple):
+    """A goal, the heading (rad) of the machine in `map`, and ways that are closed."""
+
+    goal: str
+    heading_rad: float
+    closed: tuple[str, ...]
+
+
+class Reach(NamedTuple):
+    """How far the machine reaches before and behind `base_link`, and the room wanted beyond that where the gear changes."""
+
+    nose_m: float
+    tail_m: float
+    spare_m: float
+
+
+def route_from(planner: RoutePlanner, point: str, errand: Errand, reach: Reach) -> Route:
+    """Return the route from a point to the goal on which each change of gear has room."""
+    topology = planner.topology
+    heading = f"{math.degrees(errand.heading_rad):.1f}"
+    asked = RouteOptions(heading=heading, goal_heading=facing(topology, errand.goal), alternatives=0)
+
+    def ask(avoid: tuple[str, ...]) -> Route:
+        return planner.route(point, errand.goal, replace(asked, avoid=avoid))
+
+    return with_room(topology, ask, errand.closed, *reach)
 
 
 def begins_at(topology: TopologicalMap, place: FloatArray, goal: str) -> list[Begin]:

@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -21,13 +20,11 @@ from lhdmap.driving.model import DriveModel
 from lhdmap.driving.motion import Motion
 from lhdmap.guidance.directive import Directive, moved
 from lhdmap.messages import FloatArray
-from lhdmap.movement.route import Route
-from lhdmap.movement.routes import RouteOptions, RoutePlanner
-from lhdmap.navigation.along import Located, along_m, facing, on_map, part_of
-from lhdmap.navigation.begin import Begin, begins_at, best_begin
+from lhdmap.movement.routes import RoutePlanner
+from lhdmap.navigation.along import Located, along_m, on_map, part_of
+from lhdmap.navigation.begin import Begin, Errand, Reach, begins_at, best_begin, route_from
 from lhdmap.navigation.goals import Approach, overrun, reached
 from lhdmap.navigation.leg import Leg, legs_of
-from lhdmap.navigation.room import with_room
 from lhdmap.navigation.settings import NavigationSettings
 
 IDLE, DRIVING, RESTING, BACKING, ARRIVED, ASSISTANCE = "idle", "driving", "resting", "backing", "arrived", "assistance"
@@ -88,19 +85,12 @@ class NavigationControl:
     def _plan(self, begins: list[Begin], located: Located) -> None:
         """Plan to the goal from one of several points; ask for help where nothing leads there."""
         topology, settings = self._planner.topology, self._settings
-        heading = f"{math.degrees(float(located.pose_map[2])):.1f}"
-        asked = RouteOptions(heading=heading, goal_heading=facing(topology, self.goal), alternatives=0)
-
-        def route_from(point: str) -> Route:
-            def ask(avoid: tuple[str, ...]) -> Route:
-                return self._planner.route(point, self.goal, replace(asked, avoid=avoid))
-
-            return with_room(topology, ask, self.closed, self._nose_m, self._tail_m, settings.room_m)
-
         if not begins:
             self._ask("no route: there is no point of the map near")
             return
-        begin, route = best_begin(begins, route_from)
+        errand = Errand(self.goal, float(located.pose_map[2]), self.closed)
+        body = Reach(self._nose_m, self._tail_m, settings.room_m)
+        begin, route = best_begin(begins, lambda point: route_from(self._planner, point, errand, body))
         if not route.feasible:
             self._ask(f"no route: {route.reason}")
             return

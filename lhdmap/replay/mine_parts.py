@@ -9,15 +9,17 @@ from pathlib import Path
 import numpy as np
 
 from lhdmap.config import Settings
+from lhdmap.geometry import se2
 from lhdmap.machine import Machine, load_machine
 from lhdmap.messages import FloatArray
 from lhdmap.mine.network import Network, make_network
 from lhdmap.mine.plan import find_plan, load_plan
-from lhdmap.mine.route import start_of
+from lhdmap.mine.route import Start, start_of
 from lhdmap.mine.stands import place_pose
 from lhdmap.mine.topology import Directory
+from lhdmap.mine.ways import Leg
 from lhdmap.replay.faults import Position
-from lhdmap.replay.parts import Parts, Touch
+from lhdmap.replay.parts import Autonomous, Parts, Touch
 from lhdmap.replay.scenario import AUTONOMOUS, OPERATOR, TELEOPERATOR, Scenario
 from lhdmap.replay.teaching import autonomous_of
 from lhdmap.simulation.history import START_NS
@@ -30,6 +32,7 @@ from lhdmap.simulation.sensing.suite import sensors_of
 from lhdmap.simulation.vehicle.shaking import VIBRATION_DEG, Shaking
 from lhdmap.simulation.vehicle.state import VehicleState
 from lhdmap.simulation.vehicle.vehicle import Vehicle
+from lhdmap.topology.model import AccessPoint, Waypoint
 
 _DRAWN_M = 1.0
 _KG = 1000.0  # of a tonne
@@ -66,7 +69,7 @@ def mine_parts(scenario: Scenario, folder: Path, settings: Settings) -> Parts:
     start = start_of(network, machine, scenario.start or None)
     drives_itself = scenario.who == AUTONOMOUS
     operating = OperatorSettings(speed_kmh=scenario.speed_kmh, wander_m=scenario.wander_m)
-    legs = planned(network, machine, start, scenario.route or scenario.goal, operating, scenario.seed)
+    legs = _legs(scenario, network, machine, start, operating)
     autonomous = autonomous_of(scenario, network, machine, folder, settings) if drives_itself else None
     told = _mode_of(TOLD[scenario.who]) if autonomous is None else autonomous.mode
     world = MineWorld(network, machine)
@@ -84,12 +87,33 @@ def mine_parts(scenario: Scenario, folder: Path, settings: Settings) -> Parts:
         shaking=Shaking(math.radians(VIBRATION_DEG), scenario.seed),
         changing=world,
         places=places,
-        goal_m=places.get(scenario.goal),
+        goal_m=places.get(scenario.goal) or _goal_m(autonomous, scenario.goal, network, machine),
         lines_m=_walls(network),
         expected_s=_SLOWER * way_m / (scenario.speed_kmh / 3.6) + 10.0,
         settings=settings,
         autonomous=autonomous,
     )
+
+
+def _legs(
+    scenario: Scenario, network: Network, machine: Machine, start: Start, operating: OperatorSettings
+) -> Sequence[Leg]:
+    """Return the operator's legs; of a goal that the map alone has, he knows nothing."""
+    named = {one.name for one in network.plan.places} | {one.name for one in network.plan.drifts}
+    if scenario.who == AUTONOMOUS and scenario.goal not in named:
+        return ()
+    return planned(network, machine, start, scenario.route or scenario.goal, operating, scenario.seed)
+
+
+def _goal_m(autonomous: Autonomous | None, goal: str, network: Network, machine: Machine) -> Position | None:
+    """Return where a goal is that the map alone has: its frame is where the teaching drive began."""
+    found = None if autonomous is None else autonomous.known.topology.called(goal)
+    if not isinstance(found, (Waypoint, AccessPoint)):
+        return None
+    begin = start_of(network, machine, None)
+    x0, y0, z0, yaw = network.tubes[begin.tube].pose(begin.at_m, begin.facing).tolist()
+    x, y, _ = se2.compose(np.array([x0, y0, yaw]), found.pose[[0, 1, 3]]).tolist()
+    return x, y, z0 + float(found.pose[2])
 
 
 def _state(vehicle: Vehicle, pose: FloatArray, scenario: Scenario) -> VehicleState:

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from lhdmap.navigation.control import ARRIVED, ASSISTANCE, BACKING, DRIVING, HALTED, RESTING
-from lhdmap.topology.model import AccessPoint, Waypoint
+from lhdmap.topology.model import Waypoint
 
 from tests.movement.mines import with_connection
 from tests.navigation.drives import Rod
@@ -134,8 +134,7 @@ def test_a_missed_end_is_an_overrun() -> None:
 def test_another_goal_in_the_other_gear_rests_first() -> None:
     topology = ladder()
     goals = (*topology.waypoints, Waypoint("w2", "P1", "t1", pose(20.0, 0.0, 0.0), "park"))
-    everything: list[AccessPoint | Waypoint] = [*topology.access_points, *goals]
-    points = {one.id: one.pose for one in everything}
+    points = {**{one.id: one.pose for one in topology.access_points}, **{one.id: one.pose for one in goals}}
     more = [connection(points, "t1.start", "w2"), connection(points, "w2", "t1.end")]
     rod = Rod(at(6.0, 0.0, 0.0), replace(topology, waypoints=goals, connections=(*topology.connections, *more)))
     rod.go("t1.end", "t1.start")

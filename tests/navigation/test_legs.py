@@ -19,6 +19,7 @@ from lhdmap.topology.model import Preference, TopologicalMap
 from tests.movement.mines import with_connection
 from tests.topology.maps import ladder
 
+WALLS: list[tuple[Preference, float]] = [("left", 1.0), ("right", -1.0), ("centre", 0.0)]
 SETTINGS = NavigationSettings()
 WHEELBASE_M, NOSE_M, TAIL_M = 3.4, 3.2, 6.5
 
@@ -102,7 +103,7 @@ def test_the_route_counts_more_in_and_about_intersections() -> None:
     assert weight.tolist() == [1.0, SETTINGS.crossing_weight, SETTINGS.crossing_weight]
 
 
-@pytest.mark.parametrize(("wall", "sign"), [("left", 1.0), ("right", -1.0), ("centre", 0.0)])
+@pytest.mark.parametrize(("wall", "sign"), WALLS)
 @pytest.mark.parametrize("back", [False, True])
 def test_a_wall_preference_is_of_the_tunnel_whatever_the_direction(
     wall: Preference, sign: float, *, back: bool
