@@ -152,7 +152,7 @@ class Guidance:
         """Return what to predict with: as the last plan went on, or straight on and speeding up."""
         settings, last = self.settings, self._last
         left_m = directive.stop_m - float(directive.path[at, 5])
-        t = settings.stage_s * np.arange(settings.stages + 1)
+        t: FloatArray = settings.stage_s * np.arange(settings.stages + 1, dtype=np.float64)
         if last is None or last.gear != directive.gear or begin_ns - last.begin_ns > _OLD_NS:
             self._last = None
             allowed = float(directive.path[at:, 3].min()) if at < len(directive.path) else 0.0
@@ -160,7 +160,7 @@ class Guidance:
                 (np.minimum(speed + settings.accelerate_mps2 * t, max(allowed, speed)), t), None, left_m, settings
             )
         gone_s = (begin_ns - last.begin_ns) / _SECOND_NS
-        at_s = last.speeds.step_s * np.arange(len(last.speeds.speed_mps)) - gone_s
+        at_s: FloatArray = last.speeds.step_s * np.arange(len(last.speeds.speed_mps), dtype=np.float64) - gone_s
         off = speed - float(np.interp(0.0, at_s, last.speeds.speed_mps))
         expected = np.maximum(
             last.speeds.speed_mps + off * np.exp(-np.maximum(at_s, 0.0) / 0.5), 0.0

@@ -100,7 +100,8 @@ def drive(
     at, heading = line[round(begin_m / 0.1)], headings(line)[round(begin_m / 0.1)]
     base = lead.base((float(at[0]), float(at[1]), float(heading), 0.0, 0.0))
     truth, rng = Truth(np.array([*base, 0.0, 0.0]), model, errors), np.random.default_rng(errors.seed)
-    now, out, queue = 0, Drive(), ()
+    now, out = 0, Drive()
+    queue: Setpoints = ()
     while now < seconds * _SECOND_NS and not out.arrived and not out.contact:
         if now % PERIOD_NS == 0:
             motion = _measured(now, truth, errors, rng)

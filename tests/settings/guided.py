@@ -13,6 +13,7 @@ from lhdmap.driving.motion import Motion
 from lhdmap.guidance.directive import Directive
 from lhdmap.guidance.local_walls import LocalWalls
 from lhdmap.guidance.settings import GuidanceSettings
+from lhdmap.messages import FloatArray
 from lhdmap.movement.route import Route, route_json
 from lhdmap.movement.routes import RouteOptions, RoutePlanner
 from lhdmap.navigation.control import Located, NavigationControl
@@ -91,7 +92,7 @@ class Trip:
             return
         self.said.append((self.control.state, asked.gear, asked.stop_m, asked.path))
         lead = lead_of(asked.gear, MODEL, BODIES)
-        state = lead.state(Motion(0, *self.pose.tolist(), 0.0, 0.0, 0.0))
+        state = lead.state(_standing(self.pose))
         path = asked.path
         near = int(np.hypot(path[:, 0] - state[0], path[:, 1] - state[1]).argmin())
         left = asked.stop_m - float(path[near, 5])
@@ -110,6 +111,11 @@ class Trip:
 
 
 _STEP_S = 0.1
+
+
+def _standing(pose: FloatArray) -> Motion:
+    x, y, heading = pose.tolist()
+    return Motion(0, x, y, heading, 0.0, 0.0, 0.0)
 
 
 def _map() -> TopologicalMap:
