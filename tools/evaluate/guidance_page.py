@@ -46,7 +46,7 @@ _REPLAYS = """## Replays: simulated sensors, odometry, localization on the own m
 One mine a row pair, made to measure (`tools.evaluate.navigation`), taught once by the operator, then driven forward and in
 reverse; 12 km/h is the limit of the map's tunnels. Room is what the simulator's bumper measures.
 
-| class | measured c | direction | load, t | arrived | contacts | least room, m | mean, km/h | top | back-ups | assists | ACD | ASD |
+| class | measured c | direction | load, t | arrived | contacts | least, m | mean, km/h | top | back-ups | assists | ACD | ASD |
 | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |
 {rows}
 
