@@ -42,9 +42,20 @@ def field_around(hits: FloatArray, way: FloatArray) -> Field:
     if shape.prod() > _MOST_CELLS:  # a way that long is none that will be driven
         high = low + CELL_M * math.sqrt(_MOST_CELLS)
         shape = np.minimum(shape, int(math.sqrt(_MOST_CELLS)))
-    inside = hits[((hits >= low) & (hits < high)).all(axis=1)]
+    inside = _inside(hits, low, high)
     nearest = _nearest(inside, way[:: max(len(way) // 12, 1)], low, int(shape[0]), int(shape[1]))
     return Field(low, nearest, inside)
+
+
+@nb.njit(cache=True, nogil=True)
+def _inside(hits: FloatArray, low: FloatArray, high: FloatArray) -> FloatArray:
+    kept, count = np.empty((len(hits), 2)), 0
+    for n in range(len(hits)):
+        x, y = hits[n, 0], hits[n, 1]
+        if low[0] <= x < high[0] and low[1] <= y < high[1]:
+            kept[count, 0], kept[count, 1] = x, y
+            count += 1
+    return kept[:count]
 
 
 @nb.njit(cache=True, nogil=True)
@@ -72,16 +83,28 @@ def _nearest(hits: FloatArray, way: FloatArray, low: FloatArray, rows: int, colu
 
 @nb.njit(cache=True, nogil=True)
 def _seed(found: npt.NDArray[np.int32], hits: FloatArray, way: FloatArray, low: FloatArray) -> None:
-    """Put the hit of each cell that is nearest to the way into it."""
-    aside = np.full(found.shape, math.inf)
+    """Put the hit of each cell that is nearest to the way into it: to the point of the way that is nearest to the cell."""
+    aside, beside = np.empty(found.shape), np.empty(found.shape, np.int32)
     for n in range(len(hits)):
-        i, j = int((hits[n, 0] - low[0]) / CELL_M), int((hits[n, 1] - low[1]) / CELL_M)
-        best = math.inf
-        for k in range(len(way)):
-            dx, dy = hits[n, 0] - way[k, 0], hits[n, 1] - way[k, 1]
-            best = min(best, dx * dx + dy * dy)
-        if best < aside[i, j]:
-            found[i, j], aside[i, j] = n, best
+        x, y = hits[n, 0], hits[n, 1]
+        i, j = int((x - low[0]) / CELL_M), int((y - low[1]) / CELL_M)
+        if found[i, j] < 0:
+            beside[i, j] = _beside(way, x, y)
+            aside[i, j] = math.inf
+        k = beside[i, j]
+        square = (x - way[k, 0]) ** 2 + (y - way[k, 1]) ** 2
+        if square < aside[i, j]:
+            found[i, j], aside[i, j] = n, square
+
+
+@nb.njit(cache=True, nogil=True)
+def _beside(way: FloatArray, x: float, y: float) -> int:
+    best, which = math.inf, 0
+    for k in range(len(way)):
+        square = (x - way[k, 0]) ** 2 + (y - way[k, 1]) ** 2
+        if square < best:
+            best, which = square, k
+    return which
 
 
 @nb.njit(cache=True, nogil=True)

@@ -31,6 +31,7 @@ from lhdmap.messages import FloatArray
 _COMPUTING_NS = 30_000_000
 _ROLL_S = 0.05
 _OLD_NS = 1_000_000_000
+_SAME_M = 1.0
 _POINTS = 21.0  # of the outline that the findings' weights were found with
 _SECOND_NS = 1_000_000_000
 
@@ -48,6 +49,7 @@ class Plan(NamedTuple):
     solution: Solution
     speeds: Speeds
     slopes: Slopes
+    stop_m: float
 
     @property
     def clearance_m(self) -> float:
@@ -124,9 +126,13 @@ class Guidance:
         seen = self._sight(directive, lead, start, at, field)
         nose_m = before_nose_m(solution.states, field, float(lead.leading_m[:, 0].max()))
         start_at = (speed, self._rise(begin_ns))
-        told = speeds_of(solution, ahead, start_at, directive, seen, nose_m, self._speeds(), self.model, settings)
+        told = speeds_of(
+            solution, ahead, start_at, directive, seen, nose_m, self._speeds(directive), self.model, settings
+        )
         setpoints = self._setpoints(now_ns + _COMPUTING_NS, before, told, directive.gear)
-        self._last = Plan(now_ns, directive.gear, setpoints, begin_ns, solution, told, slopes_of(solution, ahead))
+        self._last = Plan(
+            now_ns, directive.gear, setpoints, begin_ns, solution, told, slopes_of(solution, ahead), directive.stop_m
+        )
         return self._last
 
     def _rolled_to(
@@ -180,8 +186,10 @@ class Guidance:
         k = int((begin_ns - self._last.begin_ns) / _SECOND_NS / speeds.step_s)
         return float(np.diff(speeds.speed_mps)[min(k, len(speeds.speed_mps) - 2)]) / speeds.step_s
 
-    def _speeds(self) -> Speeds | None:
-        return None if self._last is None else self._last.speeds
+    def _speeds(self, directive: Directive) -> Speeds | None:
+        """Return the speeds of the last plan, if it was along the same path."""
+        same = self._last is not None and abs(self._last.stop_m - directive.stop_m) < _SAME_M
+        return self._last.speeds if self._last is not None and same else None
 
     def _sight(self, directive: Directive, lead: Lead, start: FloatArray, at: int, field: Field) -> float:
         eye = self._eyes_m[directive.gear]

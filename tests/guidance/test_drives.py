@@ -57,6 +57,23 @@ def test_a_narrow_bend_is_driven_with_room(gear: int) -> None:
     assert float(np.mean(out.speeds_mps)) * 3.6 * gear > 6.0
 
 
+@pytest.mark.parametrize(
+    "errors",
+    [
+        Errors(dead_s=0.2),
+        Errors(dead_s=-0.15),
+        Errors(jitter_m=0.05, jitter_rad=math.radians(0.5)),
+        Errors(bend_offset_rad=math.radians(0.5)),
+        Errors(gain=0.85),
+    ],
+    ids=["late", "early", "noisy", "offset", "weak"],
+)
+def test_a_machine_other_than_its_model_does_not_touch(errors: Errors) -> None:
+    out = drive(*narrow(8.0, 60.0, 0.25, 4), errors=errors, begin_m=15.0)
+    assert out.arrived
+    assert min(out.rooms_m) > 0.03
+
+
 FAILED_ONCE = [1, 9, 10]
 """Seeds that touched: the horizon was 1.5 m short where the machine was slow, and the joint moved where it stood."""
 

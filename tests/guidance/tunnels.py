@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 from lhdmap.driving.bodies import bodies_of
 from lhdmap.driving.lead import lead_of
 from lhdmap.driving.model import drive_model
@@ -19,10 +21,10 @@ _SPREAD = 15  # steps over which the swept width is held
 _DENSE = 3  # wall points of a step
 
 
-def line_of(curvature: FloatArray) -> FloatArray:
+def line_of(curvature: npt.NDArray[np.floating[Any]]) -> FloatArray:
     """A line (N, 2) of curvatures (N,) each 0.1 m, smoothed by 4 m of clothoid."""
     ramp = np.convolve(np.pad(curvature, 20, mode="edge"), np.ones(41) / 41.0, mode="valid")
-    heading = np.concatenate([[0.0], np.cumsum(STEP_M * ramp[:-1])])
+    heading: FloatArray = np.concatenate([[0.0], np.cumsum(STEP_M * ramp[:-1])])
     return np.column_stack([np.cumsum(STEP_M * np.cos(heading)), np.cumsum(STEP_M * np.sin(heading))])
 
 

@@ -13,6 +13,7 @@ from lhdmap.driving.motion import Motion
 from lhdmap.guidance.directive import Directive
 from lhdmap.guidance.local_walls import LocalWalls
 from lhdmap.guidance.settings import GuidanceSettings
+from lhdmap.messages import FloatArray
 from lhdmap.movement.route import Route, route_json
 from lhdmap.movement.routes import RouteOptions, RoutePlanner
 from lhdmap.navigation.along import Located
@@ -92,7 +93,7 @@ class Trip:
             return
         self.said.append((self.control.state, asked.gear, asked.stop_m, asked.path))
         lead = lead_of(asked.gear, MODEL, BODIES)
-        state = lead.state(Motion(0, float(self.pose[0]), float(self.pose[1]), float(self.pose[2]), 0.0, 0.0, 0.0))
+        state = lead.state(_standing(self.pose))
         path = asked.path
         near = int(np.hypot(path[:, 0] - state[0], path[:, 1] - state[1]).argmin())
         left = asked.stop_m - float(path[near, 5])
@@ -111,6 +112,11 @@ class Trip:
 
 
 _STEP_S = 0.1
+
+
+def _standing(pose: FloatArray) -> Motion:
+    x, y, heading = pose.tolist()
+    return Motion(0, x, y, heading, 0.0, 0.0, 0.0)
 
 
 def _map() -> TopologicalMap:

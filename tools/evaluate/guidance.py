@@ -12,10 +12,10 @@ import math
 import sys
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from lhdmap.config import settings_from
+from lhdmap.evaluation.navigation.drive import squared_steps
 from lhdmap.guidance.settings import GuidanceSettings
 from tests.guidance.planar_drive import Drive, Errors, drive
 from tests.guidance.tunnels import MACHINE, tunnel
@@ -97,17 +97,12 @@ def row_of(kind: Class, seed: int, settings: GuidanceSettings) -> tuple[Row, Dri
 
 def smoothness(out: Drive) -> tuple[float, float, float]:
     """Return ACD, ASD and MSD, Eqs. (22) and (23): at 10 Hz, commands as shares, speed in km/h, joint in degrees."""
-    speed = 3.6 * np.array(out.speeds_mps)
-    states = np.column_stack([speed, np.degrees([one[3] for one in out.states])])
-    told = np.array([(c.speed_mps * 3.6 / 24.0, math.degrees(c.steering_rate_rps) / 15.0) for c in out.commands[1::5]])
-    jolts = second(states)
-    return float(second(told).mean()), float(jolts.mean()), float(jolts.max())
-
-
-def second(values: np.ndarray[Any, Any]) -> np.ndarray[Any, Any]:
-    """Return what changes of the change are, squared and summed over the columns (navigation tables' E)."""
-    change: np.ndarray[Any, Any] = (np.diff(values, axis=0) ** 2).sum(axis=1)
-    return change
+    speeds, bends = 3.6 * np.array(out.speeds_mps), np.degrees([one[3] for one in out.states])
+    told = out.commands[1::5]
+    propel = np.array([one.speed_mps for one in told]) / MACHINE.dimensions.max_speed_kmh * 3.6
+    rate = np.degrees([one.steering_rate_rps for one in told]) / MACHINE.dimensions.max_articulation_rate_dps
+    jolts = squared_steps(speeds, bends)
+    return float(squared_steps(propel, rate).mean()), float(jolts.mean()), float(jolts.max())
 
 
 def summary(name: str, rows: list[Row]) -> str:

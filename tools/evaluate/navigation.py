@@ -31,7 +31,6 @@ from lhdmap.simulation.history import START_NS
 from lhdmap.simulation.mine_drive import MineDrive, MineDriveSettings
 from lhdmap.simulation.operator import OperatorSettings
 from lhdmap.simulation.vehicle.vehicle import Vehicle
-from lhdmap.topology.model import AccessPoint, Waypoint
 from tests.guidance.tunnels import STEP_M, swept_half_widths, winding_line
 
 _EVERY = 20  # line points of a plan's point: 2 m
@@ -113,9 +112,9 @@ def as_mapped(parts: Parts, scenario: Scenario, folder: Path) -> Parts:
     assert parts.autonomous is not None  # the scenario has a goal
     first = np.loadtxt(folder / "map_teaching.truth.tum", max_rows=1)
     origin = np.array([first[1], first[2], 2.0 * math.atan2(first[6], first[7])])
-    points = [parts.autonomous.known.topology.called(name) for name in (scenario.start, scenario.goal)]
-    begin, end = (one.pose for one in points if isinstance(one, (AccessPoint, Waypoint)))
-    assert isinstance(parts.vehicle, Vehicle)  # a mine's
+    assert isinstance(parts.vehicle, Vehicle)
+    named = {one.name: one.pose for one in parts.autonomous.known.topology.waypoints}
+    begin, end = named[scenario.start], named[scenario.goal]
     x, y, yaw = se2.compose(origin, begin[[0, 1, 3]]).tolist()
     state = parts.vehicle.at_rest(x, y, yaw, near_z_m=float(first[3]), time_ns=START_NS, load_kg=1000.0 * scenario.load)
     goal = se2.compose(origin, end[[0, 1, 3]])
