@@ -80,6 +80,7 @@ def _plan(now_ns: int, odom: FloatArray) -> Plan:
         solution,
         Speeds(np.full(3, 2.0), np.zeros(2), 0.15, 15.0, "sight", np.zeros(3), np.ones(3)),
         Slopes(np.zeros(2), np.zeros(2)),
+        10.0,
     )
 
 
