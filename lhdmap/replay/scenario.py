@@ -190,7 +190,7 @@ def load_scenario(path: Path, **over: Any) -> Scenario:
     scenario = load_tree(Scenario, path, "scenario file")
     beside: dict[str, Any] = {key: _beside(path, getattr(scenario, key)) for key in ("mine", "machine")}
     beside["map"] = _beside(path, scenario.map, folder=True)
-    return replace(scenario, **beside, **over)
+    return replace(scenario, **(beside | over))
 
 
 def _beside(path: Path, name: str, *, folder: bool = False) -> str:

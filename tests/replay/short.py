@@ -17,8 +17,8 @@ from lhdmap.simulation.history import START_NS
 def tram(folder: Path, **table: Any) -> Scenario:
     """Return a scenario in the mine `short`, whose map is in a folder."""
     given = {
-        "mine": str(folder / "tiny.toml"),
-        "map": str(folder / "tiny.map"),
+        "mine": "short",
+        "map": str(folder / "short.map"),
         "start": "P1",
         "goal": "OP1",
         "seed": 1,

@@ -54,6 +54,15 @@ def stops(settings: GuidanceSettings) -> list[Any]:
     return [out.commands]
 
 
+def barred(settings: GuidanceSettings) -> list[Any]:
+    """Return what is commanded where something stands in the middle of a straight."""
+    line, walls = narrow(30.0, 10.0, 1.5, 3)
+    middle = line[int(np.hypot(*(line[:, :2] - line[0, :2]).T).searchsorted(24.0)), :2]
+    thing = middle + np.array([[x, y] for x in np.arange(-0.2, 0.3, 0.1) for y in np.arange(-0.2, 0.3, 0.1)])
+    bars = np.concatenate([walls, thing])
+    return [drive(line, bars, settings=settings, seconds=10.0, begin_m=12.0, limit_mps=2.0).commands]
+
+
 class Trip:
     """A point of a machine that goes where navigation control says, on a small map, and is kept from it in three ways."""
 
@@ -141,6 +150,12 @@ def trips(settings: Settings) -> list[Any]:
         told.append(trip.said)
     held = Trip(settings, loaded=False, goal="DP1", held_m=9.0)
     held.go(120.0)
+    barred_way = []
+    for sight_m in (1.0, 5.0):
+        waits = Trip(settings, loaded=False, goal="DP1", held_m=9.0)
+        waits.control.sight_m = sight_m
+        waits.go(60.0)
+        barred_way.append(waits.said)
     slipping = Trip(settings, loaded=False, goal="DP1")
     slipping.wander_m = 0.4
     slipping.go(120.0)
@@ -148,7 +163,7 @@ def trips(settings: Settings) -> list[Any]:
     for _ in range(30):
         unsure.std_m += 0.08
         unsure.go(0.5)
-    return [*told, held.said, slipping.said, unsure.said, _turned_in_a_stub(settings)]
+    return [*told, *barred_way, held.said, slipping.said, unsure.said, _turned_in_a_stub(settings)]
 
 
 def _turned_in_a_stub(settings: Settings) -> list[Any]:

@@ -50,7 +50,7 @@ from tests.movement.mines import fast_ladder
 from tests.report.synthetic import START_NS, report_data
 from tests.report.test_recording import read
 from tests.settings import streams
-from tests.settings.guided import plans, remembered, stops, trips
+from tests.settings.guided import barred, plans, remembered, stops, trips
 from tests.settings.streams import Stream
 
 Probe = Callable[[Settings], str]
@@ -306,7 +306,8 @@ def driven(settings: Settings) -> str:
 
 def guided(settings: Settings) -> str:
     """Return the digest of what guidance commands in a narrow bend, and on the way to a stop."""
-    return digest(plans(settings.guidance), stops(settings.guidance), remembered(settings.guidance))
+    parts = plans, stops, remembered, barred
+    return digest(*(part(settings.guidance) for part in parts))
 
 
 def navigated(settings: Settings) -> str:

@@ -41,6 +41,7 @@ KINDS = ("dead", "frozen", "nan", "delayed", "dropped", "jump", "biased", "noisy
          "person", "obstacle", "steering_stuck")  # fmt: skip
 STANDS_MPS, MOVES_MPS = 0.03, 0.06
 MARGIN = 1.1
+IN_FLIGHT_S = 1.0  # dead time, and the brake on what was commanded before
 
 
 class Drive(Process):
@@ -157,7 +158,8 @@ def _stops(rows: FloatArray, events: list[Event], model: DriveModel) -> tuple[li
             worst = max(worst, way_m / allowed_m)
         if way_m > MARGIN * allowed_m + 0.05:
             missed.append(f"{at_s:.2f} s: stopped after {way_m:.2f} m, {allowed_m:.2f} m were allowed")
-        if len(stands) and np.abs(part[last:, 3]).max() > MOVES_MPS:
+        later = part[(part[:, 0] > max(part[last, 0], at_s + IN_FLIGHT_S))]
+        if len(stands) and len(later) and np.abs(later[:, 3]).max() > MOVES_MPS:
             missed.append(f"{at_s:.2f} s: moved again before it was armed")
     return missed, worst
 
