@@ -22,7 +22,8 @@ Written by `python -m tools.evaluate.guidance_page` from runs of `tools.evaluate
 Winding tunnels of 70 m (180 m in the class R 12-40), bends of 20 to 90 degrees, walls rough by 0.10 m, one opening of 5 m. By
 turns forward and in reverse, empty and loaded; pose noise 1 cm and 0.1 degrees, joint offset 0.5 degrees, steering gain
 within 5 %, lags within 10 %, the route off by 0.15 m (1 sigma). Walls are known as points, there is no guard and no backing up:
-a touch ends the run. E at 10 Hz, commands as shares of 24 km/h and 15 deg/s, km/h and degrees. Limit {limit}.
+a touch ends the run. E at 10 Hz, commands as shares of 24 km/h and 15 deg/s, km/h and degrees. Limit
+{limit}.
 
 {columns}
 {planar}
@@ -33,8 +34,8 @@ _COLUMNS = (
     "| ACD | ASD | field, solve and speeds, CPU ms median / worst p99 |\n"
     "| --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |"
 )
-_BEFORE = """With a horizon of 3.6 s alone, a joint that turns where the machine stands, and clearances that are not smoothed, the same
-tunnels gave (classes that are not in the table above were not driven again):
+_BEFORE = """With a horizon of 3.6 s alone, a joint that turns where the machine stands, and clearances that are not smoothed, the
+same tunnels gave (classes that are not in the table above were not driven again):
 
 {columns}
 {rows}
