@@ -66,7 +66,7 @@ def main() -> int:
     """Write the page."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--planar", type=Path, nargs="+", required=True)
-    parser.add_argument("--printed", type=Path)
+    parser.add_argument("--printed", type=Path, nargs="+")
     parser.add_argument("--before", type=Path, help="runs of an earlier state, to be compared")
     parser.add_argument("--replays", type=Path)
     parser.add_argument(
@@ -81,7 +81,7 @@ def main() -> int:
     if asked.before:
         text += _BEFORE.format(columns=_COLUMNS, rows="\n".join(planar([asked.before])))
     if asked.printed:
-        text += _PRINTED.format(columns=_COLUMNS, rows="\n".join(planar([asked.printed])))
+        text += _PRINTED.format(columns=_COLUMNS, rows="\n".join(planar(asked.printed)))
     if asked.replays:
         rows = replayed(asked.replays)
         smooth = smoothness(asked.navigation) if asked.navigation else {}
