@@ -22,7 +22,8 @@ Written by `python -m tools.evaluate.guidance_page` from runs of `tools.evaluate
 Winding tunnels of 70 m (180 m in the class R 12-40), bends of 20 to 90 degrees, walls rough by 0.10 m, one opening of 5 m. By
 turns forward and in reverse, empty and loaded; pose noise 1 cm and 0.1 degrees, joint offset 0.5 degrees, steering gain
 within 5 %, lags within 10 %, the route off by 0.15 m (1 sigma). Walls are known as points, there is no guard and no backing up:
-a touch ends the run. E at 10 Hz, commands as shares of 24 km/h and 15 deg/s, km/h and degrees. Limit {limit}.
+a touch ends the run. E at 10 Hz, commands as shares of 24 km/h and 15 deg/s, km/h and degrees. Limit
+{limit}.
 
 {columns}
 {planar}
@@ -33,6 +34,13 @@ _COLUMNS = (
     "| ACD | ASD | field, solve and speeds, CPU ms median / worst p99 |\n"
     "| --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |"
 )
+_BEFORE = """With a horizon of 3.6 s alone, a joint that turns where the machine stands, and clearances that are not smoothed, the
+same tunnels gave (classes that are not in the table above were not driven again):
+
+{columns}
+{rows}
+
+"""
 _PRINTED = """## Guidance as printed (`guidance.method = "paper"`), planar
 
 The same tunnels and errors; its speeds come from the default's profile, for nothing in its cost rewards progress.
@@ -58,7 +66,8 @@ def main() -> int:
     """Write the page."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--planar", type=Path, nargs="+", required=True)
-    parser.add_argument("--printed", type=Path)
+    parser.add_argument("--printed", type=Path, nargs="+")
+    parser.add_argument("--before", type=Path, help="runs of an earlier state, to be compared")
     parser.add_argument("--replays", type=Path)
     parser.add_argument(
         "--navigation", type=Path, help="what `lhdmap eval navigation RUN... --json` said of the replays"
@@ -69,8 +78,10 @@ def main() -> int:
         planar="\n".join(planar(asked.planar)),
         limit="10.1 km/h empty, 7.9 loaded; 20 and 18 in the last class",
     )
+    if asked.before:
+        text += _BEFORE.format(columns=_COLUMNS, rows="\n".join(planar([asked.before])))
     if asked.printed:
-        text += _PRINTED.format(columns=_COLUMNS, rows="\n".join(planar([asked.printed])))
+        text += _PRINTED.format(columns=_COLUMNS, rows="\n".join(planar(asked.printed)))
     if asked.replays:
         rows = replayed(asked.replays)
         smooth = smoothness(asked.navigation) if asked.navigation else {}
