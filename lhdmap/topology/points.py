@@ -81,13 +81,16 @@ def _dead_end(
 
 
 def _stood_at(tunnel: Tunnel, place: Place, path: FloatArray, path_ns: npt.NDArray[np.int64]) -> float:
-    """Return where in a place the machine stood longest (m along its tunnel), else its middle."""
+    """Return where in a place the machine stood longest, or its drive began or ended (m along its tunnel), else its middle."""
     at = along_m(tunnel, path[place.rows])
     if len(place.rows) > 1:
         waits_s = np.diff(path_ns[place.rows]) * 1e-9
         longest = int(waits_s.argmax())
         if waits_s[longest] > _STOOD_S and place.rows[longest + 1] == place.rows[longest] + 1:
             return float(at[longest])
+    ends = np.flatnonzero((place.rows == 0) | (place.rows == len(path) - 1))
+    if len(ends):
+        return float(at[ends[0]])
     return 0.5 * float(at.min() + at.max())
 
 
