@@ -97,6 +97,7 @@ _SETTINGS = {
     "anchor.hit_limit": Case("tilted", 5.0),
     "anchor.rounds": Case("tilted", 1),
     "anchor.min_support": Case("jump", 0.9),
+    "search.beams": Case("jump", 60),
     "search.reach_m": Case("jump", 0.1),
     "search.turn_deg": Case("jump", 5.0),
     "range_flow.spacing_deg": Case("level", 2.0, _FLOW),
