@@ -20,6 +20,7 @@ _FEW_HITS, _HITS = 150, 500
 _FINER = 4  # of the best are matched anew, with more hits
 _ABOUT_M = 6.0
 _ALONG_M, _ALONG_STEP_M = 4.0, 0.8
+_TURNS_RAD = tuple(math.radians(turn) for turn in (0.0, -12.0, 12.0, -24.0, 24.0))
 _STD = np.array([0.6, 0.6, math.radians(6.0)])  # poses are a metre apart, and a machine need not stand in the middle
 _KAPPA = 10.0  # hits that are neighbours share the map's errors
 _SAME_M, _SAME_RAD = 1.5, math.radians(30.0)
@@ -63,10 +64,13 @@ def poses_anywhere(topology: TopologicalMap) -> FloatArray:
 
 
 def poses_along(pose: FloatArray, height_m: float) -> FloatArray:
-    """Return poses (K, 4) before and behind a pose (3,), in its direction."""
+    """Return poses (K, 4) before and behind a pose (3,), in its direction and turned: a blind machine may have been in a bend."""
     way = np.arange(-_ALONG_M, _ALONG_M + 0.1, _ALONG_STEP_M)
-    x, y = pose[0] + way * math.cos(pose[2]), pose[1] + way * math.sin(pose[2])
-    return np.column_stack([x, y, np.full_like(way, pose[2]), np.full_like(way, height_m)])
+    poses = []
+    for turn in _TURNS_RAD:
+        x, y = pose[0] + way * math.cos(pose[2] + 0.5 * turn), pose[1] + way * math.sin(pose[2] + 0.5 * turn)
+        poses.append(np.column_stack([x, y, np.full_like(way, pose[2] + turn), np.full_like(way, height_m)]))
+    return np.concatenate(poses)
 
 
 def best_start(walls: MapWalls, starts: FloatArray, points: FloatArray) -> Start:

@@ -38,5 +38,11 @@ def test_poses_cover_a_tunnel_both_ways_and_an_intersection_all_round() -> None:
     about = poses_about(topology, topology.points["w1"])
     assert np.hypot(about[:, 0], about[:, 1] + 26.0).max() < 6.0
     ahead = poses_along(np.array([1.0, 2.0, 0.5 * math.pi]), 3.0)
-    assert ahead[:, 0] == pytest.approx(1.0)
+    straight = np.abs(ahead[:, 2] - 0.5 * math.pi) < 1e-9
+    assert ahead[straight, 0] == pytest.approx(1.0)
     assert (ahead[:, 1].min(), ahead[:, 1].max()) == pytest.approx((-2.0, 6.0))
+    left = ahead[
+        (ahead[:, 2] > 0.5 * math.pi) & (ahead[:, 1] > 5.0)
+    ]  # turned to the left, a place ahead is to the left, too
+    assert len(left) >= 2
+    assert (left[:, 0] < 1.0).all()
