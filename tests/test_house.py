@@ -40,6 +40,7 @@ FLOORS = [
     {"movement", "landmarks"},
     {"driving"},
     {"guidance", "executor"},
+    {"loading"},
     {"navigation"},
     {"exports"},
     {"smoothing", "simulation", "evaluation"},
