@@ -1,4 +1,4 @@
-"""What the loading controllers hear at a moment, and what they ask of the pedals. Plain values: a log gives them as a machine does."""
+"""What the loading controllers hear at a moment, and what they ask of the pedals: plain values, of a log or of a machine."""
 
 from __future__ import annotations
 
