@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 from lhdmap.settings import setting
@@ -93,3 +94,7 @@ class ExecutorSettings:
         maximum=1.0,
         doc="Points deeper than this in a body where it stands are returns of the machine itself.",
     )
+
+    def jumps(self, apart_m: float, apart_rad: float) -> bool:
+        """Return whether pose and scan are too far apart to go together."""
+        return apart_m > self.jump_m or apart_rad > math.radians(self.jump_deg)

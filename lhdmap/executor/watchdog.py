@@ -136,8 +136,7 @@ class Watchdog:
         return tuple(reasons)
 
     def _jumps(self) -> bool:
-        apart_m, apart_rad = self._apart
-        return apart_m > self.settings.jump_m or apart_rad > math.radians(self.settings.jump_deg)
+        return self.settings.jumps(*self._apart)
 
     def _degraded(self, now_ns: int, needed: Collection[str]) -> bool:
         link = self._inputs.get(LINK)

@@ -111,7 +111,7 @@ def _autonomous(scenario: Scenario, parts: Parts, given: Autonomous, journal: Jo
     return [
         Locating(given.known, settings, machine, given.start, journal.of(PERCEPTION)),
         Navigator(navigation, given.errand, journal.of(NAVIGATION)),
-        Guide(guidance, journal.of(GUIDANCE)),
+        Guide(guidance, settings.executor.jumps, journal.of(GUIDANCE)),
         Execute(control, machine, given.mode, journal.of(EXECUTOR)),
         Station(scenario.wanted_modes, scenario.rearm_s, scenario.assist_s, journal.of(Station.name)),
     ]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 
 from lhdmap.driving.motion import Setpoint
 from lhdmap.guidance.ghosts import Eye
@@ -22,13 +22,16 @@ _ASKED_NS = 500 * MILLISECOND_NS
 
 
 class Guide(Process):
-    """A plan each 50 ms while there is a fresh directive; its journal has what limits the speed."""
+    """A plan each 50 ms while there is a fresh directive; its journal has what limits the speed.
+
+    `jumps`: whether scan and pose are so far apart (m, rad) that hits of before and after do not go together.
+    """
 
     name, period_ns, latency_ns, priority = GUIDANCE, 50 * MILLISECOND_NS, 10 * MILLISECOND_NS, 30
     reads = (*MOTION_TOPICS, SEEN, DIRECTIVE, _COMMAND)
 
-    def __init__(self, guidance: Guidance, scribe: Scribe) -> None:
-        self._guidance, self._scribe = guidance, scribe
+    def __init__(self, guidance: Guidance, jumps: Callable[[float, float], bool], scribe: Scribe) -> None:
+        self._guidance, self._jumps, self._scribe = guidance, jumps, scribe
         self._feed, self._walls = MotionFeed(), LocalWalls(guidance.settings.memory_m)
         self._sent: deque[Setpoint] = deque(maxlen=100)
         self._asked: Asked | None = None
@@ -56,6 +59,8 @@ class Guide(Process):
     def _take(self, received: Received) -> None:
         topic, _, message = received
         if topic == SEEN:
+            if self._jumps(message.apart_m, message.apart_rad):
+                self._walls.clear()
             self._walls.add(message.pose_odom, message.points_m, self._eyes(message))
             self._seen_ns = message.stamp_ns
         elif topic == DIRECTIVE:
