@@ -111,6 +111,29 @@ class Executor:
             return self._service(now_ns, cause, period_s)
         return self._drive(now_ns, wanted, period_s, bound, held=stop is Stop.HOLD)
 
+    def dig(
+        self, now_ns: int, motion: Motion | None, pedals: Command, stop: Stop = Stop.GO, cause: str = ""
+    ) -> Command:
+        """Return the command of now for a loading controller, who asks for pedals and not for a path; any stop is a brake.
+
+        The joint moves within its limits; a gear is changed at standstill alone; the queue stays empty.
+        """
+        self.keeper.sees(motion)
+        period_s = self._period_s(now_ns)
+        self.queue.clear()
+        if stop is Stop.EMERGENCY:
+            self.stop(cause)
+        if self.emergency or stop >= Stop.SERVICE:
+            return self._brake(now_ns, self.emergency or cause, period_s)
+        self._goes("digging", "pedals")
+        self._limiter.restart(self.speed_mps)
+        rate = self._steered(pedals.steering_rate_rps, period_s)
+        propel = min(max(pedals.propel, -1.0), 1.0)
+        if propel * self.speed_mps < 0.0 and abs(self.speed_mps) > _SHIFT_MPS:
+            propel = 0.0  # the other gear through standstill alone
+        self.keeper.gave(Sent(now_ns, self.speed_mps, rate, pedals.brake))
+        return pedals._replace(stamp_ns=now_ns, propel=propel, steering_rate_rps=rate)
+
     def _period_s(self, now_ns: int) -> float:
         last, self._last_ns = self._last_ns, now_ns
         return 0.01 if last is None else min(max((now_ns - last) * 1e-9, 1e-3), _LONGEST_PERIOD_S)

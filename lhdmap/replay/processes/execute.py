@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 
 import numpy as np
@@ -19,6 +20,7 @@ from lhdmap.replay.process import (
     DIRECTIVE,
     MACHINE_SAYS,
     MILLISECOND_NS,
+    PEDALS,
     PLAN,
     POSE,
     SEEN,
@@ -28,7 +30,7 @@ from lhdmap.replay.process import (
     Received,
 )
 from lhdmap.replay.processes.feed import MOTION_TOPICS, MotionFeed
-from lhdmap.replay.processes.told import Asked, Health, Idle, ModeNow, Word
+from lhdmap.replay.processes.told import Asked, Health, Idle, ModeNow, Seen, Word
 from lhdmap.roles import ROLES
 
 EXECUTOR = "executor"
@@ -44,7 +46,7 @@ class Execute(Process):
     """A command each 20 ms."""
 
     name, period_ns, priority = EXECUTOR, 20 * MILLISECOND_NS, 40
-    reads = (*MOTION_TOPICS, _FRONT, _REAR, SEEN, PLAN, DIRECTIVE, STATION_SAYS)
+    reads = (*MOTION_TOPICS, _FRONT, _REAR, SEEN, PLAN, PEDALS, DIRECTIVE, STATION_SAYS)
 
     def __init__(self, control: Control, machine: Machine, mode: ModeNow, scribe: Scribe) -> None:
         self.control, self._machine, self._mode, self._scribe = control, machine, mode, scribe
@@ -58,7 +60,8 @@ class Execute(Process):
         """Take what has come; give the command of now."""
         for received in inbox:
             self._take(received, now_ns)
-        wanted = self._wanted if self.control.modes.mode.source == "guidance" else Stop.GO
+        follows = self.control.modes.mode.source == "guidance" and not self.control.digs(now_ns)
+        wanted = self._wanted if follows else Stop.GO
         command = self.control.step(now_ns, self._feed.motion, wanted, "navigation", self._pull_mps2)
         for who, note in self.control.take_notes():
             self._scribe.event(
@@ -82,7 +85,9 @@ class Execute(Process):
                 self._gear = message.gear
                 self.control.plan("guidance", message.setpoints, message.stamp_ns, now_ns)
         elif topic == SEEN:
-            watchdog.disagreement(message.stamp_ns, now_ns, message.apart_m, message.apart_rad)
+            self._compare(message, now_ns)
+        elif topic == PEDALS:
+            self.control.dig(message.pedals, message.expected_m, now_ns)
         elif topic == DIRECTIVE:
             self._ask(message)
         elif topic == STATION_SAYS:
@@ -93,6 +98,12 @@ class Execute(Process):
                 watchdog.saw(MOTION, self._feed.heard_ns, now_ns)
             if topic == POSE:
                 self._pull_mps2 = 9.81 * float(-message.T_odom_base[2, 0])
+
+    def _compare(self, seen: Seen, now_ns: int) -> None:
+        """Tell the watchdog by how much pose and scan disagree; wheels that dig slip, and say nothing of the scan."""
+        lost = math.isinf(seen.apart_m)
+        apart = (seen.apart_m, seen.apart_rad) if lost or not self.control.digs(now_ns) else (0.0, 0.0)
+        self.control.watchdog.disagreement(seen.stamp_ns, now_ns, *apart)
 
     def _ask(self, asked: Asked) -> None:
         self._wanted = Stop.SERVICE if asked.directive is None else Stop.GO

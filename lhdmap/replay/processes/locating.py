@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import replace
 
 import numpy as np
 
@@ -20,13 +19,11 @@ from lhdmap.pipeline.localize import KnownMap, Localizer
 from lhdmap.replay.journal import Scribe
 from lhdmap.replay.process import LOCATED, MILLISECOND_NS, POSE, SEEN, Outgoing, Process, Received
 from lhdmap.replay.processes.perception import PERCEPTION
+from lhdmap.replay.processes.scouting import live
 from lhdmap.replay.processes.told import Seen
 from lhdmap.roles import BUILD_MAP, ROLES, read_by
 
 _ROLE_OF = {ROLES[name].topic: name for name in read_by(BUILD_MAP)}
-
-_STEP_S = 0.08  # a machine that stands or creeps has to know so, too
-_HALF_WINDOW_S = 0.08  # scans wait for the inclinometer's filter: a control loop has less time than a map
 
 
 class Locating(Process):
@@ -40,10 +37,7 @@ class Locating(Process):
     ) -> None:
         self._scribe = scribe
         self._seen: list[Seen] = []
-        often = replace(settings.odometry, step_s=min(settings.odometry.step_s, _STEP_S))
-        soon = replace(settings.attitude, half_window_s=min(settings.attitude.half_window_s, _HALF_WINDOW_S))
-        live = replace(settings, odometry=often, attitude=soon)
-        self.localizer = Localizer(known, live, machine, start, listener=self._listen)
+        self.localizer = Localizer(known, live(settings), machine, start, listener=self._listen)
         self._agreement = Agreement(self.localizer.pipeline.front_end.wheels.motion_between)
         scribe.goes("waiting", "no scan yet")
 

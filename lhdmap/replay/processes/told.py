@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from lhdmap.guidance.directive import Directive
-from lhdmap.messages import FloatArray
+from lhdmap.messages import Command, FloatArray
 
 
 class Seen(NamedTuple):
@@ -28,6 +28,13 @@ class Asked(NamedTuple):
     stamp_ns: int
     directive: Directive | None
     cause: str
+
+
+class Digs(NamedTuple):
+    """What the loading task asks of the pedals, and corners (4, 2) in `odom` of where the bucket is to touch."""
+
+    pedals: Command
+    expected_m: FloatArray
 
 
 class Idle(NamedTuple):
