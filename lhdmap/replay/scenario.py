@@ -71,6 +71,23 @@ class Limits:
 
 
 @dataclass(frozen=True, slots=True)
+class LoadingPlan:
+    """How a machine loads, how far before the pile it begins, on what ground, and when the operator has enough."""
+
+    method: str = setting(
+        "adaptive", choices=("paper", "paper-tuned", "adaptive"), doc="Excavation: docs/loading_control.md."
+    )
+    detector: str = setting("fused", choices=("paper", "fused"), doc="How the touch of the pile is noticed.")
+    ground: str = setting("default", doc="Ground: a file, or the name of one that ships.")
+    approach_m: float = setting(
+        18.0, unit="m", minimum=0.0, maximum=500.0, doc="Way to the draw point at the start, as far as the drive has it."
+    )
+    offset_m: float = setting(0.0, unit="m", minimum=-3.0, maximum=3.0, doc="The machine begins so far to the left.")
+    turned_deg: float = setting(0.0, unit="deg", minimum=-45.0, maximum=45.0, doc="... and turned to the left by this.")
+    buckets: int = setting(1, minimum=1, maximum=1000, doc="How many; between two of them the bucket is emptied.")
+
+
+@dataclass(frozen=True, slots=True)
 class Scenario:
     """A replay: where, what machine, what it is to do, and what goes wrong."""
 
@@ -104,6 +121,7 @@ class Scenario:
         10.0, unit="s", minimum=0.0, maximum=3600.0, doc="How long the station takes to answer a request for help."
     )
     modes: tuple[ModeAt, ...] = part(tuple, key="mode")
+    loading: LoadingPlan = part(LoadingPlan)
     limits: Limits = part(Limits)
     link: LinkSettings = part(LinkSettings)
     faults: tuple[FaultSettings, ...] = part(tuple, key="fault")
@@ -133,7 +151,7 @@ class Scenario:
     @property
     def who(self) -> str:
         """Who drives."""
-        return self.driver or (AUTONOMOUS if self.goal else OPERATOR)
+        return self.driver or (AUTONOMOUS if self.goal or self.kind != "tram" else OPERATOR)
 
 
 def _check_target(fault: FaultSettings) -> None:
