@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from typing import NamedTuple, Protocol
 
 import numpy as np
@@ -26,30 +25,57 @@ class Controllers(NamedTuple):
     weigh: Controller
 
 
-class Rule(Protocol):
-    """Whether another attempt pays (`lhdmap.loading.attempts`)."""
+class Decision(Protocol):
+    """What a rule says: whether to go on, why, and the figures of that."""
 
-    def __call__(self, fills: Sequence[float]) -> tuple[bool, str]:
-        """Return whether to go on after attempts with these fills, the last one of now, and why."""
+    @property
+    def go_on(self) -> bool:
+        """Whether there is to be another attempt."""
+        ...
+
+    @property
+    def text(self) -> str:
+        """Why, in a sentence."""
+        ...
+
+    @property
+    def values(self) -> tuple[tuple[str, float], ...]:
+        """The figures of that sentence."""
+        ...
+
+
+class Rule(Protocol):
+    """Whether another attempt pays."""
+
+    def decide(self, fill: float, fill_std: float, attempt: int) -> Decision:
+        """Return what to do after the `attempt`-th attempt (1 is the first) with a fill as weighed."""
         ...
 
 
 class Driven:
     """A part that is one controller; where it ends, `event`, or failure where it says so."""
 
-    def __init__(self, controller: Controller, event: Event, lip_m: FloatArray) -> None:
-        self._controller, self._event, self._lip_m = controller, event, lip_m
-        self.phase = ""
+    phase = ""
+
+    def __init__(self, controller: Controller, event: Event, lip_m: FloatArray, toe_std_m: float) -> None:
+        self._controller, self._event, self._lip_m, self._toe_std_m = controller, event, lip_m, toe_std_m
 
     def begin(self, moment: Moment) -> None:
         """Begin the controller."""
-        self._controller.begin(told_toe(moment, self._lip_m))
+        self._controller.begin(self._told(moment))
 
     def step(self, moment: Moment) -> Step:
         """Step the controller."""
-        turn = self._controller.step(told_toe(moment, self._lip_m))
+        turn = self._controller.step(self._told(moment))
         event = None if not turn.ended else Event.FAILED if value_of(turn, FAILED) > 0.0 else self._event
         return Step("", event, turn.ended, pedals=turn.pedals, values=turn.values)
+
+    def _told(self, moment: Moment) -> Signals:
+        """Return the signals with the way of the lip to the toe along the machine's axis, where they do not say it."""
+        signals = moment.signals
+        if moment.target is None or math.isfinite(signals.toe_m):
+            return signals
+        return signals._replace(toe_m=toe_m(moment.target, moment, self._lip_m), toe_std_m=self._toe_std_m)
 
 
 class Weighing:
@@ -75,8 +101,9 @@ class Weighing:
         if value_of(turn, FAILED) > 0.0 or not math.isfinite(fill):
             return Step("", Event.FAILED, turn.ended, pedals=pedals, values=turn.values)
         self.fills.append(fill)
-        again, why = self._rule(tuple(self.fills))
-        return Step("", Event.AGAIN if again else Event.ENOUGH, why, pedals=pedals, values=turn.values)
+        said = self._rule.decide(fill, value_of(turn, FILL_STD, math.nan), len(self.fills))
+        values = tuple(dict([*turn.values, *said.values]).items())
+        return Step("", Event.AGAIN if said.go_on else Event.ENOUGH, said.text, pedals=pedals, values=values)
 
 
 def value_of(turn: Turn, name: str, default: float = 0.0) -> float:
@@ -84,18 +111,8 @@ def value_of(turn: Turn, name: str, default: float = 0.0) -> float:
     return next((value for one, value in turn.values if one == name), default)
 
 
-def told_toe(moment: Moment, lip_m: FloatArray) -> Signals:
-    """Return the signals with the way of the lip to the pile's toe, where the machine itself does not say it.
-
-    `lip_m` (2,) in `base_link`; the way is along the machine's axis to the line through the limits.
-    """
-    signals = moment.signals
-    if moment.target is None or math.isfinite(signals.toe_m):
-        return signals
-    return signals._replace(toe_m=_toe_m(moment.target, moment, lip_m))
-
-
-def _toe_m(target: Target, moment: Moment, lip_m: FloatArray) -> float:
+def toe_m(target: Target, moment: Moment, lip_m: FloatArray) -> float:
+    """Return the way (m) of the lip (2,), in `base_link`, straight ahead to the line through the limits; NaN: there is none."""
     right, left = target.limits_in(moment.motion)
     E = left - right
     if abs(E[1]) < 1e-6:

@@ -42,8 +42,8 @@ class LoadingTask:
         self._parts: dict[State, Part] = {
             State.IDENTIFICATION: Identification(model, settings),
             State.POSITIONING: Positioning(model, bodies, settings),
-            State.CHARGING: Driven(controllers.charge, Event.COLLISION, lip),
-            State.EXCAVATION: Driven(controllers.dig, Event.DUG, lip),
+            State.CHARGING: Driven(controllers.charge, Event.COLLISION, lip, settings.toe_std_m),
+            State.EXCAVATION: Driven(controllers.dig, Event.DUG, lip, settings.toe_std_m),
             State.PULL_BACK: PullBack(model, bodies, settings, controllers.shake, self._trail),
             State.WEIGHING: self._weighing,
         }

@@ -76,6 +76,14 @@ class LoadingSettings:
     pile_hits: int = setting(
         3, minimum=0, maximum=1000, doc="Scan points at the pile that show that it is still there, before another try."
     )
+    toe_std_m: float = setting(
+        0.15,
+        unit="m",
+        minimum=0.0,
+        maximum=5.0,
+        source=f"{_FINDINGS}, section 6",
+        doc="Deviation of the toe's place, as the detector of the charge is told.",
+    )
     reach_m: float = setting(
         11.0,
         unit="m",

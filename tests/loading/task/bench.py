@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from lhdmap.driving.motion import Motion, Setpoint, Setpoints
@@ -98,9 +98,21 @@ def controllers(fill: float = 0.9) -> Controllers:
     return Controllers(charge, dig, shake, weigh)
 
 
-def once(fills: Sequence[float]) -> tuple[bool, str]:
-    """No second attempt."""
-    return False, "once"
+class Said(NamedTuple):
+    go_on: bool
+    text: str
+    values: tuple[tuple[str, float], ...] = ()
+
+
+class Until:
+    """A rule: on until a fill, so often at most."""
+
+    def __init__(self, fill: float = 0.85, most: int = 4) -> None:
+        self._fill, self._most = fill, most
+
+    def decide(self, fill: float, fill_std: float, attempt: int) -> Said:
+        on = fill < self._fill and attempt < self._most
+        return Said(on, f"fill {fill:.2f} after {attempt}")
 
 
 @dataclass
@@ -222,6 +234,6 @@ def bench(
 ) -> Bench:
     """A bench with simple controllers."""
     settings = more.pop("settings", LoadingSettings())
-    rule = more.pop("rule", once)
+    rule = more.pop("rule", Until())
     task = LoadingTask(MODEL, BODIES, more.pop("controllers", None) or controllers(fill), rule, settings)
     return Bench(drift or Drift(), task, np.array(start), **more)
