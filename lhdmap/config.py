@@ -14,6 +14,7 @@ from lhdmap.executor.settings import ExecutorSettings
 from lhdmap.guidance.settings import GuidanceSettings
 from lhdmap.integration.integrator import IntegrationSettings
 from lhdmap.landmarks.settings import LandmarkSettings
+from lhdmap.loading.task_settings import LoadingSettings
 from lhdmap.localization.settings import LocalizationSettings
 from lhdmap.movement.settings import MovementSettings
 from lhdmap.navigation.settings import NavigationSettings
@@ -60,6 +61,7 @@ class Settings:
     navigation: NavigationSettings = field(default_factory=NavigationSettings)
     guidance: GuidanceSettings = field(default_factory=GuidanceSettings)
     executor: ExecutorSettings = field(default_factory=ExecutorSettings)
+    loading: LoadingSettings = field(default_factory=LoadingSettings)
     pile: PileSettings = field(default_factory=PileSettings)
     figure9: Figure9Constants = field(default_factory=Figure9Constants)
     figure9_repaired: RepairedConstants = field(default_factory=RepairedConstants)

@@ -40,13 +40,17 @@ class Signals(NamedTuple):
 
 
 class Pedals(NamedTuple):
-    """What a controller asks for; the shares are those of `lhd_msgs/MachineCommand`. The joint is held where it is."""
+    """What a controller asks for; the shares are those of `lhd_msgs/MachineCommand`.
+
+    `steering_rate_rps`: 0, the joint is held where it is; positioning alone turns it.
+    """
 
     propel: float = 0.0
     tilt: float = 0.0
     lift: float = 0.0
     full_rpm: bool = False
     brake: bool = False
+    steering_rate_rps: float = 0.0
 
 
 class Turn(NamedTuple):

@@ -1,0 +1,109 @@
+"""Rock pile identification: the machine rolls on while perception looks; the pile is known in time, or help is asked for."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import numpy.typing as npt
+
+from lhdmap.driving.model import DriveModel
+from lhdmap.geometry import se2
+from lhdmap.loading.moment import Moment, Step, Target, pose_of
+from lhdmap.loading.states import Event
+from lhdmap.loading.task_settings import LoadingSettings
+from lhdmap.messages import FloatArray
+from lhdmap.pile.result import PileEstimate
+
+_BEFORE_M, _BEHIND_M = 0.7, 3.0  # hits on a face lie behind its toe, by the scanner's height over its slope
+
+
+class Identification:
+    """Takes an estimate that is loadable and measured; refuses one that is not; asks where there is none 15 m before the pile."""
+
+    def __init__(self, model: DriveModel, settings: LoadingSettings) -> None:
+        self._model, self._settings = model, settings
+        self.phase = "look"
+        self._since_ns, self._near = 0, False
+
+    def begin(self, moment: Moment) -> None:
+        """Begin to look, from afar, or near the pile before another attempt."""
+        self._since_ns = moment.now_ns
+        self._near = self._distance_m(moment) < self._settings.identify_m
+
+    def step(self, moment: Moment) -> Step:
+        """Return what navigation drives until the pile is known."""
+        estimate, stamp_ns, why = self._estimate(moment)
+        target = target_of(estimate, stamp_ns) if estimate is not None else None
+        if target is not None and (why := self._gone(target, moment)) == "":
+            return Step(self.phase, Event.PILE_FOUND, "loadable", moment.approach, target=target)
+        far_m = self._distance_m(moment)
+        late = far_m < self._settings.identify_m
+        if self._near:
+            late = moment.now_ns - self._since_ns > round(self._settings.look_s * 1e9)
+        if late:
+            unfit = estimate is not None and estimate.status not in (None, "none", "loadable")
+            event = Event.PILE_UNFIT if unfit else Event.PILE_UNKNOWN
+            return Step(self.phase, event, why, values=(("distance_m", far_m),))
+        return Step(self.phase, directive=None if self._near else moment.approach)
+
+    def _estimate(self, moment: Moment) -> tuple[PileEstimate | None, int, str]:
+        """Return the estimate that counts, its stamp, and what is to be said where it does not do."""
+        if moment.marked is not None:
+            return moment.marked, moment.now_ns, "the marked pile has no limits"
+        if moment.pile is None:
+            return None, 0, "no estimate of a pile"
+        stamp_ns, _, estimate = moment.pile
+        if stamp_ns < moment.touched_ns:
+            return None, 0, "no estimate since the pile was dug"
+        said = estimate.reason or f"status {estimate.status}"
+        return estimate, stamp_ns, said if estimate.status != "loadable" else "the pile has no limits"
+
+    def _distance_m(self, moment: Moment) -> float:
+        """Return the way from the joint to the pile's centre, or to the draw point; infinite where neither is known."""
+        place = joint_of(pose_of(moment.motion), self._model)
+        if moment.pile is not None and np.isfinite(moment.pile.estimate.center_m[:2]).all():
+            return float(np.hypot(*(moment.pile.estimate.center_m[:2] - place)))
+        if moment.draw_point_m is not None:
+            return math.hypot(moment.draw_point_m[0] - place[0], moment.draw_point_m[1] - place[1])
+        return math.inf if moment.target is None else float(np.hypot(*(moment.target.center_m - place)))
+
+    def _gone(self, target: Target, moment: Moment) -> str:
+        """Return why a pile that was known before does not count as still there; empty: it does."""
+        if not self._near or self._settings.pile_hits == 0:
+            return ""
+        hits = int(at_pile(moment.walls_m, target.limits_in(moment.motion)).sum())
+        return "" if hits >= self._settings.pile_hits else f"only {hits} scan points where the pile was"
+
+
+def target_of(estimate: PileEstimate, stamp_ns: int) -> Target | None:
+    """Return the pile to load; None where it is not loadable, or not measured."""
+    limits = np.stack([estimate.right_limit_m[:2], estimate.left_limit_m[:2]])
+    if estimate.status != "loadable" or not np.isfinite(limits).all():
+        return None
+    E = limits[1] - limits[0]
+    if float(np.hypot(*E)) < 1e-3:
+        return None
+    center = estimate.center_m[:2] if np.isfinite(estimate.center_m[:2]).all() else limits.mean(axis=0)
+    heading = math.atan2(-E[0], E[1])
+    if estimate.attack is not None and math.isfinite(estimate.attack.heading_rad):
+        heading = estimate.attack.heading_rad
+    return Target(limits.copy(), center.copy(), heading, stamp_ns)
+
+
+def joint_of(base: FloatArray, model: DriveModel) -> FloatArray:
+    """Return the joint (2,) of a pose of `base_link` (3,): the paper's reference point."""
+    return se2.compose(base, np.array([-model.front_m, 0.0, 0.0]))[:2]
+
+
+def at_pile(points_m: FloatArray, limits_m: FloatArray, behind_m: float = _BEHIND_M) -> npt.NDArray[np.bool_]:
+    """Return which points (N, 2) are on the pile between its limits (2, 2; E_R, E_L), bool (N,); one frame.
+
+    `behind_m`: how far behind the toe they may be.
+    """
+    E = limits_m[1] - limits_m[0]
+    d = points_m - limits_m[0]
+    share = d @ E / float(E @ E)
+    behind = d @ np.array([E[1], -E[0]]) / float(np.hypot(*E))
+    found: npt.NDArray[np.bool_] = (share > 0.0) & (share < 1.0) & (behind > -_BEFORE_M) & (behind < behind_m)
+    return found

@@ -1,0 +1,98 @@
+"""The joint angle with which a charge lands on the pile and keeps off the walls: Eqs. (3) to (6) together."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from typing import NamedTuple
+
+import numpy as np
+
+from lhdmap.driving.bodies import Bodies
+from lhdmap.driving.model import DriveModel
+from lhdmap.geometry import se2
+from lhdmap.loading.identification import at_pile
+from lhdmap.loading.positioning import Landing, curvature_pm, landing
+from lhdmap.loading.positioning_boxes import Posture, charging, touches, turned, turning
+from lhdmap.loading.task_settings import LoadingSettings
+from lhdmap.messages import FloatArray
+
+_STEP_RAD = math.radians(0.5)
+_NEAR_M = 14.0
+
+
+class Aim(NamedTuple):
+    """A joint angle to charge with; None where there is none, and then whether the walls alone are what stands against it."""
+
+    bend_rad: float | None
+    walled: bool = False
+
+
+class Aligner:
+    """Finds the joint angle nearest to that of now from which both sides land inside the limits, without touching a wall."""
+
+    def __init__(self, model: DriveModel, bodies: Bodies, settings: LoadingSettings) -> None:
+        self._model, self._bodies, self._settings = model, bodies, settings
+        (_, y0), (x1, y1) = bodies.front_box_m
+        self.corners_m = np.array([[x1, y1], [x1, y0]])
+
+    def lands(self, bend_rad: float, limits_m: FloatArray, *, margin_m: float = 0.0) -> Landing:
+        """Return how a charge from now on lands, the joint held as it is; limits (2, 2) E_R, E_L in `base_link`."""
+        return landing(curvature_pm(bend_rad, self._model), self.corners_m, shrunk(limits_m, margin_m))
+
+    def free(self, bend_rad: float, limits_m: FloatArray, walls_m: FloatArray) -> bool:
+        """Return whether a charge from now on keeps both boxes free of wall points until the lip is at the pile."""
+        landed = self.lands(bend_rad, limits_m)
+        start = Posture(np.zeros(3), bend_rad)
+        return self._sweeps_free(iter(()), start, landed, self._walls(limits_m, walls_m))
+
+    def boxes_free(self, bend_rad: float, limits_m: FloatArray, walls_m: FloatArray) -> bool:
+        """Return whether no wall point is inside a box now: Eq. (6)."""
+        walls = self._walls(limits_m, walls_m)
+        return not touches(Posture(np.zeros(3), bend_rad), walls, self._bodies, self._model, 0.0)
+
+    def aim(self, bend_rad: float, limits_m: FloatArray, walls_m: FloatArray) -> Aim:
+        """Return the angle to turn the joint to; limits (2, 2) and wall points (N, 2) in `base_link`."""
+        walls, margin_m, walled = self._walls(limits_m, walls_m), self._settings.landing_m, False
+        for bend in self._candidates(bend_rad):
+            turn = turned(bend_rad, bend, self._model)
+            limits = se2.transform(se2.inverse(np.array([0.0, 0.0, turn])), limits_m)
+            if not self.lands(bend, limits, margin_m=margin_m).good:
+                continue
+            landed = self.lands(bend, limits)
+            start = Posture(np.array([0.0, 0.0, turn]), bend)
+            if self._sweeps_free(turning(bend_rad, bend, self._model), start, landed, walls):
+                return Aim(bend)
+            walled = True
+        return Aim(None, walled)
+
+    def _candidates(self, bend_rad: float) -> Iterator[float]:
+        """Yield joint angles, the nearest to that of now first."""
+        most, reach = self._model.max_articulation_rad, math.radians(self._settings.align_deg)
+        for k in range(round(reach / _STEP_RAD) + 1):
+            for bend in {bend_rad - k * _STEP_RAD: 0, bend_rad + k * _STEP_RAD: 0}:
+                if abs(bend) <= most:
+                    yield bend
+
+    def _sweeps_free(self, turn: Iterator[Posture], start: Posture, landed: Landing, walls_m: FloatArray) -> bool:
+        """Return whether the boxes stay free while the joint turns, and then along the charge."""
+        way_m = landed.way_m if math.isfinite(landed.way_m) else 0.0
+        curvature = curvature_pm(start.bend_rad, self._model)
+        margin_m = self._settings.wall_m
+        for postures in (turn, charging(start, curvature, way_m)):
+            if any(touches(one, walls_m, self._bodies, self._model, margin_m) for one in postures):
+                return False
+        return True
+
+    def _walls(self, limits_m: FloatArray, points_m: FloatArray) -> FloatArray:
+        """Return the points that are wall: near, and not on the pile."""
+        near = np.hypot(points_m[:, 0], points_m[:, 1]) < _NEAR_M
+        return points_m[near & ~at_pile(points_m, limits_m)]
+
+
+def shrunk(limits_m: FloatArray, margin_m: float) -> FloatArray:
+    """Return limits (2, 2) drawn in by a margin at both ends, by a third of their width at most."""
+    E = limits_m[1] - limits_m[0]
+    width = float(np.hypot(*E))
+    inward = E / width * min(margin_m, width / 3.0)
+    return np.stack([limits_m[0] + inward, limits_m[1] - inward])

@@ -1,0 +1,131 @@
+"""Positioning: guided to a set distance without stopping, steering corrected until the charge lands, bucket down (Figs. 11 to 14).
+
+approach -> align -> lower: the bucket goes down only once the machine is aimed and stands.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from lhdmap.driving.bodies import Bodies
+from lhdmap.driving.model import DriveModel
+from lhdmap.guidance.directive import WAY, Directive
+from lhdmap.loading.identification import joint_of, target_of
+from lhdmap.loading.lowering import Lowering
+from lhdmap.loading.moment import Moment, Step, Target, pose_of
+from lhdmap.loading.positioning_align import Aim, Aligner
+from lhdmap.loading.positioning_path import approach_path
+from lhdmap.loading.signals import Pedals
+from lhdmap.loading.states import Event
+from lhdmap.loading.task_settings import LoadingSettings
+from lhdmap.messages import FloatArray
+
+APPROACH, ALIGN, LOWER = "approach", "align", "lower"
+_REPLAN_M, _BACKSTOP_M = 0.3, 2.0
+_LOOK_NS = 200_000_000
+_REACHED_RAD = math.radians(0.4)
+_GAIN_PS = 1.0  # rate per angle: the joint answers after dead time and lag, 0.45 s
+_STILL_RPS = math.radians(0.5)
+
+
+class Positioning:
+    """Brings the machine before the pile so that driving straight on with the joint held ends in it."""
+
+    def __init__(self, model: DriveModel, bodies: Bodies, settings: LoadingSettings) -> None:
+        self._model, self._settings = model, settings
+        self._nose_m = float(bodies.front_box_m[1, 0])
+        self._aligner, self._lowering = Aligner(model, bodies, settings), Lowering(settings)
+        self.phase = APPROACH
+        self._path: FloatArray | None = None
+        self._planned: Target | None = None
+        self._aim, self._aimed_ns = Aim(None), 0
+
+    def begin(self, moment: Moment) -> None:  # noqa: ARG002
+        """Begin with the approach."""
+        self.phase, self._path, self._planned = APPROACH, None, None
+
+    def step(self, moment: Moment) -> Step:
+        """Return what is to be done now."""
+        target = self._refreshed(moment)
+        if target is None:
+            return Step(self.phase, Event.MISSED, "no pile to aim at")
+        if self.phase == APPROACH:
+            step = self._approach(moment, target)
+        elif self.phase == ALIGN:
+            step = self._align(moment, target)
+        else:
+            step = self._lower(moment, target)
+        return step._replace(target=target)
+
+    def _refreshed(self, moment: Moment) -> Target | None:
+        """Return the pile, newer where perception goes on to see the same one; near it the first look is the best."""
+        known, pile = moment.target, moment.pile
+        if known is None or pile is None or self.phase != APPROACH or pile.stamp_ns <= known.stamp_ns:
+            return known
+        newer = target_of(pile.estimate, pile.stamp_ns)
+        if newer is None or float(np.hypot(*(newer.center_m - known.center_m))) > self._settings.pile_moved_m:
+            return known
+        return newer
+
+    def _approach(self, moment: Moment, target: Target) -> Step:
+        """Drive on by guidance until the joint is at the set distance from the pile's centre."""
+        settings = self._settings
+        far_m = float(np.hypot(*(target.center_m - joint_of(pose_of(moment.motion), self._model))))
+        if far_m <= settings.reach_m:
+            self.phase, self._aimed_ns = ALIGN, -_LOOK_NS
+            return self._align(moment, target)
+        before_m = settings.reach_m - self._model.front_m
+        moved = self._planned is None or float(np.abs(target.limits_m - self._planned.limits_m).max()) > _REPLAN_M
+        if self._path is None or moved:
+            self._path = approach_path(moment.motion, target, before_m, settings.approach_kmh / 3.6)
+            self._planned = target
+        left = np.hypot(*(self._path[:, :2] - target.limits_m.mean(axis=0)).T)
+        stop_m = float(self._path[int(left.argmin()), WAY]) - before_m + _BACKSTOP_M
+        return Step(APPROACH, directive=Directive(moment.now_ns, 1, self._path, stop_m))
+
+    def _align(self, moment: Moment, target: Target) -> Step:
+        """Turn the joint until both sides land, creeping on while there is room; Eq. (6) all the while."""
+        settings, motion, bend = self._settings, moment.motion, moment.motion.articulation_rad
+        limits = target.limits_in(motion)
+        if not self._aligner.boxes_free(bend, limits, moment.walls_m):
+            return Step(ALIGN, Event.BLOCKED, "a wall point is inside a body's box")
+        if moment.now_ns - self._aimed_ns >= _LOOK_NS:
+            self._aim, self._aimed_ns = self._aligner.aim(bend, limits, moment.walls_m), moment.now_ns
+        if self._aim.bend_rad is None:
+            return self._cannot(moment)
+        off = self._aim.bend_rad - bend
+        landed = self._aligner.lands(bend, limits)
+        still = abs(motion.articulation_rate_rps) < _STILL_RPS
+        if abs(off) < _REACHED_RAD and still and landed.good:
+            self.phase = LOWER
+            self._lowering.begin(moment.signals)
+            return self._lower(moment, target)
+        most = math.radians(settings.align_dps)
+        rate = 0.0 if abs(off) < _REACHED_RAD else min(max(_GAIN_PS * off, -most), most)
+        room = landed.way_m > settings.run_up_m
+        pedals = Pedals(settings.creep if room else 0.0, brake=not room, steering_rate_rps=rate)
+        return Step(ALIGN, pedals=pedals)
+
+    def _cannot(self, moment: Moment) -> Step:
+        """Say so once it stands: what is seen while it rolls may look otherwise from where it stops."""
+        if abs(moment.motion.speed_mps) > self._settings.standing_mps:
+            return Step(ALIGN, pedals=Pedals(brake=True))
+        if self._aim.walled:
+            return Step(ALIGN, Event.BLOCKED, "each angle that lands on the pile touches a wall")
+        return Step(ALIGN, Event.MISSED, "no joint angle within reach lands both sides on the pile")
+
+    def _lower(self, moment: Moment, target: Target) -> Step:
+        """Lower the bucket at rest; at last look at the charge once more."""
+        turn = self._lowering.step(moment.signals)
+        standing = abs(moment.motion.speed_mps) < self._settings.standing_mps
+        if not turn.ended or not standing:
+            return Step(LOWER, pedals=turn.pedals._replace(brake=True))
+        limits, bend = target.limits_in(moment.motion), moment.motion.articulation_rad
+        landed = self._aligner.lands(bend, limits)
+        if not landed.good or not self._aligner.free(bend, limits, moment.walls_m):
+            self.phase, self._aimed_ns = ALIGN, -_LOOK_NS
+            return Step(ALIGN, pedals=Pedals(brake=True))
+        values = (*turn.values, ("bend_rad", bend), ("way_m", landed.way_m), ("middle", landed.middle))
+        return Step(LOWER, Event.PLACED, turn.ended, pedals=Pedals(brake=True), values=values)

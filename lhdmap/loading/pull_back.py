@@ -1,0 +1,116 @@
+"""Pull back: the bucket is retracted, guidance drives back by the way the machine came, the bucket is shaken (section 3.5)."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from lhdmap.driving.bodies import Bodies
+from lhdmap.driving.lead import lead_of
+from lhdmap.driving.model import DriveModel
+from lhdmap.driving.motion import Motion
+from lhdmap.guidance.directive import WAY, Directive
+from lhdmap.loading.moment import Moment, Step
+from lhdmap.loading.positioning_path import back_path
+from lhdmap.loading.signals import Controller, Pedals
+from lhdmap.loading.states import Event
+from lhdmap.loading.task_settings import LoadingSettings
+from lhdmap.messages import FloatArray
+
+RACK, BACK, SHAKE = "rack", "back", "shake"
+_ARRIVED_M = 0.5
+_TRAIL_M, _STEP_M = 60.0, 0.25
+
+
+class Trail:
+    """The way the machine came by: its motions each 0.25 m, the oldest forgotten."""
+
+    def __init__(self) -> None:
+        self.motions: list[Motion] = []
+
+    def add(self, motion: Motion) -> None:
+        """Take a motion."""
+        last = self.motions[-1] if self.motions else None
+        if last is None or np.hypot(motion.x_m - last.x_m, motion.y_m - last.y_m) >= _STEP_M:
+            self.motions.append(motion)
+            del self.motions[: -round(_TRAIL_M / _STEP_M)]
+
+    def behind(self, motion: Motion) -> list[Motion]:
+        """Return what lies behind a motion: the trail up to its place nearest to there."""
+        return self.motions[: self._nearest(motion) + 1]
+
+    def off_m(self, motion: Motion) -> float:
+        """Return how far a motion is from the trail; infinite where there is none."""
+        if not self.motions:
+            return float("inf")
+        near = self.motions[self._nearest(motion)]
+        return float(np.hypot(motion.x_m - near.x_m, motion.y_m - near.y_m))
+
+    def forget(self) -> None:
+        """Begin anew."""
+        self.motions = []
+
+    def _nearest(self, motion: Motion) -> int:
+        if not self.motions:
+            return -1
+        places = np.array([[one.x_m, one.y_m] for one in self.motions])
+        return int(np.hypot(places[:, 0] - motion.x_m, places[:, 1] - motion.y_m).argmin())
+
+
+class PullBack:
+    """Three phases; the limit of the state counts over all of them."""
+
+    def __init__(
+        self, model: DriveModel, bodies: Bodies, settings: LoadingSettings, shake: Controller, trail: Trail
+    ) -> None:
+        self._rear, self._settings, self._shake, self._trail = lead_of(-1, model, bodies), settings, shake, trail
+        self.phase = RACK
+        self._since_ns = 0
+        self._path: FloatArray | None = None
+        self._stop_m = 0.0
+
+    def begin(self, moment: Moment) -> None:
+        """Begin with retracting the bucket."""
+        self.phase, self._since_ns, self._path = RACK, moment.now_ns, None
+
+    def step(self, moment: Moment) -> Step:
+        """Return what is to be done now."""
+        if self.phase == RACK:
+            return self._rack(moment)
+        return self._back(moment) if self.phase == BACK else self._shaken(moment)
+
+    def _rack(self, moment: Moment) -> Step:
+        """Retract the bucket; one that is buried too deep is pulled out as it is."""
+        settings = self._settings
+        over = moment.now_ns - self._since_ns > round(settings.rack_s * 1e9)
+        if moment.signals.bucket_rad < -settings.racked_rad and not over:
+            return Step(RACK, pedals=Pedals(tilt=1.0, brake=True))
+        self.phase = BACK
+        return self._back(moment)
+
+    def _back(self, moment: Moment) -> Step:
+        """Drive back by guidance over the set distance."""
+        motion, settings = moment.motion, self._settings
+        if self._path is None:
+            trail = self._trail.behind(motion)
+            self._path = back_path(motion, trail, self._rear, settings.pull_back_m, settings.back_kmh / 3.6)
+            self._stop_m = self._along_m(motion) + settings.pull_back_m
+        left_m = self._stop_m - self._along_m(motion)
+        if left_m < _ARRIVED_M and abs(motion.speed_mps) < settings.standing_mps:
+            self.phase = SHAKE
+            self._shake.begin(moment.signals)
+            return self._shaken(moment)
+        return Step(BACK, directive=Directive(moment.now_ns, -1, self._path, self._stop_m))
+
+    def _along_m(self, motion: Motion) -> float:
+        assert self._path is not None  # noqa: S101  # in this phase
+        x, y, *_ = self._rear.state(motion)
+        near = int(np.hypot(self._path[:, 0] - x, self._path[:, 1] - y).argmin())
+        heading = self._path[near, 2]
+        ahead = np.cos(heading) * (x - self._path[near, 0]) + np.sin(heading) * (y - self._path[near, 1])
+        return float(self._path[near, WAY] + ahead)
+
+    def _shaken(self, moment: Moment) -> Step:
+        """Shake what lies loose off the bucket's rim."""
+        turn = self._shake.step(moment.signals)
+        event = Event.BACKED if turn.ended else None
+        return Step(SHAKE, event, turn.ended, pedals=turn.pedals._replace(propel=0.0, brake=True), values=turn.values)
