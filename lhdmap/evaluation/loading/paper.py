@@ -49,9 +49,7 @@ def paper_loads() -> list[Load]:
         digs = tuple(Attempt(0.0, row.duration_s, fill) for row, fill in zip(rows, fills, strict=False))
         loads += [Load(f"paper {len(loads) + i + 1}", digs) for i in range(kind.n)]
     early = Attempt(0.0, float("nan"), early=True)
-    return [
-        Load(load.log, (early, *load.attempts)) if i < EARLY_TRIGGERS else load for i, load in enumerate(loads)
-    ]
+    return [Load(load.log, (early, *load.attempts)) if i < EARLY_TRIGGERS else load for i, load in enumerate(loads)]
 
 
 def _before(kinds: list[Printed], rows: list[Printed]) -> list[float]:

@@ -68,7 +68,9 @@ def digs_of(signals: LoadingSignals) -> list[Span]:
 def _digs(signals: LoadingSignals, span: Span) -> bool:
     """Return whether boom or bucket moved, against a pressure where the log has one."""
     rows = slice(span.first, span.end)
-    turned = [np.ptp(v[np.isfinite(v)]) for v in (signals.boom_rad[rows], signals.bucket_rad[rows]) if np.isfinite(v).any()]
+    turned = [
+        np.ptp(v[np.isfinite(v)]) for v in (signals.boom_rad[rows], signals.bucket_rad[rows]) if np.isfinite(v).any()
+    ]
     if turned and max(turned) < _TURNED_RAD:
         return False
     pressure = signals.transmission_bar[rows]
@@ -82,14 +84,18 @@ def weighed_in(signals: LoadingSignals, span: Span, settings: WeighingSettings) 
         still &= ~(np.abs(signals.propel) > _ASKED) & ~(np.abs(signals.speed_mps) > _STILL_MPS)
         still &= ~(np.abs(signals.tilt) > _ASKED) & ~(np.abs(signals.lift) > _ASKED) & np.isfinite(signals.lift_bar)
     still[: span.first] = still[span.end :] = False
-    spans = [one for one in spans_of(still, least_s=_SETTLED_S) if np.ptp(signals.boom_rad[one.first : one.end]) < _NEAR_RAD]
+    spans = [
+        one for one in spans_of(still, least_s=_SETTLED_S) if np.ptp(signals.boom_rad[one.first : one.end]) < _NEAR_RAD
+    ]
     if not spans:
         return math.nan, math.nan
     last = spans[-1]
     first = max(last.first + round(_SETTLED_S / STEP_S / 2), last.end - round(_WINDOW_S / STEP_S))
     rows = signals.lift_bar[first : last.end]
     fill = settings.fill_per_bar * float(rows.mean()) - settings.fill_offset
-    std_bar = math.hypot(settings.friction_bar, settings.zero_bar, float(rows.std()) / math.sqrt(max(len(rows) / 4.0, 1.0)))
+    std_bar = math.hypot(
+        settings.friction_bar, settings.zero_bar, float(rows.std()) / math.sqrt(max(len(rows) / 4.0, 1.0))
+    )
     return fill, math.hypot(settings.fill_per_bar * std_bar, settings.centre_share * fill)
 
 

@@ -15,7 +15,18 @@ STEP_S = 0.05
 ROLES = ("command", "joints", "transmission_pressure", "lift_pressure", "tachometer", "mode")
 _HELD_S = 0.5
 _BAR_PA = 1e5
-_NAMES = ("propel", "tilt", "lift", "full_rpm", "brake", "boom_rad", "bucket_rad", "transmission_bar", "lift_bar", "speed_mps")
+_NAMES = (
+    "propel",
+    "tilt",
+    "lift",
+    "full_rpm",
+    "brake",
+    "boom_rad",
+    "bucket_rad",
+    "transmission_bar",
+    "lift_bar",
+    "speed_mps",
+)
 
 
 class LoadingSignals(NamedTuple):
@@ -37,7 +48,7 @@ class LoadingSignals(NamedTuple):
     @property
     def time_s(self) -> FloatArray:
         """Times of the grid after its start."""
-        return np.arange(len(self.propel)) * STEP_S
+        return STEP_S * np.arange(len(self.propel), dtype=float)
 
     def any_of(self, name: str) -> bool:
         """Return whether the log has values of a name."""
@@ -82,8 +93,8 @@ class LoadingCollector:
             return None
         start_ns = min(stamps)
         grid_ns = start_ns + np.arange(int((max(stamps) - start_ns) * 1e-9 / STEP_S) + 1) * round(STEP_S * 1e9)
-        columns = [_held(self._samples[name], grid_ns) for name in _NAMES]
-        return LoadingSignals(start_ns, *columns, self._mode(grid_ns))
+        columns = (_held(self._samples[name], grid_ns) for name in _NAMES)
+        return LoadingSignals._make((start_ns, *columns, self._mode(grid_ns)))
 
     def _mode(self, grid_ns: npt.NDArray[np.int64]) -> npt.NDArray[np.object_]:
         """Return the mode told last, before the first the first; empty texts where none was told."""
