@@ -15,6 +15,7 @@ from lhdmap.simulation.ground.records import Record
 
 GRAVITY_MPS2 = 9.81
 NOISE_STEP_M = 0.02
+_STANDS_M = 1e-4  # a face steeper by less than this over a cell stands
 _COVER_M = 0.4  # depth from which on the rock holds the lip with all its strength
 _SLOW_MPS = 0.2
 _AHEAD_M = 0.10  # where the depth over the lip is taken
@@ -58,8 +59,10 @@ def _sub_step(
         cut(state, rig, rock, heights, max(before - moved, state.begun_m), state.lip_x_m)
         state.begun_m = state.lip_x_m
     in_pile = state.embed_m > 0.0 or height_at(heights, rock, state.lip_x_m + rock.step_m) > state.lip_z_m + 0.02
-    slide(state, rig, rock, heights, -math.expm1(-step_s * rock.flow * 100.0), in_pile)
     spill(state, rig, rock, heights, step_s)
+    if state.busy > 0.0:
+        worst = slide(state, rig, rock, heights, -math.expm1(-step_s * rock.slide_per_s), in_pile)
+        state.busy = 1.0 if worst > _STANDS_M or in_pile else 0.0
     if state.speed_mps < 0.0:
         state.begun_m = min(state.begun_m, state.lip_x_m)
 

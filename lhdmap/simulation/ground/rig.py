@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from lhdmap.machine import Machine
-from lhdmap.simulation.ground.records import RIG, Record, record
+from lhdmap.simulation.ground.records import Record, Rig, record
 
 _BAR_PA = 1e5
 _WEIGHED_RAD = 0.2  # boom at which Table 2 holds
@@ -19,8 +19,7 @@ def rig_of(machine: Machine, tilt_factor: float = 1.0) -> Record:
     size, drive, linkage, digging = machine.dimensions, machine.drive, machine.linkage, machine.digging
     displacement = 1e-3 * digging.displacement_l
     leak_mps = digging.leakage * digging.first_gear_mps
-    return record(
-        RIG,
+    return record(Rig(
         mass_kg=drive.mass_kg,
         wheelbase_m=size.wheelbase_m,
         gravity_centre_m=digging.gravity_centre_m,
@@ -61,7 +60,7 @@ def rig_of(machine: Machine, tilt_factor: float = 1.0) -> Record:
         floor_stiffness=1e3 * digging.floor_stiffness_kn_m,
         brake_n=machine.brakes.deceleration_mps2 * drive.mass_kg,
         brake_ramp_s=machine.brakes.ramp_s,
-    )
+    ))
 
 
 def tilt_bar(machine: Machine, share: float) -> float:
