@@ -49,27 +49,29 @@ def draw_load(ground: Grounds, seed: int) -> Load:
     rock, face, floor, filling = ground.rock, ground.face, ground.floor, ground.filling
     internal, external = (math.radians(rng.uniform(*both)) for both in (rock.internal_deg, rock.external_deg))
     dry, wet = rng.uniform(*floor.friction), rng.uniform(*floor.wet_friction)
-    numbers = record(Rock(
-        density=1e3 * rock.density_t_m3 * (1.0 + rock.density_spread * rng.uniform(-1.0, 1.0)),
-        hardness=rock.hardness * math.exp(rock.hardness_sigma * rng.standard_normal()),
-        penetration=rock.penetration,
-        rake_factor=rock.rake_factor,
-        loosening=rock.loosening,
-        fee_scale=rock.fee_scale,
-        cohesion_pa=1e3 * rng.uniform(*rock.cohesion_kpa),
-        external_rad=external,
-        tensile_pa=1e3 * rock.tensile_kpa * max(1.0 + rock.tensile_sigma * rng.standard_normal(), 0.2),
-        friction=wet if rng.random() < floor.wet_chance else dry,
-        swell=filling.swell,
-        entering=filling.entering,
-        heap=filling.heap,
-        level_share=filling.level_share,
-        slide_per_s=face.slide_per_s,
-        slope=math.tan(math.radians(rng.uniform(*face.slope_deg))),
-        step_m=CELL_M,
-        lateral_share=face.lateral_share,
-        origin_m=0.0,
-    ))
+    numbers = record(
+        Rock(
+            density=1e3 * rock.density_t_m3 * (1.0 + rock.density_spread * rng.uniform(-1.0, 1.0)),
+            hardness=rock.hardness * math.exp(rock.hardness_sigma * rng.standard_normal()),
+            penetration=rock.penetration,
+            rake_factor=rock.rake_factor,
+            loosening=rock.loosening,
+            fee_scale=rock.fee_scale,
+            cohesion_pa=1e3 * rng.uniform(*rock.cohesion_kpa),
+            external_rad=external,
+            tensile_pa=1e3 * rock.tensile_kpa * max(1.0 + rock.tensile_sigma * rng.standard_normal(), 0.2),
+            friction=wet if rng.random() < floor.wet_chance else dry,
+            swell=filling.swell,
+            entering=filling.entering,
+            heap=filling.heap,
+            level_share=filling.level_share,
+            slide_per_s=face.slide_per_s,
+            slope=math.tan(math.radians(rng.uniform(*face.slope_deg))),
+            step_m=CELL_M,
+            lateral_share=face.lateral_share,
+            origin_m=0.0,
+        )
+    )
     tilt = ground.hydraulic.tilt_factor * max(1.0 + ground.hydraulic.tilt_spread * rng.standard_normal(), 0.4)
     return Load(numbers, bearing_table(internal, external), rng.uniform(*face.crest_m), tilt)
 

@@ -45,9 +45,7 @@ class Hearing:
         moving = abs(truth.wheel_mps) > 1e-6
         load_kg = truth.fill * self._machine.drive.payload_kg
         boom, bucket = state.boom_rad, state.bucket_rad
-        lift = lift_bar(
-            self._machine, boom, load_kg, state.lifting * 1e3 * self._machine.digging.lift_force_kn
-        )
+        lift = lift_bar(self._machine, boom, load_kg, state.lifting * 1e3 * self._machine.digging.lift_force_kn)
         return Signals(
             now_ns=now_ns,
             tacho_mps=truth.wheel_mps + (errors.tacho_mps * noise[0] if moving else 0.0),

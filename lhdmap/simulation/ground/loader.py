@@ -79,7 +79,9 @@ class Loader:
     @property
     def truth(self) -> Truth:
         """What really is; for evaluation, never for a controller."""
-        return truth_of(state_of(self._state), self.machine, self._tonnes, toe_of(self._heights, _ORIGIN_M), self._number)
+        return truth_of(
+            state_of(self._state), self.machine, self._tonnes, toe_of(self._heights, _ORIGIN_M), self._number
+        )
 
     @property
     def pile(self) -> tuple[FloatArray, FloatArray]:

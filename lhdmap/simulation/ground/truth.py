@@ -62,7 +62,10 @@ def truth_of(state: State, machine: Machine, kg_m3: float, toe_m: float, attempt
         content_m3=state.content_m3,
         lip_x_m=state.lip_x_m,
         lip_z_m=state.lip_z_m,
-        floor_rad=linkage.bucket_angle_rad + state.bucket_rad - linkage.bucket_max_rad + linkage.boom_to_bucket * lifted,
+        floor_rad=linkage.bucket_angle_rad
+        + state.bucket_rad
+        - linkage.bucket_max_rad
+        + linkage.boom_to_bucket * lifted,
         toe_m=toe_m - state.lip_x_m,
         speed_mps=speed,
         wheel_mps=wheel,
