@@ -10,7 +10,7 @@ import numpy as np
 from lhdmap.messages import FloatArray
 from lhdmap.simulation.ground.earth import bearing_table
 from lhdmap.simulation.ground.kernel import NOISE_STEP_M
-from lhdmap.simulation.ground.records import ROCK, Record, record
+from lhdmap.simulation.ground.records import Record, Rock, record
 from lhdmap.simulation.ground.sections import Grounds
 
 CELL_M = 0.05
@@ -50,25 +50,27 @@ def draw_load(ground: Grounds, seed: int) -> Load:
     internal, external = (math.radians(rng.uniform(*both)) for both in (rock.internal_deg, rock.external_deg))
     dry, wet = rng.uniform(*floor.friction), rng.uniform(*floor.wet_friction)
     numbers = record(
-        ROCK,
-        density=1e3 * rock.density_t_m3 * (1.0 + rock.density_spread * rng.uniform(-1.0, 1.0)),
-        hardness=rock.hardness * math.exp(rock.hardness_sigma * rng.standard_normal()),
-        penetration=rock.penetration,
-        rake_factor=rock.rake_factor,
-        loosening=rock.loosening,
-        fee_scale=rock.fee_scale,
-        cohesion_pa=1e3 * rng.uniform(*rock.cohesion_kpa),
-        external_rad=external,
-        tensile_pa=1e3 * rock.tensile_kpa * max(1.0 + rock.tensile_sigma * rng.standard_normal(), 0.2),
-        friction=wet if rng.random() < floor.wet_chance else dry,
-        swell=filling.swell,
-        entering=filling.entering,
-        heap=filling.heap,
-        level_share=filling.level_share,
-        flow=face.slide_per_s / 100.0,
-        slope=math.tan(math.radians(rng.uniform(*face.slope_deg))),
-        step_m=CELL_M,
-        lateral_share=face.lateral_share,
+        Rock(
+            density=1e3 * rock.density_t_m3 * (1.0 + rock.density_spread * rng.uniform(-1.0, 1.0)),
+            hardness=rock.hardness * math.exp(rock.hardness_sigma * rng.standard_normal()),
+            penetration=rock.penetration,
+            rake_factor=rock.rake_factor,
+            loosening=rock.loosening,
+            fee_scale=rock.fee_scale,
+            cohesion_pa=1e3 * rng.uniform(*rock.cohesion_kpa),
+            external_rad=external,
+            tensile_pa=1e3 * rock.tensile_kpa * max(1.0 + rock.tensile_sigma * rng.standard_normal(), 0.2),
+            friction=wet if rng.random() < floor.wet_chance else dry,
+            swell=filling.swell,
+            entering=filling.entering,
+            heap=filling.heap,
+            level_share=filling.level_share,
+            slide_per_s=face.slide_per_s,
+            slope=math.tan(math.radians(rng.uniform(*face.slope_deg))),
+            step_m=CELL_M,
+            lateral_share=face.lateral_share,
+            origin_m=0.0,
+        )
     )
     tilt = ground.hydraulic.tilt_factor * max(1.0 + ground.hydraulic.tilt_spread * rng.standard_normal(), 0.4)
     return Load(numbers, bearing_table(internal, external), rng.uniform(*face.crest_m), tilt)

@@ -12,6 +12,7 @@ from lhdmap.simulation.ground.records import Record
 
 BUCKET_LENGTH_M = 1.4  # over which the content spreads
 _PUSHED = 6  # cells ahead of the lip that get what is pushed on
+_REACH = 100  # cells ahead of the lip that slide while it is in the pile
 _DUMPED_RAD = -0.75  # floor angle at which nothing stays in the bucket
 _ROUNDED_RAD = 0.5  # floor angle from which on the whole heap stays
 
@@ -64,7 +65,7 @@ def cut(state: Record, rig: Record, rock: Record, heights: FloatArray, before_m:
     for k in range(max(first, 0), min(last, len(heights) - 1) + 1):
         over = heights[k] - level
         if over > 0.0:
-            heights[k] = level
+            heights[k], state.busy = level, 1.0
             put_ahead(heights, k + 1, rock, take(state, rig, rock, heights, over * rock.step_m))
 
 
@@ -76,9 +77,8 @@ def slide(state: Record, rig: Record, rock: Record, heights: FloatArray, share: 
     """
     drop, worst = rock.slope * rock.step_m, 0.0
     tip = math.floor((state.lip_x_m - rock.origin_m) / rock.step_m + 0.5) if in_pile else -1
-    for k in range(len(heights) - 1):
-        if k < tip:
-            continue
+    last = len(heights) - 1 if tip < 0 else min(tip + _REACH, len(heights) - 1)
+    for k in range(max(tip, 0), last):
         if k == tip:
             level = max(state.lip_z_m, 0.0) + state.content_m3 / (rig.width_m * BUCKET_LENGTH_M)
             excess = heights[k + 1] - level - drop
@@ -93,9 +93,10 @@ def slide(state: Record, rig: Record, rock: Record, heights: FloatArray, share: 
             heights[k] += 0.5 * share * excess
             worst = max(worst, excess)
         elif heights[k] - heights[k + 1] - drop > 0.0:
-            back = 0.5 * share * (heights[k] - heights[k + 1] - drop)
-            heights[k] -= back
-            heights[k + 1] += back
+            excess = heights[k] - heights[k + 1] - drop
+            heights[k] -= 0.5 * share * excess
+            heights[k + 1] += 0.5 * share * excess
+            worst = max(worst, excess)
     return worst
 
 
@@ -108,6 +109,7 @@ def spill(state: Record, rig: Record, rock: Record, heights: FloatArray, step_s:
         return
     lost = over * min(step_s / 0.3, 1.0)
     state.content_m3 -= lost
+    state.busy = 1.0
     state.spilled_m3 += lost
     cell = math.floor((state.lip_x_m - rock.origin_m) / rock.step_m + 0.5)
     put_ahead(heights, cell, rock, lost / (rock.swell * rig.width_m))

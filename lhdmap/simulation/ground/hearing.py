@@ -8,7 +8,7 @@ from collections import deque
 from lhdmap.loading.signals import Signals
 from lhdmap.machine import Machine
 from lhdmap.simulation.ground.draws import generator
-from lhdmap.simulation.ground.records import Record
+from lhdmap.simulation.ground.records import State
 from lhdmap.simulation.ground.rig import lift_bar, tilt_bar
 from lhdmap.simulation.ground.sections import Errors
 from lhdmap.simulation.ground.truth import Truth
@@ -34,20 +34,18 @@ class Hearing:
         self._scan = (0, float("nan"), 0.0)
         self._due_ns, self._walk_m, self._begun_m = -1, 0.0, float("nan")
 
-    def signals(self, now_ns: int, state: Record, truth: Truth) -> Signals:
+    def signals(self, now_ns: int, state: State, truth: Truth) -> Signals:
         """Return what is heard of a state at a moment."""
         errors, noise = self._errors, self._rng.standard_normal(8).tolist()
         if self._begun_m != self._begun_m:
-            self._begun_m, self._due_ns = float(state["x_m"]), now_ns
-        self._past.append((now_ns, truth.speed_mps, float(state["x_m"]) - self._begun_m))
+            self._begun_m, self._due_ns = state.x_m, now_ns
+        self._past.append((now_ns, truth.speed_mps, state.x_m - self._begun_m))
         self._hear_scan(now_ns)
         stamp, speed, travel = self._scan
         moving = abs(truth.wheel_mps) > 1e-6
         load_kg = truth.fill * self._machine.drive.payload_kg
-        boom, bucket = float(state["boom_rad"]), float(state["bucket_rad"])
-        lift = lift_bar(
-            self._machine, boom, load_kg, float(state["lifting"]) * 1e3 * self._machine.digging.lift_force_kn
-        )
+        boom, bucket = state.boom_rad, state.bucket_rad
+        lift = lift_bar(self._machine, boom, load_kg, state.lifting * 1e3 * self._machine.digging.lift_force_kn)
         return Signals(
             now_ns=now_ns,
             tacho_mps=truth.wheel_mps + (errors.tacho_mps * noise[0] if moving else 0.0),
@@ -57,9 +55,9 @@ class Hearing:
             boom_rad=boom + errors.joint_rad * noise[1],
             bucket_rad=bucket + errors.joint_rad * noise[2],
             articulation_rad=errors.joint_rad * noise[3],
-            transmission_bar=max(abs(float(state["pressure_pa"])) / _PA_PER_BAR + errors.pressure_bar * noise[4], 0.0),
+            transmission_bar=max(abs(state.pressure_pa) / _PA_PER_BAR + errors.pressure_bar * noise[4], 0.0),
             lift_bar=max(lift + errors.lift_bar * noise[5], 0.0),
-            tilt_bar=max(tilt_bar(self._machine, float(state["tilting"])) + errors.pressure_bar * noise[6], 0.0),
+            tilt_bar=max(tilt_bar(self._machine, state.tilting) + errors.pressure_bar * noise[6], 0.0),
             toe_m=truth.toe_m + self._toe_error_m,
             toe_std_m=errors.toe_m,
         )

@@ -15,7 +15,12 @@ from lhdmap.simulation.ground.records import Record
 
 GRAVITY_MPS2 = 9.81
 NOISE_STEP_M = 0.02
+_STANDS_M = 1e-4  # a face steeper by less than this over a cell stands
 _COVER_M = 0.4  # depth from which on the rock holds the lip with all its strength
+_RESTING, _RELAXING_S = (
+    0.4,
+    0.2,
+)  # what of the rock's reaction stays on a bucket that is not moved, and how fast it goes
 _SLOW_MPS = 0.2
 _AHEAD_M = 0.10  # where the depth over the lip is taken
 _LOAD_BACK_M = 0.9  # the content's middle behind the lip
@@ -47,7 +52,7 @@ def _sub_step(
     cylinders(state, rig, pedals[1], pedals[2], step_s)
     moved, rise = _move_lip(state, rig, step_s)
     cover = _touch(state, rig, rock, heights, moved, rise, step_s)
-    _rock_forces(state, rig, rock, world, cover, rise)
+    _rock_forces(state, rig, rock, world, cover, pedals, step_s)
     _axles(state, rig, rock)
     drive = transmission(state, rig, step_s)
     _roll(state, rig, drive, pedals[4] > 0.5, step_s)
@@ -58,8 +63,10 @@ def _sub_step(
         cut(state, rig, rock, heights, max(before - moved, state.begun_m), state.lip_x_m)
         state.begun_m = state.lip_x_m
     in_pile = state.embed_m > 0.0 or height_at(heights, rock, state.lip_x_m + rock.step_m) > state.lip_z_m + 0.02
-    slide(state, rig, rock, heights, -math.expm1(-step_s * rock.flow * 100.0), in_pile)
     spill(state, rig, rock, heights, step_s)
+    if state.busy > 0.0:
+        worst = slide(state, rig, rock, heights, -math.expm1(-step_s * rock.slide_per_s), in_pile)
+        state.busy = 1.0 if worst > _STANDS_M or in_pile else 0.0
     if state.speed_mps < 0.0:
         state.begun_m = min(state.begun_m, state.lip_x_m)
 
@@ -93,7 +100,8 @@ def _touch(
 @nb.njit(cache=True, nogil=True)
 def _rock_forces(
     state: Record, rig: Record, rock: Record,
-    world: tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray], cover: float, rise_mps: float,
+    world: tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray], cover: float,
+    pedals: FloatArray, step_s: float,
 ) -> None:  # fmt: skip
     """Set what rock and floor do to the bucket: along the drive, against a lip that rises, against one that is pressed down."""
     heights, table, noise, strikes, bumps = world
@@ -117,9 +125,10 @@ def _rock_forces(
         state.resist_n += state.rock_n
         upward = max(math.cos(plate_rake(psi) + rock.external_rad), 0.0)
         state.up_n = breaking(rock, rig, state.embed_m, cover) + upward * earth
-    down = state.up_n if rise_mps > 1e-3 or state.tilting > 0.0 or state.lifting > 0.0 else 0.0
-    state.tilting = (down - state.press_n) / rig.tilt_force_n
-    state.lifting = (down - state.press_n) / rig.lift_force_n
+    held = 1.0 if pedals[1] > 0.0 or pedals[2] > 0.0 else _RESTING
+    state.down_n += (held * state.up_n - state.down_n) * step_s / (step_s + _RELAXING_S)
+    state.tilting = (state.down_n - state.press_n) / rig.tilt_force_n
+    state.lifting = (state.down_n - state.press_n) / rig.lift_force_n
 
 
 @nb.njit(cache=True, nogil=True)

@@ -20,7 +20,7 @@ from lhdmap.simulation.ground.draws import CELL_M, Attempt, draw_attempt, draw_l
 from lhdmap.simulation.ground.face import capacity, put_ahead, settle
 from lhdmap.simulation.ground.hearing import Hearing
 from lhdmap.simulation.ground.kernel import advance
-from lhdmap.simulation.ground.records import STATE, record
+from lhdmap.simulation.ground.records import State, record, state_of
 from lhdmap.simulation.ground.rig import bucket_for, press_force_n, rig_of
 from lhdmap.simulation.ground.sections import Grounds
 from lhdmap.simulation.ground.truth import Truth, toe_of, truth_of
@@ -44,10 +44,11 @@ class Loader:
         self._seed, self._number, self._now_ns = seed, 0, time_ns
         self._rig = rig_of(self.machine, self._load.tilt_factor)
         self._rock = self._load.rock.copy()
+        self._tonnes = float(self._rock["density"][0] / self._rock["swell"][0])
         self._rock["origin_m"] = _ORIGIN_M
         x = _ORIGIN_M + CELL_M * np.arange(_CELLS)
         self._heights = np.clip(x * self._rock["slope"], 0.0, self._load.crest_m)
-        self._state = record(STATE)
+        self._state = record(State())
         return self._attempt(approach_m)
 
     def retry(self, *, approach_m: float = 7.0) -> Signals:
@@ -73,12 +74,14 @@ class Loader:
         self._now_ns += round(dt_s * 1e9)
         if self._chance.boulder_m3 > 0.0 and self._state["way_m"][0] > _BOULDER_WAY_M:
             self._take_boulder(self._chance.boulder_m3)
-        return self._hearing.signals(self._now_ns, self._state[0], self.truth)
+        return self._hearing.signals(self._now_ns, state_of(self._state), self.truth)
 
     @property
     def truth(self) -> Truth:
         """What really is; for evaluation, never for a controller."""
-        return truth_of(self._state[0], self._rig[0], self._rock[0], self._heights, self.machine, self._number)
+        return truth_of(
+            state_of(self._state), self.machine, self._tonnes, toe_of(self._heights, _ORIGIN_M), self._number
+        )
 
     @property
     def pile(self) -> tuple[FloatArray, FloatArray]:
@@ -105,7 +108,7 @@ class Loader:
         )
         press = press_force_n(self.machine, self.ground.floor.press_bar) / float(self._rig["floor_stiffness"][0])
         bucket = bucket_for(self.machine, chance.lip_high_m if chance.lip_high_m > 0.0 else -press)
-        state[:] = record(STATE, **kept)
+        state[:] = record(State(**kept))
         state["bucket_rad"], state["boom_rad"] = bucket, self.machine.linkage.boom_min_rad
         state["engine"] = self._rig["idle"]
         state["x_m"] = toe - approach_m
@@ -116,7 +119,7 @@ class Loader:
         state["lip_x_m"] = state["begun_m"] = toe - approach_m
         advance(state, self._rig, self._rock, self._world, np.array([0.0, 0.0, 0.0, 0.0, 1.0]), 1, self._sub_step_s)
         self._hearing.begin(self._seed, self._number, chance.toe_error_m)
-        return self._hearing.signals(self._now_ns, state[0], self.truth)
+        return self._hearing.signals(self._now_ns, state_of(state), self.truth)
 
     def _set_chance(self, chance: Attempt) -> None:
         self._chance = chance

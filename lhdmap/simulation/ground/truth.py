@@ -4,13 +4,12 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-import numpy as np
+import numba as nb
 
 from lhdmap.machine import Machine
 from lhdmap.messages import FloatArray
 from lhdmap.simulation.ground.draws import CELL_M
-from lhdmap.simulation.ground.linkage import floor_angle
-from lhdmap.simulation.ground.records import Record
+from lhdmap.simulation.ground.records import State
 
 _TOE_M = 0.1  # height from which on it is the pile
 
@@ -44,35 +43,41 @@ class Truth(NamedTuple):
     contact: bool
 
 
+@nb.njit(cache=True, nogil=True)
 def toe_of(heights: FloatArray, origin_m: float) -> float:
     """Return where the pile begins, m; where there is none its far end."""
-    high = np.flatnonzero(heights > _TOE_M)
-    first = int(high[0]) if high.size else len(heights) - 1
-    return origin_m + CELL_M * first
+    for k in range(len(heights)):
+        if heights[k] > _TOE_M:
+            return origin_m + CELL_M * k
+    return origin_m + CELL_M * (len(heights) - 1)
 
 
-def truth_of(state: Record, rig: Record, rock: Record, heights: FloatArray, machine: Machine, attempt: int) -> Truth:
-    """Return the truth of a state."""
-    speed, wheel = float(state["speed_mps"]), float(state["wheel_mps"])
+def truth_of(state: State, machine: Machine, kg_m3: float, toe_m: float, attempt: int) -> Truth:
+    """Return the truth of a state; `kg_m3` is the density of loose ore, `toe_m` the place of the toe."""
+    linkage, speed, wheel = machine.linkage, state.speed_mps, state.wheel_mps
+    lifted = state.boom_rad - linkage.boom_min_rad
     return Truth(
         attempt=attempt,
-        fill=float(state["content_m3"] * rock["density"] / rock["swell"]) / machine.drive.payload_kg,
-        content_m3=float(state["content_m3"]),
-        lip_x_m=float(state["lip_x_m"]),
-        lip_z_m=float(state["lip_z_m"]),
-        floor_rad=floor_angle(rig, float(state["boom_rad"]), float(state["bucket_rad"])),
-        toe_m=toe_of(heights, float(rock["origin_m"])) - float(state["lip_x_m"]),
+        fill=state.content_m3 * kg_m3 / machine.drive.payload_kg,
+        content_m3=state.content_m3,
+        lip_x_m=state.lip_x_m,
+        lip_z_m=state.lip_z_m,
+        floor_rad=linkage.bucket_angle_rad
+        + state.bucket_rad
+        - linkage.bucket_max_rad
+        + linkage.boom_to_bucket * lifted,
+        toe_m=toe_m - state.lip_x_m,
         speed_mps=speed,
         wheel_mps=wheel,
         slip=(wheel - speed) / max(abs(wheel), abs(speed), 0.2),
-        embed_m=float(state["embed_m"]),
-        rock_n=float(state["rock_n"]),
-        up_n=float(state["up_n"]),
-        press_n=float(state["press_n"]),
-        traction_n=float(state["traction_n"]),
-        front_n=float(state["front_n"]),
-        rear_n=float(state["rear_n"]),
-        slip_s=float(state["slip_s"]),
-        rear_up_s=float(state["rear_up_s"]),
-        contact=bool(state["rock_n"] > 0.0),
+        embed_m=state.embed_m,
+        rock_n=state.rock_n,
+        up_n=state.up_n,
+        press_n=state.press_n,
+        traction_n=state.traction_n,
+        front_n=state.front_n,
+        rear_n=state.rear_n,
+        slip_s=state.slip_s,
+        rear_up_s=state.rear_up_s,
+        contact=state.rock_n > 0.0,
     )
