@@ -14,6 +14,14 @@ from lhdmap.executor.settings import ExecutorSettings
 from lhdmap.guidance.settings import GuidanceSettings
 from lhdmap.integration.integrator import IntegrationSettings
 from lhdmap.landmarks.settings import LandmarkSettings
+from lhdmap.loading.digging_settings import (
+    AttemptSettings,
+    ChargingSettings,
+    ExcavationSettings,
+    PaperDigSettings,
+    TunedDigSettings,
+    WeighingSettings,
+)
 from lhdmap.loading.task_settings import LoadingSettings
 from lhdmap.localization.settings import LocalizationSettings
 from lhdmap.movement.settings import MovementSettings
@@ -65,6 +73,12 @@ class Settings:
     pile: PileSettings = field(default_factory=PileSettings)
     figure9: Figure9Constants = field(default_factory=Figure9Constants)
     figure9_repaired: RepairedConstants = field(default_factory=RepairedConstants)
+    charging: ChargingSettings = field(default_factory=ChargingSettings)
+    excavation: ExcavationSettings = field(default_factory=ExcavationSettings)
+    excavation_paper: PaperDigSettings = field(default_factory=PaperDigSettings)
+    excavation_tuned: TunedDigSettings = field(default_factory=TunedDigSettings)
+    weighing: WeighingSettings = field(default_factory=WeighingSettings)
+    attempts: AttemptSettings = field(default_factory=AttemptSettings)
     movement: MovementSettings = field(default_factory=MovementSettings)
     recording: RecordingSettings = field(default_factory=RecordingSettings)
     rockbreaker: RockbreakerSettings = field(default_factory=RockbreakerSettings)

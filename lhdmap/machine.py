@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from lhdmap.geometry import se3
-from lhdmap.machine_sections import Brakes, Drive, Linkage, Spread, Steering
+from lhdmap.machine_sections import Brakes, Digging, Drive, Linkage, Spread, Steering
 from lhdmap.messages import FloatArray
 from lhdmap.settings import REQUIRED, check_corners, setting
 from lhdmap.settings_tree import load_tree, part, tree_toml
@@ -127,6 +127,7 @@ class Machine:
     steering: Steering = part(Steering)
     brakes: Brakes = part(Brakes)
     linkage: Linkage = part(Linkage)
+    digging: Digging = part(Digging)
     spread: Spread = part(Spread)
     bodies: dict[str, BodyBox] = part(_default_bodies, key="body")
     mounts: dict[str, SensorMount] = part(_default_mounts, key="mount")
@@ -140,7 +141,7 @@ class Machine:
 def load_machine(path: Path | None = None) -> Machine:
     """Return the machine that a TOML file describes, or the default 11-t loader where `path` is None.
 
-    A file has `name`, one `[dimensions]`, `[drive]`, `[steering]`, `[brakes]`, `[linkage]`, `[spread]`, and a
+    A file has `name`, one `[dimensions]`, `[drive]`, `[steering]`, `[brakes]`, `[linkage]`, `[digging]`, `[spread]`, and a
     `[body.NAME]` and `[mount.NAME]` for each box and sensor; a part that is left out keeps the default's values, bodies
     and mounts are replaced as a whole.
 

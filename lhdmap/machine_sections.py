@@ -110,10 +110,10 @@ class Linkage:
         maximum=1.0,
         doc="How far the bucket turns with the boom (1: as if fixed to it).",
     )
-    boom_min_rad: float = setting(-0.35, unit="rad", source=_CLASS, doc="Lower stop of `boom_lift`.")
-    boom_max_rad: float = setting(0.85, unit="rad", source=_CLASS, doc="Upper stop of `boom_lift`.")
-    bucket_min_rad: float = setting(-1.2, unit="rad", source=_CLASS, doc="Lower stop of `bucket_tilt`: dumped.")
-    bucket_max_rad: float = setting(0.6, unit="rad", source=_CLASS, doc="Upper stop of `bucket_tilt`: rolled back.")
+    boom_min_rad: float = setting(0.0, unit="rad", source=_CLASS, doc="Lower stop of `boom_lift`.")
+    boom_max_rad: float = setting(1.2, unit="rad", source=_CLASS, doc="Upper stop of `boom_lift`.")
+    bucket_min_rad: float = setting(-1.8, unit="rad", source=_CLASS, doc="Lower stop of `bucket_tilt`: dumped.")
+    bucket_max_rad: float = setting(0.0, unit="rad", source=_CLASS, doc="Upper stop of `bucket_tilt`: rolled back.")
     lift_rate_rps: float = setting(0.16, unit="rad/s", source=_LOADING, minimum=0.01, doc="Boom at full engine speed.")
     tilt_rate_rps: float = setting(
         0.24,
@@ -157,4 +157,70 @@ class Spread:
     )
     lags: float = setting(
         0.0, source="0.1 in the guidance prototype", minimum=0.0, maximum=0.5, doc="Largest relative error of the lags."
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class Digging:
+    """What counts in the pile: first gear of the hydrostatic transmission, cylinders' forces, the bucket, its weighing."""
+
+    gravity_centre_m: float = setting(
+        1.8, unit="m", source=_LOADING, minimum=0.1, doc="Centre of gravity of the empty machine behind the front axle."
+    )
+    first_gear_mps: float = setting(
+        2.6, unit="m/s", source=_LOADING, minimum=0.1, doc="Speed in first gear at full pedal and engine speed."
+    )
+    displacement_l: float = setting(
+        3.0, unit="l/rad", source=_LOADING, minimum=0.01, doc="Oil for a turn of the wheels: 300 bar are 112 kN."
+    )
+    relief_bar: float = setting(
+        420.0, unit="bar", source=_CLASS, minimum=50.0, doc="Most that the transmission has at full engine speed."
+    )
+    loss_bar: float = setting(
+        18.5, unit="bar", source="46 bar of free rolling, loading prototype", minimum=0.0, doc="Lost in the drive line."
+    )
+    leakage: float = setting(
+        0.02, source=_LOADING, minimum=0.0, maximum=0.5, doc="Speed lost by leakage at 300 bar, of first gear's."
+    )
+    stiffness_gpa_m3: float = setting(
+        100.0, unit="GPa/m3", source=_LOADING, minimum=1.0, doc="Bulk modulus of the oil over the volume of its lines."
+    )
+    wheel_inertia_kgm2: float = setting(
+        2500.0, unit="kg m2", source=_LOADING, minimum=10.0, doc="Wheels and what turns with them."
+    )
+    idle: float = setting(
+        0.35,
+        source="0.87 m/s at pedal 0.5",
+        minimum=0.05,
+        maximum=1.0,
+        doc="Engine speed without pedal, of its largest.",
+    )
+    engine_lag_s: float = setting(0.5, unit="s", source=_LOADING, minimum=0.01, doc="Lag of the engine's speed.")
+    pump_lag_s: float = setting(0.25, unit="s", source=_LOADING, minimum=0.01, doc="Lag of the pump's stroke.")
+    lift_force_kn: float = setting(230.0, unit="kN", source=_LOADING, minimum=1.0, doc="Lift breakout at the lip.")
+    tilt_force_kn: float = setting(190.0, unit="kN", source=_LOADING, minimum=1.0, doc="Tilt breakout at the lip.")
+    tilt_free_bar: float = setting(
+        12.0,
+        unit="bar",
+        source="below the contact threshold of 23 bar",
+        minimum=0.0,
+        doc="Tilt cylinder against nothing.",
+    )
+    tilt_relief_bar: float = setting(250.0, unit="bar", source=_CLASS, minimum=10.0, doc="Tilt cylinder at its most.")
+    lift_empty_bar: float = setting(
+        52.0,
+        unit="bar",
+        source="autonomous_loading, Table 2",
+        minimum=0.0,
+        doc="Lift cylinder at boom 0.2, bucket empty.",
+    )
+    lift_full_bar: float = setting(
+        100.4, unit="bar", source="autonomous_loading, Table 2", minimum=0.0, doc="The same with a full bucket."
+    )
+    floor_stiffness_kn_m: float = setting(
+        400.0, unit="kN/m", source=_CLASS, minimum=1.0, doc="Force of a pressed lip for each metre that it is too low."
+    )
+    bucket_width_m: float = setting(2.4, unit="m", source=_LOADING, minimum=0.5, doc="Width of the bucket inside.")
+    bucket_volume_m3: float = setting(
+        5.0, unit="m3", source=_LOADING, minimum=0.1, doc="Nominal volume: the payload, loose."
     )

@@ -13,6 +13,7 @@ from lhdmap.cli.console import Console
 from lhdmap.cli.options import add_common
 
 SUBJECTS = {
+    "loading": "attempts, fills and durations of loadings, as in Tables 3 to 5 of the autonomous loading paper",
     "localization": "where a machine was on a map, against the truth of the drive and of the teaching drive",
     "navigation": "speeds, times, distances, smoothness and walls of drives, as in Tables 3 and 4 of the navigation paper",
     "pile": "width, inclination and status of piles, as in Table 6 of the autonomous loading paper",

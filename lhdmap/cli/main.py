@@ -30,6 +30,7 @@ COMMANDS = {
     "info": "what is in a map or run folder, in ten lines",
     "view": "open a map, log or run in Rerun",
     "pile": "find and measure the ore pile at the end of a drive",
+    "loading": "calibrate the weighing model of a loader",
     "rockbreaker": "plan trajectories of a rockbreaker over its grizzly",
     "simulate": "write a simulated log and its truth",
     "replay": "drive a simulated machine in closed loop: log, journal, verdict, report",

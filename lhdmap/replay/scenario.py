@@ -80,7 +80,11 @@ class LoadingPlan:
     detector: str = setting("fused", choices=("paper", "fused"), doc="How the touch of the pile is noticed.")
     ground: str = setting("default", doc="Ground: a file, or the name of one that ships.")
     approach_m: float = setting(
-        18.0, unit="m", minimum=0.0, maximum=500.0, doc="Way to the draw point at the start, as far as the drive has it."
+        18.0,
+        unit="m",
+        minimum=0.0,
+        maximum=500.0,
+        doc="Way to the draw point at the start, as far as the drive has it.",
     )
     offset_m: float = setting(0.0, unit="m", minimum=-3.0, maximum=3.0, doc="The machine begins so far to the left.")
     turned_deg: float = setting(0.0, unit="deg", minimum=-45.0, maximum=45.0, doc="... and turned to the left by this.")

@@ -1,0 +1,60 @@
+"""Our own excavation: the bucket is tilted by force and penetration, not by the clock."""
+
+from __future__ import annotations
+
+import math
+
+from lhdmap.loading.digging_settings import ExcavationSettings
+from lhdmap.loading.excavation_lift import SlipLift
+from lhdmap.loading.excavation_stops import Stops
+from lhdmap.loading.excavation_stuck import BackOff
+from lhdmap.loading.signals import Pedals, Signals, Turn
+from lhdmap.loading.skid import SkidFactor
+
+
+class AdaptiveDig:
+    """An admittance: `tilt = (F - F_0) / F_1 + (v_0 - v) / v_1`, within 0 and 1.
+
+    While the lip goes in easily, nothing is tilted; the more the rock resists and the slower the machine gets on, the more
+    the bucket turns. Slip lifts the boom (as in the paper) and takes pedal away. Where nothing moves, it backs out a little.
+    """
+
+    def __init__(self, settings: ExcavationSettings) -> None:
+        self._settings = settings
+        self._stops = Stops(settings, settings.boom_max_rad, settings.advance_max_m)
+
+    def begin(self, signals: Signals) -> None:
+        """Begin at this moment."""
+        one = self._settings
+        self._skid = SkidFactor(one.window_s, one.floor_mps, lag_matched=one.lag_matched)
+        self._lift = SlipLift(one.skid_max, one.hysteresis, one.lift_least_s)
+        self._back_off = BackOff(one)
+        self._stops.begin(signals)
+
+    def step(self, signals: Signals) -> Turn:
+        """Return the pedals of this moment, and the stop where one is reached."""
+        one, skid, ended = self._settings, self._skid.update(signals), self._stops.reached(signals)
+        force_kn = one.force_kn_per_bar * signals.transmission_bar
+        values = (
+            ("advance_m", self._stops.advance_m(signals)),
+            ("skid", skid),
+            ("force_kn", force_kn),
+            ("bucket_rad", signals.bucket_rad),
+            ("boom_rad", signals.boom_rad),
+            ("back_offs", float(self._back_off.pulses)),
+        )
+        if ended:
+            return Turn(Pedals(), ended, values)
+        if self._back_off.update(signals):
+            return Turn(Pedals(propel=-one.back_off_pedal), values=values)
+        slipping = self._lift.update(signals.now_ns, skid)
+        pedal = one.pedal * (one.pedal_slipping if slipping else 1.0)
+        tilt = self._tilt(force_kn, signals)
+        return Turn(Pedals(pedal, tilt=tilt, lift=float(slipping), full_rpm=True), values=values)
+
+    def _tilt(self, force_kn: float, signals: Signals) -> float:
+        """Return the tilt command; without scan odometry the tachometer tells the advance, without a pressure it is half."""
+        one = self._settings
+        advance_mps = signals.scan_mps if math.isfinite(signals.scan_mps) else signals.tacho_mps
+        asked = (force_kn - one.force_kn) / one.force_range_kn + (one.advance_mps - advance_mps) / one.advance_range_mps
+        return min(max(asked, 0.0), 1.0) if math.isfinite(asked) else 0.5

@@ -1,0 +1,1 @@
+"""Tests of charging, excavation, shaking, weighing and the rule for another attempt."""
