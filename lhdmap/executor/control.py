@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import NamedTuple
 
 import numpy as np
 
@@ -18,18 +17,12 @@ from lhdmap.executor.notes import Note, Notes, Stop
 from lhdmap.executor.settings import ExecutorSettings
 from lhdmap.executor.watchdog import Watchdog
 from lhdmap.geometry import se2
+from lhdmap.geometry.polygon import inside
 from lhdmap.messages import Command, FloatArray
 
 _GUARD_NS = 50_000_000
 _DIGS_NS = 100_000_000  # so old the pedals of a loading controller may be
 _LOOKS = 2  # in a row, before a point within the margin is believed: a single one is noise
-
-
-class Dig(NamedTuple):
-    """Pedals of a loading controller, and corners (4, 2) in `odom` of where its bucket is to touch."""
-
-    pedals: Command
-    expected_m: FloatArray
 
 
 class Control:
@@ -48,7 +41,8 @@ class Control:
         self._settings = settings
         self._notes, self._blocked, self._near = Notes(), False, 0
         self._points: dict[str, tuple[Motion, FloatArray]] = {}
-        self._dig: Dig | None = None
+        self._pedals: Command | None = None
+        self._touched_m: FloatArray | None = None
         self._looked_ns: int | None = None
 
     def loaded(self, model: DriveModel) -> None:
@@ -82,18 +76,19 @@ class Control:
         plan = operator_setpoints(speed_mps, steering_rate_rps, now_ns, settings.hold_s, settings.age_s)
         return self.plan("operator", plan, made_ns, now_ns)
 
-    def dig(self, pedals: Command, expected_m: FloatArray, now_ns: int) -> bool:
-        """Take what a loading controller asks of the pedals; False where it does not count now.
-
-        `expected_m` (4, 2): corners in `odom`, counterclockwise, of where its bucket is to touch: the guard looks beside it.
-        """
+    def dig(self, pedals: Command, now_ns: int) -> bool:
+        """Take what a loading controller asks of the pedals; False where it does not count now."""
         fits = self.watchdog.armed and self.modes.takes("guidance", pedals.stamp_ns)
-        self._dig = Dig(pedals, expected_m) if fits and self._fresh(pedals, now_ns) else None
-        return self._dig is not None
+        self._pedals = pedals if fits and self._fresh(pedals, now_ns) else None
+        return self._pedals is not None
 
     def digs(self, now_ns: int) -> bool:
         """Return whether a loading controller has the pedals."""
-        return self._dig is not None and self.watchdog.armed and self._fresh(self._dig.pedals, now_ns)
+        return self._pedals is not None and self.watchdog.armed and self._fresh(self._pedals, now_ns)
+
+    def touches(self, corners_m: FloatArray | None) -> None:
+        """Take where the bucket is to touch: corners (4, 2) in `odom`, counterclockwise; the guard looks beside it."""
+        self._touched_m = corners_m
 
     @staticmethod
     def _fresh(pedals: Command, now_ns: int) -> bool:
@@ -138,8 +133,8 @@ class Control:
             asked, cause = told, why
         if motion is not None and self._guarded(now_ns, motion, pull_mps2) and asked < Stop.FULL:
             asked, cause = Stop.FULL, "guard: contact on the braking path"
-        if self._dig is not None and self.digs(now_ns):
-            return self.executor.dig(now_ns, motion, self._dig.pedals, asked, cause)
+        if self._pedals is not None and self.digs(now_ns):
+            return self.executor.dig(now_ns, motion, self._pedals, asked, cause)
         return self.executor.step(now_ns, motion, asked, cause, pull_mps2)
 
     def take_notes(self) -> list[tuple[str, Note]]:
@@ -169,7 +164,7 @@ class Control:
         wanted = self.executor.queue.at(now_ns)
         self.swept = self.guard.sweep(
             motion,
-            self._beside(self._seen_from(motion), motion, now_ns),
+            self._beside(self._seen_from(motion), motion),
             commanded_mps=None if wanted is None else wanted.speed_mps,
             plan=self._plan_ahead(),
             pull_mps2=pull_mps2,
@@ -197,18 +192,12 @@ class Control:
         seen = [_moved(points, at, motion) for at, points in self._points.values()]
         return np.concatenate(seen) if seen else np.zeros((0, 2))
 
-    def _beside(self, points: FloatArray, motion: Motion, now_ns: int) -> FloatArray:
+    def _beside(self, points: FloatArray, motion: Motion) -> FloatArray:
         """Return points in `base_link` without those that the bucket is to touch."""
-        if self._dig is None or not self.digs(now_ns):
+        if self._touched_m is None:
             return points
-        corners = se2.transform(
-            se2.inverse(np.array([motion.x_m, motion.y_m, motion.heading_rad])), self._dig.expected_m
-        )
-        inside = np.ones(len(points), bool)
-        for one, other in zip(corners, np.roll(corners, -1, axis=0), strict=True):
-            side = (other[0] - one[0]) * (points[:, 1] - one[1]) - (other[1] - one[1]) * (points[:, 0] - one[0])
-            inside &= side > 0.0
-        beside: FloatArray = points[~inside]
+        T_base_odom = se2.inverse(np.array([motion.x_m, motion.y_m, motion.heading_rad]))
+        beside: FloatArray = points[~inside(points, se2.transform(T_base_odom, self._touched_m))]
         return beside
 
     def _plan_ahead(self) -> FloatArray | None:

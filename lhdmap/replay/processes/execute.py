@@ -87,7 +87,8 @@ class Execute(Process):
         elif topic == SEEN:
             self._compare(message, now_ns)
         elif topic == PEDALS:
-            self.control.dig(message.pedals, message.expected_m, now_ns)
+            self.control.touches(message.touched_m)
+            self.control.dig(message.pedals, now_ns)
         elif topic == DIRECTIVE:
             self._ask(message)
         elif topic == STATION_SAYS:
@@ -107,6 +108,7 @@ class Execute(Process):
 
     def _ask(self, asked: Asked) -> None:
         self._wanted = Stop.SERVICE if asked.directive is None else Stop.GO
+        self.control.touches(asked.touched_m)
         self._asks = asked.cause if asked.cause.startswith("assistance") else ""
 
     def _scan(self, scan: LaserScan, now_ns: int, *, front: bool) -> None:

@@ -6,6 +6,7 @@ from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 
 from lhdmap.driving.motion import Setpoint
+from lhdmap.geometry.polygon import inside
 from lhdmap.guidance.ghosts import Eye
 from lhdmap.guidance.local_walls import LocalWalls
 from lhdmap.guidance.planner import Guidance
@@ -51,7 +52,10 @@ class Guide(Process):
         if now_ns - asked.stamp_ns > _ASKED_NS:
             self._scribe.goes("waiting", "directive too old")
             return
-        plan = self._guidance.plan(now_ns, motion, tuple(self._sent), self._walls.points(), asked.directive)
+        walls = self._walls.points()
+        if asked.touched_m is not None:
+            walls = walls[~inside(walls, asked.touched_m)]
+        plan = self._guidance.plan(now_ns, motion, tuple(self._sent), walls, asked.directive)
         gear = "forward" if plan.gear > 0 else "reverse"
         self._scribe.goes(gear, "directive", clearance_m=round(plan.clearance_m, 3), by=plan.speeds.by)
         yield Outgoing(PLAN, plan)

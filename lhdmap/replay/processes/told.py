@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from lhdmap.guidance.directive import Directive
+from lhdmap.loading.assistance import Answer, Request
 from lhdmap.messages import Command, FloatArray
 
 
@@ -23,18 +24,33 @@ class Seen(NamedTuple):
 
 
 class Asked(NamedTuple):
-    """What navigation asks for: a directive, or None: stand."""
+    """What navigation or the loading task asks for: a directive, or None: stand.
+
+    `touched_m`: corners (4, 2) in `odom`, counterclockwise, of where hits are no obstacle: the bucket is in them.
+    """
 
     stamp_ns: int
     directive: Directive | None
     cause: str
+    touched_m: FloatArray | None = None
 
 
 class Digs(NamedTuple):
-    """What the loading task asks of the pedals, and corners (4, 2) in `odom` of where the bucket is to touch."""
+    """What the loading task asks of the pedals, and corners (4, 2) in `odom`, counterclockwise, of where its bucket is to touch."""
 
     pedals: Command
-    expected_m: FloatArray
+    touched_m: FloatArray
+
+
+class LoadingNow(NamedTuple):
+    """What the loading task does: state, phase, attempts weighed, the last fill (NaN: none), the open request."""
+
+    stamp_ns: int
+    state: str
+    phase: str
+    attempts: int
+    fill: float
+    request: Request | None
 
 
 class Idle(NamedTuple):
@@ -55,6 +71,7 @@ class Word(NamedTuple):
     steering_rate_rps: float = 0.0
     go_on: bool = False
     goal: str = ""
+    answer: Answer | None = None
 
 
 class Health(NamedTuple):

@@ -1,0 +1,160 @@
+"""The loading task as a process: it has the machine from the approach to a weighed bucket."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from lhdmap.geometry import se2
+from lhdmap.guidance.directive import Directive
+from lhdmap.loading.assistance import Answer
+from lhdmap.loading.moment import LoadingInput, LoadingOutput, Mission, Target
+from lhdmap.loading.states import ASSISTANCE, Event, State
+from lhdmap.loading.task import LoadingTask
+from lhdmap.messages import Command, FloatArray, Text
+from lhdmap.pile.result import Snapshot
+from lhdmap.replay.journal import Scribe
+from lhdmap.replay.process import (
+    DIRECTIVE,
+    LOADING,
+    MACHINE_SAYS,
+    MILLISECOND_NS,
+    MISSION,
+    PEDALS,
+    PILE,
+    STATION_SAYS,
+    Outgoing,
+    Process,
+    Received,
+)
+from lhdmap.replay.processes.feed import MOTION_TOPICS, MotionFeed
+from lhdmap.replay.processes.load_feed import SIGNAL_TOPICS, SignalFeed
+from lhdmap.replay.processes.told import Asked, Digs, Health, LoadingNow
+
+LOADS = "loading"
+_ASKS_NS = 100 * MILLISECOND_NS
+_SETTLED_NS = 1_000_000_000
+_IN_THE_PILE = (State.CHARGING, State.EXCAVATION, State.PULL_BACK)
+_BEFORE_M, _BEHIND_M, _BESIDE_M = 1.2, 8.0, 0.1
+
+
+class Loads(Process):
+    """Pedals each 20 ms or a directive each 100 ms; begins once the machine is armed and its pose has held for a second.
+
+    `way`: path of the approach in `odom`, as it was taught; None: the machine is where it looks from.
+    """
+
+    name, period_ns, latency_ns, priority = LOADS, 20 * MILLISECOND_NS, 2 * MILLISECOND_NS, 20
+    reads = tuple(dict.fromkeys((*MOTION_TOPICS, *SIGNAL_TOPICS, PILE, MACHINE_SAYS, STATION_SAYS)))
+
+    def __init__(self, task: LoadingTask, way: Directive | None, scribe: Scribe) -> None:
+        self.task, self._way, self._scribe = task, way, scribe
+        self._feed, self._signals = MotionFeed(), SignalFeed()
+        self._pile: Snapshot | None = None
+        self._health: Health | None = None
+        self._answer: Answer | None = None
+        self._emergency = False
+        self._since_ns: int | None = None
+        self._asked_ns, self._mission = 0, ""
+
+    def step(self, now_ns: int, inbox: Sequence[Received]) -> Iterator[Outgoing]:
+        """Take what has come; say what is to be driven, or what the pedals are to do."""
+        for received in inbox:
+            self._take(received)
+        out = self.task.update(self._told(now_ns))
+        self._note(out)
+        around = np.zeros((0, 2)) if out.target is None else mouth_of(out.target)
+        if out.pedals is not None:
+            p = out.pedals
+            pedals = Command(now_ns, p.propel, p.steering_rate_rps, p.tilt, p.lift, p.full_rpm, p.brake)
+            yield Outgoing(PEDALS, Digs(pedals, around))
+        if now_ns - self._asked_ns >= _ASKS_NS:
+            self._asked_ns = now_ns
+            cause = f"assistance: {out.request.why}" if out.request is not None else out.state.value
+            directive = None if out.directive is None else out.directive._replace(stamp_ns=now_ns)
+            touched = around if out.pedals is not None or out.state in _IN_THE_PILE else None
+            yield Outgoing(DIRECTIVE, Asked(now_ns, directive, cause, touched))
+        mission = self._told_of(out)
+        yield Outgoing(LOADING, LoadingNow(now_ns, out.state, out.phase, out.attempts, out.fill, out.request))
+        if mission != self._mission:
+            self._mission = mission
+            self._scribe.event("mission", mission)
+            yield Outgoing(MISSION, Text(now_ns, mission))
+
+    def _take(self, received: Received) -> None:
+        topic, _, message = received
+        if topic in MOTION_TOPICS:
+            self._feed.take(received)
+        if topic in SIGNAL_TOPICS:
+            self._signals.take(received)
+        elif topic == PILE:
+            self._pile = message
+        elif topic == MACHINE_SAYS:
+            self._health = message
+        elif topic == STATION_SAYS:
+            self._answer = message.answer or self._answer
+            self._emergency = bool(message.emergency) or (self._emergency and not message.release)
+
+    def _told(self, now_ns: int) -> LoadingInput:
+        motion, health = self._feed.motion, self._health
+        answer, self._answer = self._answer, None
+        way = None if self._way is None else self._way._replace(stamp_ns=now_ns)
+        return LoadingInput(
+            now_ns,
+            self._signals.signals(),
+            motion,
+            self._pile,
+            None if motion is None else self._signals.walls_m(motion),
+            "idle" if health is None else health.mode,
+            health is not None and health.armed,
+            answer,
+            self._emergency,
+            Mission(1) if self._settled(now_ns) else None,
+            way,
+            evidence=(("log", f"run.mcap@{now_ns}"),),
+        )
+
+    def _settled(self, now_ns: int) -> bool:
+        """Return whether the machine has been there for a while, with a pose: the mission begins."""
+        if self._feed.motion is None:
+            return False
+        self._since_ns = now_ns if self._since_ns is None else self._since_ns
+        return now_ns - self._since_ns >= _SETTLED_NS
+
+    def _note(self, out: LoadingOutput) -> None:
+        for note in out.notes:
+            values = {"attempt": out.attempts, **note.values}
+            if note.event == "state":
+                self._scribe.goes(note.after, note.cause, **values)
+            else:
+                self._scribe.event(note.event, note.cause, **values)
+
+    @staticmethod
+    def _told_of(out: LoadingOutput) -> str:
+        if out.state in ASSISTANCE:
+            return f"assistance: {out.request.why if out.request is not None else out.state.value}"
+        if out.state == State.ABORTED:
+            return f"aborted: {Event.ABORT.value}"
+        return "done" if out.state == State.DONE else "driving"
+
+
+def mouth_of(target: Target) -> FloatArray:
+    """Return corners (4, 2) in `odom`, counterclockwise, of where the bucket is to touch: from before the toe on."""
+    c, s = math.cos(target.heading_rad), math.sin(target.heading_rad)
+    ahead, left = np.array([c, s]), np.array([-s, c])
+    right_m, left_m = target.limits_m[0] - _BESIDE_M * left, target.limits_m[1] + _BESIDE_M * left
+    return np.stack(
+        [
+            right_m - _BEFORE_M * ahead,
+            right_m + _BEHIND_M * ahead,
+            left_m + _BEHIND_M * ahead,
+            left_m - _BEFORE_M * ahead,
+        ]
+    )
+
+
+def way_from(start: FloatArray, line_map_m: FloatArray) -> FloatArray:
+    """Return a taught line (N, 2) of the map in `odom`: the odometry begins where the machine is said to stand (3,)."""
+    return se2.transform(se2.inverse(start), line_map_m)
