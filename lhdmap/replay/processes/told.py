@@ -36,7 +36,7 @@ class Asked(NamedTuple):
 
 
 class Digs(NamedTuple):
-    """What the loading task asks of the pedals, and corners (4, 2) in `odom`, counterclockwise, of where its bucket is to touch."""
+    """What the loading task asks of the pedals; corners (4, 2) in `odom`, counterclockwise, of where its bucket is to touch."""
 
     pedals: Command
     touched_m: FloatArray
