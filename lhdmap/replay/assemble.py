@@ -11,9 +11,9 @@ from lhdmap.driving.bodies import bodies_of
 from lhdmap.driving.model import drive_model
 from lhdmap.errors import ConfigError, UsageError
 from lhdmap.executor.control import Control
-from lhdmap.guidance.planner import Guidance, method_of
 from lhdmap.movement.routes import RoutePlanner
 from lhdmap.navigation.control import NavigationControl
+from lhdmap.replay.assemble_loading import guidance_of, loading_processes
 from lhdmap.replay.engine import Engine, overrun_targets
 from lhdmap.replay.faults import Faults
 from lhdmap.replay.journal import Journal
@@ -43,12 +43,18 @@ def parts_of(scenario: Scenario, folder: Path, settings: Settings | None = None)
         UsageError: there is no such place or route, or this version does not replay the kind.
         ConfigError: there is no such mine.
     """
-    if scenario.kind != "tram" or scenario.mission:
+    if scenario.kind not in _REPLAYED or scenario.mission:
         what = f"kind = '{scenario.kind}'" + (" with a mission" if scenario.mission else "")
-        raise UsageError(f"{what}: this version replays kind = 'tram', to a goal or along a route")
-    from lhdmap.replay.mine_parts import mine_parts  # what a mine needs takes a second to load
+        raise UsageError(f"{what}: this version replays kind = 'tram' and 'loading'")
+    from lhdmap.replay.loading_parts import loading_parts  # what a mine needs takes a second to load
+    from lhdmap.replay.mine_parts import mine_parts
 
+    if scenario.kind == "loading":
+        return loading_parts(scenario, settings or Settings())
     return mine_parts(scenario, folder, settings or Settings())
+
+
+_REPLAYED = ("tram", "loading")
 
 
 class Watchers(NamedTuple):
@@ -80,7 +86,9 @@ def assemble(
     link = Link(scenario.link, faults, scenario.seed)
     monitor = Monitor(Tally(scenario.kind, scenario.limits, parts.goal_m), journal.of(Monitor.name))
     processes: list[Process] = [Plant(parts, faults, link, journal.of(Plant.name), scenario.seed)]
-    if parts.autonomous is not None:
+    if parts.loading is not None:
+        processes += loading_processes(scenario, parts, parts.loading, journal)
+    elif parts.autonomous is not None:
         processes += _autonomous(scenario, parts, parts.autonomous, journal)
     elif scenario.perception:
         processes.append(Perception(parts.settings, parts.machine, journal.of(Perception.name)))
@@ -105,8 +113,7 @@ def _autonomous(scenario: Scenario, parts: Parts, given: Autonomous, journal: Jo
         settings.navigation,
         journal.of(NAVIGATION).goes,
     )
-    eyes_m = {1: machine.mounts["lidar_front"].position_m[0], -1: -machine.mounts["lidar_rear"].position_m[0]}
-    guidance = Guidance(model, bodies, eyes_m, settings.guidance, method_of(settings.guidance))
+    guidance = guidance_of(machine, model, bodies, settings)
     control = Control(model, bodies, settings.executor, PERIODS_S)
     return [
         Locating(given.known, settings, machine, given.start, journal.of(PERCEPTION)),

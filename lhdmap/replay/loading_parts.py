@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 
@@ -11,17 +11,64 @@ from lhdmap.config import Settings
 from lhdmap.errors import UsageError
 from lhdmap.geometry import se2
 from lhdmap.guidance.directive import Directive, path_of
-from lhdmap.machine import Machine
+from lhdmap.machine import Machine, load_machine
 from lhdmap.messages import FloatArray
-from lhdmap.mine.network import Network
+from lhdmap.mine.network import Network, make_network
+from lhdmap.mine.plan import find_plan, load_plan
 from lhdmap.mine.route import start_of
+from lhdmap.mine.topology import Directory
 from lhdmap.mine.ways import STEP_M, Leg
+from lhdmap.replay.mine_parts import BodyBumper, places_of, walls_of
+from lhdmap.replay.parts import Loading, Parts
+from lhdmap.replay.processes.told import ModeNow
 from lhdmap.replay.scenario import Scenario
 from lhdmap.settings import nearest
-from lhdmap.simulation.mine_drive import planned
+from lhdmap.simulation.ground.mine import mine_piles
+from lhdmap.simulation.ground.sections import load_ground
+from lhdmap.simulation.ground.vehicle import LoadingVehicle
+from lhdmap.simulation.history import START_NS
+from lhdmap.simulation.mine_drive import node_of, planned
+from lhdmap.simulation.mine_world.world import MineWorld
 from lhdmap.simulation.operator import OperatorSettings
+from lhdmap.simulation.sensing.sections import SensorSettings
+from lhdmap.simulation.sensing.suite import sensors_of
+from lhdmap.simulation.vehicle.shaking import VIBRATION_DEG, Shaking
 
-_STRAIGHT_RAD = math.radians(1.0)
+_EXPECTED_S = 120.0  # two attempts and a half
+
+
+def loading_parts(scenario: Scenario, settings: Settings) -> Parts:
+    """Return the parts of a machine that is to fill its bucket at a draw point.
+
+    Raises:
+        ConfigError: there is no such mine or ground.
+        UsageError: `start` is no draw point of the mine.
+    """
+    machine = load_machine(Path(scenario.machine) if scenario.machine else None)
+    network = make_network(load_plan(find_plan(scenario.mine)))
+    leg = approach_leg(scenario, network, machine)
+    world = MineWorld(network, machine)
+    piles = mine_piles(world, load_ground(scenario.loading.ground), seed=scenario.seed)
+    vehicle = LoadingVehicle(machine, world, piles, seed=scenario.seed)
+    x, y, z, heading = start_pose(leg, scenario).tolist()
+    bend = float(leg.articulation_rad[0])
+    mode = ModeNow("idle")
+    return Parts(
+        machine=machine,
+        world=world,
+        vehicle=vehicle,
+        start=vehicle.at_rest(x, y, heading, near_z_m=z, articulation_rad=bend, time_ns=START_NS),
+        sensors=sensors_of(machine, SensorSettings(), seed=scenario.seed, mode=mode, node=node_of(Directory(network))),
+        operator=None,
+        bumper=BodyBumper(machine, world),
+        shaking=Shaking(math.radians(VIBRATION_DEG), scenario.seed),
+        changing=world,
+        places=places_of(network, machine),
+        lines_m=walls_of(network),
+        expected_s=_EXPECTED_S,
+        settings=settings,
+        loading=Loading(taught_way(leg, settings), mode),
+    )
 
 
 def approach_leg(scenario: Scenario, network: Network, machine: Machine) -> Leg:
@@ -42,8 +89,7 @@ def approach_leg(scenario: Scenario, network: Network, machine: Machine) -> Leg:
     )
     leg = legs[-1]
     kept = min(round(scenario.loading.approach_m / STEP_M) + 1, len(leg.x_m))
-    fields = {name: values[-kept:] for name, values in leg._asdict().items() if isinstance(values, np.ndarray)}
-    return leg._replace(**fields)
+    return Leg(leg.gear, *(values[-kept:] for values in leg[1:7]), leg.stop)
 
 
 def start_pose(leg: Leg, scenario: Scenario) -> FloatArray:
@@ -60,8 +106,3 @@ def taught_way(leg: Leg, settings: Settings) -> Directive:
     line = se2.transform(se2.inverse(start), np.column_stack([leg.x_m, leg.y_m]))
     path = path_of(line, settings.loading.approach_kmh / 3.6)
     return Directive(0, 1, path, float(path[-1, -1]))
-
-
-def without_load(scenario: Scenario) -> Scenario:
-    """Return a scenario whose machine is empty."""
-    return replace(scenario, load=0.0)

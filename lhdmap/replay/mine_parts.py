@@ -71,10 +71,10 @@ def mine_parts(scenario: Scenario, folder: Path, settings: Settings) -> Parts:
     operating = OperatorSettings(speed_kmh=scenario.speed_kmh, wander_m=scenario.wander_m)
     legs = _legs(scenario, network, machine, start, operating)
     autonomous = autonomous_of(scenario, network, machine, folder, settings) if drives_itself else None
-    told = _mode_of(TOLD[scenario.who]) if autonomous is None else autonomous.mode
+    told = mode_of(TOLD[scenario.who]) if autonomous is None else autonomous.mode
     world = MineWorld(network, machine)
     vehicle = Vehicle(machine, world, seed=scenario.seed)
-    places = _places(network, machine)
+    places = places_of(network, machine)
     way_m = sum(leg.length_m for leg in legs)
     return Parts(
         machine=machine,
@@ -88,7 +88,7 @@ def mine_parts(scenario: Scenario, folder: Path, settings: Settings) -> Parts:
         changing=world,
         places=places,
         goal_m=places.get(scenario.goal) or _goal_m(autonomous, scenario.goal, network, machine),
-        lines_m=_walls(network),
+        lines_m=walls_of(network),
         expected_s=_SLOWER * way_m / (scenario.speed_kmh / 3.6) + 10.0,
         settings=settings,
         autonomous=autonomous,
@@ -121,21 +121,23 @@ def _state(vehicle: Vehicle, pose: FloatArray, scenario: Scenario) -> VehicleSta
     return vehicle.at_rest(x, y, yaw, near_z_m=z, time_ns=START_NS, load_kg=_KG * scenario.load)
 
 
-def _mode_of(mode: str) -> Callable[[int, FloatArray], str]:
+def mode_of(mode: str) -> Callable[[int, FloatArray], str]:
+    """Return what says a mode that does not change."""
+
     def told(stamp_ns: int, state: FloatArray) -> str:  # noqa: ARG001  # a `Told`
         return mode
 
     return told
 
 
-def _places(network: Network, machine: Machine) -> dict[str, Position]:
+def places_of(network: Network, machine: Machine) -> dict[str, Position]:
     """Return where a machine stands at each place, and the nodes by their names."""
     places = {place.name: _point(place_pose(network, place, machine)) for place in network.plan.places if place.name}
     nodes = {node.name: _point(node.position_m) for node in network.nodes if node.name}
     return {**nodes, **places}
 
 
-def _walls(network: Network) -> list[FloatArray]:
+def walls_of(network: Network) -> list[FloatArray]:
     """Return the walls of all drifts as the plan has them: lines (N, 3), two of each."""
     lines = []
     for tube in network.tubes:

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from typing import Any, NamedTuple, Protocol
 
 from lhdmap.config import Settings
+from lhdmap.guidance.directive import Directive
 from lhdmap.machine import Machine
 from lhdmap.messages import Command, FloatArray
 from lhdmap.pipeline.localize import KnownMap
@@ -107,6 +108,13 @@ class Changing(Protocol):
         ...
 
 
+class Loading(NamedTuple):
+    """The way to the pile in `odom`, as it was taught, and the mode that the log tells."""
+
+    way: Directive | None
+    mode: ModeNow
+
+
 class Autonomous(NamedTuple):
     """The map, about where on it the machine stands at first (4,: x, y, yaw, z), its errand, and the mode that the log tells."""
 
@@ -135,6 +143,7 @@ class Parts:
         expected_s: about how long it will take.
         shaking: vibration that the sensors feel.
         settings: of perception and control.
+        loading: what a machine that loads is given; None: it does not.
         autonomous: what a machine that drives itself is given; None: nobody does, or the operator.
     """
 
@@ -152,4 +161,5 @@ class Parts:
     expected_s: float | None = None
     shaking: Shaking | None = None
     settings: Settings = field(default_factory=Settings)
+    loading: Loading | None = None
     autonomous: Autonomous | None = None
