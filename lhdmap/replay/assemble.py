@@ -18,6 +18,7 @@ from lhdmap.replay.engine import Engine, overrun_targets
 from lhdmap.replay.faults import Faults
 from lhdmap.replay.journal import Journal
 from lhdmap.replay.link import Link
+from lhdmap.replay.load_tally import LoadTally
 from lhdmap.replay.parts import Autonomous, Parts
 from lhdmap.replay.process import MACHINE, STATION, Process
 from lhdmap.replay.processes.driver import Driver
@@ -84,7 +85,8 @@ def assemble(
     """
     faults = Faults(scenario.faults, journal, parts.places)
     link = Link(scenario.link, faults, scenario.seed)
-    monitor = Monitor(Tally(scenario.kind, scenario.limits, parts.goal_m), journal.of(Monitor.name))
+    load = None if parts.loading is None else LoadTally(parts.machine.drive.payload_kg)
+    monitor = Monitor(Tally(scenario.kind, scenario.limits, parts.goal_m), journal.of(Monitor.name), load)
     processes: list[Process] = [Plant(parts, faults, link, journal.of(Plant.name), scenario.seed)]
     if parts.loading is not None:
         processes += loading_processes(scenario, parts, parts.loading, journal)

@@ -89,7 +89,8 @@ def approach_leg(scenario: Scenario, network: Network, machine: Machine) -> Leg:
     )
     leg = legs[-1]
     kept = min(round(scenario.loading.approach_m / STEP_M) + 1, len(leg.x_m))
-    return Leg(leg.gear, *(values[-kept:] for values in leg[1:7]), leg.stop)
+    x, y, z, heading, curvature, bend = (values[-kept:] for values in _samples(leg))
+    return Leg(leg.gear, x, y, z, heading, curvature, bend, leg.stop)
 
 
 def start_pose(leg: Leg, scenario: Scenario) -> FloatArray:
@@ -106,3 +107,7 @@ def taught_way(leg: Leg, settings: Settings) -> Directive:
     line = se2.transform(se2.inverse(start), np.column_stack([leg.x_m, leg.y_m]))
     path = path_of(line, settings.loading.approach_kmh / 3.6)
     return Directive(0, 1, path, float(path[-1, -1]))
+
+
+def _samples(leg: Leg) -> tuple[FloatArray, ...]:
+    return leg.x_m, leg.y_m, leg.z_m, leg.heading_rad, leg.curvature_pm, leg.articulation_rad

@@ -102,7 +102,7 @@ class _Replay:
             simulated_s = (run.engine.now_ns - START_NS) / SECOND_NS
             factor = simulated_s / max(time.monotonic() - started, 1e-6)
         faults = [fault.told() for fault in run.faults.all]
-        verdict = run.monitor.tally.verdict(run.engine.now_ns, faults, factor, journal.sha256)
+        verdict = run.monitor.tally.verdict(run.engine.now_ns, faults, factor, journal.sha256) | run.monitor.verdict()
         self._write(verdict, film)
         return verdict
 

@@ -57,7 +57,7 @@ class Loads(Process):
         self._answer: Answer | None = None
         self._emergency = False
         self._since_ns: int | None = None
-        self._asked_ns, self._mission = 0, ""
+        self._asked_ns, self._mission, self._fill_std = 0, "", math.nan
 
     def step(self, now_ns: int, inbox: Sequence[Received]) -> Iterator[Outgoing]:
         """Take what has come; say what is to be driven, or what the pedals are to do."""
@@ -77,7 +77,7 @@ class Loads(Process):
             touched = around if out.pedals is not None or out.state in _IN_THE_PILE else None
             yield Outgoing(DIRECTIVE, Asked(now_ns, directive, cause, touched))
         mission = self._told_of(out)
-        yield Outgoing(LOADING, LoadingNow(now_ns, out.state, out.phase, out.attempts, out.fill, out.request))
+        yield Outgoing(LOADING, self._now(now_ns, out))
         if mission != self._mission:
             self._mission = mission
             self._scribe.event("mission", mission)
@@ -123,9 +123,13 @@ class Loads(Process):
         self._since_ns = now_ns if self._since_ns is None else self._since_ns
         return now_ns - self._since_ns >= _SETTLED_NS
 
+    def _now(self, now_ns: int, out: LoadingOutput) -> LoadingNow:
+        return LoadingNow(now_ns, out.state, out.phase, out.attempts, out.fill, self._fill_std, out.request)
+
     def _note(self, out: LoadingOutput) -> None:
         for note in out.notes:
             values = {"attempt": out.attempts, **note.values}
+            self._fill_std = note.values.get("fill_std", self._fill_std)
             if note.event == "state":
                 self._scribe.goes(note.after, note.cause, **values)
             else:

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from typing import Any
 
 from lhdmap.messages import Text
 from lhdmap.replay.journal import Scribe
+from lhdmap.replay.load_tally import LoadTally
 from lhdmap.replay.process import (
     CONTACT,
     EVERYWHERE,
+    LOADING,
     MILLISECOND_NS,
     MISSION,
     STATE,
@@ -25,15 +28,19 @@ class Monitor(Process):
     """Has the last turn of all at a time."""
 
     name, period_ns, priority, site = MONITOR, 100 * MILLISECOND_NS, 90, EVERYWHERE
-    reads = (STATE, CONTACT, MISSION)
+    reads = (STATE, CONTACT, MISSION, LOADING)
 
-    def __init__(self, tally: Tally, scribe: Scribe) -> None:
-        self.tally, self._scribe = tally, scribe
+    def __init__(self, tally: Tally, scribe: Scribe, load: LoadTally | None = None) -> None:
+        self.tally, self._scribe, self.load = tally, scribe, load
 
     @property
     def ended(self) -> bool:
         """Whether there is nothing more to wait for."""
         return self.tally.ended
+
+    def verdict(self) -> dict[str, Any]:
+        """Return what is said of the kind alone."""
+        return {} if self.load is None else self.load.verdict()
 
     def step(self, now_ns: int, inbox: Sequence[Received]) -> Iterable[Outgoing]:
         """Take what has come and judge."""
@@ -41,6 +48,10 @@ class Monitor(Process):
         for received in inbox:
             if received.topic == STATE:
                 self.tally.at(received.message)
+                if self.load is not None:
+                    self.load.at(received.message)
+            elif received.topic == LOADING and self.load is not None:
+                self.load.said(received.message)
             elif received.topic == CONTACT:
                 self.tally.near(received.sent_ns, received.message)
             elif isinstance(received.message, Text):

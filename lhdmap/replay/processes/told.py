@@ -43,13 +43,14 @@ class Digs(NamedTuple):
 
 
 class LoadingNow(NamedTuple):
-    """What the loading task does: state, phase, attempts weighed, the last fill (NaN: none), the open request."""
+    """What the loading task does: state, phase, attempts, the last fill and its deviation (NaN: none), the open request."""
 
     stamp_ns: int
     state: str
     phase: str
     attempts: int
     fill: float
+    fill_std: float
     request: Request | None
 
 
