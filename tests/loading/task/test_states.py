@@ -30,8 +30,7 @@ _OUTCOMES = {
             event
             for (start, event) in TABLE
             if start == state
-            and event
-            not in (Event.EMERGENCY, Event.CANCELLED, Event.STOPPED, Event.TAKEN_OVER, Event.TOO_LONG)
+            and event not in (Event.EMERGENCY, Event.CANCELLED, Event.STOPPED, Event.TAKEN_OVER, Event.TOO_LONG)
         ),
     ]
     for state in MOVING
