@@ -73,7 +73,8 @@ def crossing(point_m: FloatArray, curvature: float, limits_m: FloatArray) -> Cro
     """Return where a point of the machine first meets the line through the limits, driving forward; frame `base_link`.
 
     Of the two solutions the paper takes any; the one that is met first within half a turn ahead counts here, for the other one
-    lies behind the machine or behind the pile. `limits_m` (2, 2): E_R, E_L; `curvature` of `base_link` (1/m); `way_m` along the point's circle.
+    lies behind the machine or behind the pile. `limits_m` (2, 2): E_R, E_L; `curvature` of `base_link` (1/m); `way_m` along the
+    point's circle.
     """
     right_m, left_m = limits_m
     if abs(curvature) < _STRAIGHT_PM:

@@ -15,7 +15,6 @@ from typing import NamedTuple
 
 import numpy as np
 from lhdmap.loading.states import State
-
 from tests.guidance.tunnels import BODIES, room
 from tests.loading.task.bench import Bench, Drift, bench
 
@@ -42,7 +41,7 @@ def start_of(seed: int, width_m: tuple[float, float]) -> Bench | None:
     start = (drift.toe_m - far - float(BODIES.front_box_m[1, 0]), aside, float(turned))
     if room(np.array([*start, float(bend)]), drift.walls_m) < 0.05:
         return None
-    return bench(drift=drift, start=start, bend_rad=float(bend))
+    return bench(drift=drift, start=start, bend_rad=float(bend), guided=True)
 
 
 def came(seed: int, width_m: tuple[float, float]) -> Came | None:
@@ -59,7 +58,7 @@ def came(seed: int, width_m: tuple[float, float]) -> Came | None:
 
 def _beside_m(one: Bench) -> float:
     """Return the room of the lip's corners to the pile's limits, across the drift, where it touched."""
-    x, y, heading, *_ = one.truth.state.tolist()
+    y, heading = one.truth.state[1:3].tolist()
     (_, y0), (x1, y1) = BODIES.front_box_m
     corners = [y + x1 * math.sin(heading) + side * math.cos(heading) for side in (y0, y1)]
     return one.drift.half_m - max(abs(corner) for corner in corners)

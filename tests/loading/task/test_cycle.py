@@ -31,7 +31,7 @@ CYCLE = [
 
 
 def test_a_cycle_from_the_drift_to_a_weighed_bucket() -> None:
-    one = bench(start=(8.0, 0.3, 0.1))
+    one = bench(start=(8.0, 0.3, 0.1), guided=True)
     out = one.run(120.0, over)
     assert states(one) == [*CYCLE, State.DONE]
     assert (out.attempts, out.fill, out.assists) == (1, 0.9, 0)
@@ -39,7 +39,7 @@ def test_a_cycle_from_the_drift_to_a_weighed_bucket() -> None:
 
 
 def test_it_hands_over_to_the_correction_while_it_rolls() -> None:
-    one = bench(start=(5.0, 0.2, 0.0))
+    one = bench(start=(8.0, 0.2, 0.0), guided=True)
     one.run(60.0, lambda out: out.phase == "lower")
     began = next(k for k, out in enumerate(one.said) if out.phase == "approach")
     rolling = [out.phase for out in one.said[began:]]
@@ -100,8 +100,13 @@ def never(pedals: Pedals) -> object:
 
 @pytest.mark.parametrize(
     ("broken", "state", "limit_s"),
-    [("charge", State.CHARGING, 15.0), ("dig", State.EXCAVATION, 30.0), ("shake", State.PULL_BACK, 60.0), ("weigh", State.WEIGHING, 20.0)],
-)  # fmt: skip
+    [
+        ("charge", State.CHARGING, 15.0),
+        ("dig", State.EXCAVATION, 30.0),
+        ("shake", State.PULL_BACK, 60.0),
+        ("weigh", State.WEIGHING, 20.0),
+    ],
+)
 def test_what_does_not_end_is_one_for_an_operator_at_its_limit(broken: str, state: State, limit_s: float) -> None:
     one = bench(start=(12.0, 0.0, 0.0), controllers=controllers()._replace(**{broken: never(Pedals())}))
     out = one.run(200.0, lambda said: said.request is not None)
