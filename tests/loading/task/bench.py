@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from lhdmap.driving.lead import lead_of
 from lhdmap.driving.motion import Motion, Setpoint, Setpoints
+from lhdmap.geometry import se2
 from lhdmap.guidance.directive import HEADING, SPEED, WAY, Directive
 from lhdmap.guidance.planner import Guidance, method_of
 from lhdmap.guidance.settings import GuidanceSettings
@@ -49,8 +50,8 @@ class Drift:
 
     @property
     def walls_m(self) -> FloatArray:
-        """Wall points each 5 cm, on to 2 m past the toe."""
-        x = np.arange(-15.0, self.toe_m + 2.0, 0.05)
+        """Wall points each 8 cm, on to 2 m past the toe."""
+        x = np.arange(-15.0, self.toe_m + 2.0, 0.08)
         return np.vstack([np.column_stack([x, np.full(len(x), side * self.half_m)]) for side in (-1.0, 1.0)])
 
     @property
@@ -245,7 +246,8 @@ class Bench:
         speed = min(float(path[near, SPEED]), max(before, 0.0) + 1.0 * step_s, math.sqrt(1.2 * left), left / step_s)
         at += speed * step_s
         x, y, heading = (float(np.interp(at, path[:, WAY], path[:, k])) for k in (0, 1, HEADING))
-        self.truth.state = np.array([*lead.base((x, y, heading, 0.0, 0.0)), 0.0, 0.0])
+        x, y, heading = lead.base((x, y, heading, 0.0, 0.0))
+        self.truth.state = np.array([x, y, float(se2.wrap(heading)), 0.0, 0.0])
         self.truth.speed = directive.gear * (speed if left > 0.02 else 0.0)
 
     def motion(self) -> Motion:
