@@ -95,7 +95,7 @@ def shown(call: Callable[[Signals, int], Turn]) -> Any:
 def controllers(fill: float = 0.9) -> Controllers:
     """Simple ones: charge until 0.5 m in the pile, dig for 3 s, shake for 1 s, weigh for 2 s."""
     charge = shown(lambda s, n: Turn(Pedals(0.5), "collision" if s.toe_m < -0.5 else ""))
-    dig = shown(lambda s, n: Turn(Pedals(0.1, 0.8), "racked" if n > 150 else ""))
+    dig = shown(lambda s, n: Turn(Pedals(0.1, 0.5), "racked" if n > 150 else ""))
     shake = shown(lambda s, n: Turn(Pedals(tilt=0.5 * (-1) ** (n // 10)), "shaken" if n > 50 else ""))
     weigh = shown(lambda s, n: Turn(Pedals(), "settled" if n > 100 else "", (("fill", fill), ("fill_std", 0.03))))
     return Controllers(charge, dig, shake, weigh)

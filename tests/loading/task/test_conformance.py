@@ -1,4 +1,4 @@
-"""The task itself against the table: each state with each combination of facts is made real, and `update` must go where it says."""
+"""The task itself against the table: each state with each combination of facts is made real, `update` must go where it says."""
 
 from __future__ import annotations
 
