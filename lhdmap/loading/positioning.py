@@ -72,13 +72,14 @@ def side_of(found: tuple[float, float] | None, bend_side: float) -> Lands:
 def crossing(point_m: FloatArray, curvature: float, limits_m: FloatArray) -> Crossing:
     """Return where a point of the machine first meets the line through the limits, driving forward; frame `base_link`.
 
-    Of the two solutions the paper takes any; the one that is met first ahead counts here, for the other one lies behind the
-    machine or behind the pile. `limits_m` (2, 2): E_R, E_L; `curvature` of `base_link` (1/m); `way_m` along the point's circle.
+    Of the two solutions the paper takes any; the one that is met first within half a turn ahead counts here, for the other one
+    lies behind the machine or behind the pile. `limits_m` (2, 2): E_R, E_L; `curvature` of `base_link` (1/m); `way_m` along the
+    point's circle.
     """
     right_m, left_m = limits_m
     if abs(curvature) < _STRAIGHT_PM:
         E = left_m - right_m
-        if (abs(E[0]) < 1e-9 and abs(E[1]) < 1e-9) or abs(E[1]) < 1e-9:
+        if abs(E[1]) < 1e-9:
             return Crossing(math.nan, math.nan)
         share = float((point_m[1] - right_m[1]) / E[1])
         way = float(right_m[0] + share * E[0] - point_m[0])
@@ -91,9 +92,8 @@ def crossing(point_m: FloatArray, curvature: float, limits_m: FloatArray) -> Cro
     for share in found or ():
         to = right_m + share * (left_m - right_m) - center
         turned = math.copysign(1.0, curvature) * math.atan2(arm[0] * to[1] - arm[1] * to[0], float(arm @ to))
-        way = radius * (turned % (2.0 * math.pi))
-        if turned >= 0.0 and way < best.way_m:
-            best = Crossing(share, way)
+        if 0.0 <= radius * turned < best.way_m:
+            best = Crossing(share, radius * turned)
     return best if math.isfinite(best.way_m) else Crossing(math.nan, math.nan)
 
 

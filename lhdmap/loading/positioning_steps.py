@@ -97,6 +97,8 @@ class Positioning:
             return self._cannot(moment)
         off = self._aim.bend_rad - bend
         landed = self._aligner.lands(bend, limits)
+        if landed.good and landed.way_m < settings.charge_from_m:
+            return Step(ALIGN, Event.MISSED, f"too near to the pile: {landed.way_m:.1f} m")
         still = abs(motion.articulation_rate_rps) < _STILL_RPS
         if abs(off) < _REACHED_RAD and still and landed.good:
             self.phase = LOWER

@@ -18,7 +18,7 @@ from lhdmap.messages import FloatArray
 
 RACK, BACK, SHAKE = "rack", "back", "shake"
 _ARRIVED_M = 0.5
-_TRAIL_M, _STEP_M = 60.0, 0.25
+_TRAIL_M, _STEP_M, _GAP_M = 60.0, 0.25, 1.0
 
 
 class Trail:
@@ -35,8 +35,19 @@ class Trail:
             del self.motions[: -round(_TRAIL_M / _STEP_M)]
 
     def behind(self, motion: Motion) -> list[Motion]:
-        """Return what lies behind a motion: the trail up to its place nearest to there."""
-        return self.motions[: self._nearest(motion) + 1]
+        """Return what lies behind a motion: the trail up to its place nearest to there, back to where it has a gap.
+
+        After a pull back the trail goes on from farther back: what it had before is another pass.
+        """
+        found = self.motions[: self._nearest(motion) + 1]
+        for k in range(len(found) - 1, 0, -1):
+            if np.hypot(found[k].x_m - found[k - 1].x_m, found[k].y_m - found[k - 1].y_m) > _GAP_M:
+                return found[k:]
+        return found
+
+    def cut(self, motion: Motion) -> None:
+        """Forget what lies ahead of a motion, to which the machine has gone back."""
+        self.motions = self.behind(motion)
 
     def off_m(self, motion: Motion) -> float:
         """Return how far a motion is from the trail; infinite where there is none."""
@@ -97,6 +108,7 @@ class PullBack:
         left_m = self._stop_m - self._along_m(motion)
         if left_m < _ARRIVED_M and abs(motion.speed_mps) < settings.standing_mps:
             self.phase = SHAKE
+            self._trail.cut(motion)
             self._shake.begin(moment.signals)
             return self._shaken(moment)
         return Step(BACK, directive=Directive(moment.now_ns, -1, self._path, self._stop_m))

@@ -152,7 +152,7 @@ class LoadingTask:
         good = facts.ready and told.motion is not None and told.signals is not None
         if good and told.motion is not None and told.signals is not None:
             good = abs(told.motion.speed_mps) < settings.standing_mps
-            good &= not abs(told.motion.articulation_rad - told.signals.articulation_rad) > _JOINT_RAD
+            good &= abs(told.motion.articulation_rad - told.signals.articulation_rad) <= _JOINT_RAD
             if memory.touched and not memory.loaded:
                 good &= self._trail.off_m(told.motion) < settings.off_trail_m
         if not good:

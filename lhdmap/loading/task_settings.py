@@ -105,6 +105,9 @@ class LoadingSettings:
     run_up_m: float = setting(
         2.5, unit="m", minimum=0.0, maximum=20.0, doc="Nearer to the pile than this it stands while it corrects."
     )
+    charge_from_m: float = setting(
+        1.0, unit="m", minimum=0.0, maximum=20.0, doc="Nearer to the pile than this no charge begins."
+    )
     lower: float = setting(0.6, minimum=0.05, maximum=1.0, doc="Share with which bucket and boom are lowered.")
     press_bar: float = setting(
         23.0,

@@ -8,7 +8,10 @@ from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
 import numpy as np
+from lhdmap.driving.lead import lead_of
 from lhdmap.driving.motion import Motion, Setpoint, Setpoints
+from lhdmap.geometry import se2
+from lhdmap.guidance.directive import HEADING, SPEED, WAY, Directive
 from lhdmap.guidance.planner import Guidance, method_of
 from lhdmap.guidance.settings import GuidanceSettings
 from lhdmap.loading.assistance import Operator
@@ -26,7 +29,7 @@ from tests.guidance.planar_drive import EYES_M, Errors, Truth
 from tests.guidance.tunnels import BODIES, MODEL, room
 
 SECOND_NS = 1_000_000_000
-STEP_NS, CALL_NS, PLAN_NS = 10_000_000, 20_000_000, 50_000_000
+STEP_NS, CALL_NS, PLAN_NS = 10_000_000, 40_000_000, 80_000_000
 TOP_MPS = 2.6  # first gear at full pedal
 LIP_M = float(BODIES.front_box_m[1, 0])
 
@@ -47,8 +50,8 @@ class Drift:
 
     @property
     def walls_m(self) -> FloatArray:
-        """Wall points each 5 cm, on to 2 m past the toe."""
-        x = np.arange(-15.0, self.toe_m + 2.0, 0.05)
+        """Wall points each 8 cm, on to 2 m past the toe."""
+        x = np.arange(-15.0, self.toe_m + 2.0, 0.08)
         return np.vstack([np.column_stack([x, np.full(len(x), side * self.half_m)]) for side in (-1.0, 1.0)])
 
     @property
@@ -92,7 +95,7 @@ def shown(call: Callable[[Signals, int], Turn]) -> Any:
 def controllers(fill: float = 0.9) -> Controllers:
     """Simple ones: charge until 0.5 m in the pile, dig for 3 s, shake for 1 s, weigh for 2 s."""
     charge = shown(lambda s, n: Turn(Pedals(0.5), "collision" if s.toe_m < -0.5 else ""))
-    dig = shown(lambda s, n: Turn(Pedals(0.1, 0.8), "racked" if n > 150 else ""))
+    dig = shown(lambda s, n: Turn(Pedals(0.1, 0.5), "racked" if n > 150 else ""))
     shake = shown(lambda s, n: Turn(Pedals(tilt=0.5 * (-1) ** (n // 10)), "shaken" if n > 50 else ""))
     weigh = shown(lambda s, n: Turn(Pedals(), "settled" if n > 100 else "", (("fill", fill), ("fill_std", 0.03))))
     return Controllers(charge, dig, shake, weigh)
@@ -117,7 +120,10 @@ class Until:
 
 @dataclass
 class Bench:
-    """Runs the task on the machine; `change` may alter what it is told."""
+    """Runs the task on the machine; `change` may alter what it is told.
+
+    `guided`: real guidance drives; otherwise the machine runs along the path itself, which is quicker.
+    """
 
     drift: Drift
     task: LoadingTask
@@ -125,6 +131,7 @@ class Bench:
     bend_rad: float = 0.0
     operator: Operator | None = None
     change: Callable[[LoadingInput], LoadingInput] = lambda told: told
+    guided: bool = False
     now_ns: int = 0
     bucket_rad: float = 0.0
     boom_rad: float = 0.0
@@ -140,6 +147,7 @@ class Bench:
         self._guidance = Guidance(MODEL, BODIES, EYES_M, settings, method_of(settings))
         self._points = np.vstack([self.drift.walls_m, self.drift.face_m])
         self._queue: Setpoints = ()
+        self._planned_ns = -SECOND_NS
         self._pedals = Pedals(brake=True)
         self._travel_m = 0.0
         self._rng = np.random.default_rng(5)
@@ -177,8 +185,11 @@ class Bench:
     def _command(self, out: LoadingOutput, motion: Motion) -> None:
         """Drive as guidance, pedals or the brake say."""
         self._pedals = out.pedals or Pedals(brake=out.directive is None)
+        if out.directive is not None and not self.guided:
+            return
         if out.directive is not None:
-            if self.now_ns % PLAN_NS < CALL_NS:
+            if self.now_ns - self._planned_ns >= PLAN_NS:
+                self._planned_ns = self.now_ns
                 plan = self._guidance.plan(self.now_ns, motion, self.truth.sent[-60:], self._near(), out.directive)
                 self._queue = plan.setpoints
             times = np.array([one.at_ns for one in self._queue], dtype=float)
@@ -190,6 +201,7 @@ class Bench:
             self.truth.sent.append(Setpoint(self.now_ns, speed + lag, rate))
             return
         self._guidance.forget()
+        self._planned_ns = -SECOND_NS
         speed = 0.0 if self._pedals.brake else TOP_MPS * self._pedals.propel
         self.truth.sent.append(Setpoint(self.now_ns, speed, self._pedals.steering_rate_rps))
 
@@ -201,7 +213,11 @@ class Bench:
         return points[np.hypot(*(points - self.truth.state[:2]).T) < 25.0]
 
     def _move(self) -> None:
-        self.truth.step(self.now_ns)
+        directive = self.said[-1].directive
+        if directive is None or self.guided:
+            self.truth.step(self.now_ns)
+        elif self.now_ns % 20_000_000 == 0:
+            self._follow(directive, 0.02)
         stands = self._pedals.brake and abs(self.truth.speed) < 0.02
         self.truth.speed = 0.0 if stands else self.truth.speed
         self._travel_m += self.truth.speed * 0.01
@@ -216,6 +232,23 @@ class Bench:
             near = walls[np.hypot(*(walls - self.truth.state[:2]).T) < 12.0]
             self.rooms_m.append(room(self.truth.state, near))
             self.speeds_mps.append(self.truth.speed)
+
+    def _follow(self, directive: Directive, step_s: float) -> None:
+        """Run along the path, the joint straight."""
+        lead = lead_of(directive.gear, MODEL, BODIES)
+        x, y, *_ = lead.state(self.motion())
+        path = directive.path
+        near = int(np.hypot(path[:, 0] - x, path[:, 1] - y).argmin())
+        c, s = math.cos(path[near, HEADING]), math.sin(path[near, HEADING])
+        at = float(path[near, WAY] + c * (x - path[near, 0]) + s * (y - path[near, 1]))
+        before = directive.gear * self.truth.speed
+        left = max(directive.stop_m - at, 0.0)
+        speed = min(float(path[near, SPEED]), max(before, 0.0) + 1.0 * step_s, math.sqrt(1.2 * left), left / step_s)
+        at += speed * step_s
+        x, y, heading = (float(np.interp(at, path[:, WAY], path[:, k])) for k in (0, 1, HEADING))
+        x, y, heading = lead.base((x, y, heading, 0.0, 0.0))
+        self.truth.state = np.array([x, y, float(se2.wrap(heading)), 0.0, 0.0])
+        self.truth.speed = directive.gear * (speed if left > 0.02 else 0.0)
 
     def motion(self) -> Motion:
         x, y, heading, bend, rate = self.truth.state.tolist()
