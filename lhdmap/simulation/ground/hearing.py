@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections import deque
 
-
 from lhdmap.loading.signals import Signals
 from lhdmap.machine import Machine
 from lhdmap.simulation.ground.draws import generator

@@ -65,8 +65,8 @@ def _sub_step(
     heights = world.heights
     engine(state, rig, pedals[0], pedals[3] > 0.5, step_s)
     cylinders(state, rig, pedals[1], pedals[2], step_s)
-    moved, rise = _move_lip(state, rig, step_s)
-    cover = _touch(state, rig, rock, heights, moved, rise, step_s)
+    moved, rise = _move_lip(state, rig)
+    cover = _touch(state, rock, heights, moved, rise, step_s)
     _rock_forces(state, rig, rock, world, cover, pedals, step_s)
     _axles(state, rig, rock)
     drive = transmission(state, rig, step_s)
@@ -87,7 +87,7 @@ def _sub_step(
 
 
 @nb.njit(cache=True, nogil=True)
-def _move_lip(state: Record, rig: Record, step_s: float) -> tuple[float, float]:
+def _move_lip(state: Record, rig: Record) -> tuple[float, float]:
     """Put the lip where boom and bucket hold it; returns how far they moved it along x, and the speed at which it rises."""
     x, z = lip(rig, state.boom_rad, state.bucket_rad)
     _, rise = lip_rates(rig, state.boom_rad, state.bucket_rad, state.boom_rps, state.bucket_rps)
@@ -97,9 +97,7 @@ def _move_lip(state: Record, rig: Record, step_s: float) -> tuple[float, float]:
 
 
 @nb.njit(cache=True, nogil=True)
-def _touch(
-    state: Record, rig: Record, rock: Record, heights: FloatArray, moved_m: float, rise_mps: float, step_s: float
-) -> float:
+def _touch(state: Record, rock: Record, heights: FloatArray, moved_m: float, rise_mps: float, step_s: float) -> float:
     """Move on how deep the lip sits in rock, and return how well it is covered, 0 to 1: a rising lip loosens the rock."""
     depth = height_at(heights, rock, state.lip_x_m + _AHEAD_M) - max(state.lip_z_m, 0.0)
     if depth <= 0.02:
