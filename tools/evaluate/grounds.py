@@ -31,10 +31,10 @@ _PAPER = {
     "final": (0.906, 0.015), "in time": (0.99, 0.02),
 }  # fmt: skip
 _RANGES = {
-    "rock.hardness": (1.2, 3.6), "rock.hardness_sigma": (0.4, 0.9), "rock.loosened": (0.72, 1.0), "rock.loosening": (3.0, 8.0),
-    "rock.rake_factor": (1.2, 3.0), "rock.fee_scale": (0.25, 0.75), "rock.tensile_kpa": (8.0, 28.0),
-    "face.slide_per_s": (3.0, 20.0), "face.lateral_share": (0.0, 0.5), "filling.entering": (0.8, 0.97),
-    "filling.level_share": (0.62, 0.9), "filling.heap": (1.0, 1.25), "filling.boulder_chance": (0.03, 0.07),
+    "rock.hardness": (1.0, 4.0), "rock.hardness_sigma": (0.5, 1.2), "rock.loosened": (0.75, 1.0), "rock.loosening": (3.0, 8.0),
+    "rock.rake_factor": (1.2, 3.0), "rock.fee_scale": (0.2, 0.6), "rock.tensile_kpa": (8.0, 28.0),
+    "face.slide_per_s": (3.0, 20.0), "face.lateral_share": (0.0, 0.5), "filling.entering": (0.84, 0.98),
+    "filling.level_share": (0.6, 0.85), "filling.heap": (1.1, 1.4), "filling.boulder_chance": (0.03, 0.07),
     "hydraulic.tilt_factor": (0.85, 1.1), "operator.stop_fill": (0.76, 0.88),
 }  # fmt: skip
 

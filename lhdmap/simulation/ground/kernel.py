@@ -16,13 +16,12 @@ from lhdmap.simulation.ground.records import Record
 
 GRAVITY_MPS2 = 9.81
 NOISE_STEP_M = 0.02
+SLIPS = 0.5  # slip ratio from which on the wheels count as slipping
 _STANDS_M = 1e-4  # a face steeper by less than this over a cell stands
-_COVER_M = 0.4  # depth from which on the rock holds the lip with all its strength
+_COVER_M = 0.8  # depth from which on the rock holds the lip with all its strength
 _BACKWARDS = 0.15  # of the resistance, out of the pile
-_RESTING, _RELAXING_S = (
-    0.4,
-    0.2,
-)  # what of the rock's reaction stays on a bucket that is not moved, and how fast it goes
+_RESTING = 0.8  # of the rock's reaction, on a bucket that is held
+_RELAXING_S = 0.2  # how fast the reaction comes and goes
 _SLOW_MPS = 0.2
 _AHEAD_M = 0.10  # where the depth over the lip is taken
 _LOAD_BACK_M = 0.9  # the content's middle behind the lip
@@ -189,7 +188,7 @@ def _roll(state: Record, rig: Record, drive_n: float, brake: bool, step_s: float
     state.speed_mps = after
     state.wheel_mps = wheel + a * (push - total)
     state.traction_n = total
-    if state.wheel_mps - after > 0.2 * max(abs(state.wheel_mps), 0.2):
+    if abs(state.wheel_mps - after) > SLIPS * max(abs(state.wheel_mps), abs(after), _SLOW_MPS):
         state.slip_s += step_s
     if state.rear_n <= 0.0:
         state.rear_up_s += step_s
