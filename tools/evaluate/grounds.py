@@ -35,7 +35,7 @@ _RANGES = {
     "rock.rake_factor": (1.2, 3.0), "rock.fee_scale": (0.2, 0.6), "rock.tensile_kpa": (8.0, 28.0),
     "face.slide_per_s": (3.0, 20.0), "face.lateral_share": (0.0, 0.5), "filling.entering": (0.84, 0.98),
     "filling.level_share": (0.6, 0.85), "filling.heap": (1.1, 1.4), "filling.boulder_chance": (0.03, 0.07),
-    "hydraulic.tilt_factor": (0.85, 1.1), "operator.stop_fill": (0.76, 0.88),
+    "hydraulic.tilt_factor": (0.75, 1.05), "operator.stop_fill": (0.76, 0.88),
 }  # fmt: skip
 
 

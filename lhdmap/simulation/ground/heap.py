@@ -33,6 +33,7 @@ class Heap:
     def __init__(
         self, grid: Grid, heights_m: FloatArray, slope: float, inside: Inside, floor: FloorAt, *, fed: bool = True
     ) -> None:
+        self._home = grid  # what all grids cover
         self.grid, self.slope, self._inside, self._floor = grid, slope, inside, floor
         self.version, self.came_m3, self.calm = 0, 0.0, False
         far_m = (grid.shape[0] - 1) * ALONG_M - _FED_M if fed else math.inf
@@ -59,7 +60,7 @@ class Heap:
 
     def turn_to(self, through_m: FloatArray, heading_rad: float) -> int:
         """Turn the grid to a heading (rad) through a point (x, y); returns the first column on its left. Volume is kept."""
-        grid = turned(self.grid, through_m, heading_rad)
+        grid = turned(self._home, through_m, heading_rad)
         at = np.moveaxis(self.grid.places(grid.points()), 2, 0)
         old, volume = self.heights_m, self.volume_m3
         fields = [
@@ -80,7 +81,7 @@ class Heap:
     def give_back(self, first: int, last: int, slice_m: FloatArray) -> None:
         """Take the heights (N,) that the side view made of `slice_m`."""
         change = slice_m - self.slice_m(first, last)
-        spread_back(self.heights_m, first, last, change)
+        spread_back(self.heights_m, self._open, first, last, change)
         self.version += bool(np.abs(change).max() > _SEEN_M)
 
     def slide(self, dt_s: float, per_s: float, bucket: tuple[int, int, int, int] = _NO_BUCKET) -> None:

@@ -23,6 +23,7 @@ _BACKWARDS = 0.15  # of the resistance, out of the pile
 _RESTING = 0.8  # of the rock's reaction, on a bucket that is held
 _RELAXING_S = 0.2  # how fast the reaction comes and goes
 _SLOW_MPS = 0.2
+_STANDS_MPS = 0.02
 _AHEAD_M = 0.10  # where the depth over the lip is taken
 _LOAD_BACK_M = 0.9  # the content's middle behind the lip
 
@@ -185,8 +186,15 @@ def _roll(state: Record, rig: Record, drive_n: float, brake: bool, step_s: float
         total = (force + slope * (a * push + speed)) / (1.0 + slope * a)
         total = min(max(total, -state.grip_n), state.grip_n)
         after = 0.0
-    state.speed_mps = after
-    state.wheel_mps = wheel + a * (push - total)
+    turning = wheel + a * (push - total)
+    if (
+        state.brake > 0.99
+        and abs(turning) < _STANDS_MPS
+        and abs(after) < _STANDS_MPS
+        and abs(pull) < 0.9 * state.grip_n
+    ):
+        after, turning, total = 0.0, 0.0, -pull  # locked tyres hold without creeping
+    state.speed_mps, state.wheel_mps = after, turning
     state.traction_n = total
     if abs(state.wheel_mps - after) > SLIPS * max(abs(state.wheel_mps), abs(after), _SLOW_MPS):
         state.slip_s += step_s
