@@ -43,6 +43,7 @@ class _Scene:
     rock: Record
     heights: FloatArray
     state: Record
+    kg_m3: float
 
 
 class Loader:
@@ -63,7 +64,8 @@ class Loader:
         rock["origin_m"] = _ORIGIN_M
         x = _ORIGIN_M + CELL_M * np.arange(_CELLS)
         heights = np.clip(x * rock["slope"], 0.0, load.crest_m)
-        self._scene = _Scene(seed, load, rig_of(self.machine, load.tilt_factor), rock, heights, record(State()))
+        kg_m3 = float(rock["density"][0] / rock["swell"][0])
+        self._scene = _Scene(seed, load, rig_of(self.machine, load.tilt_factor), rock, heights, record(State()), kg_m3)
         self._number, self._now_ns = 0, time_ns
         return self._attempt(approach_m)
 
@@ -103,7 +105,8 @@ class Loader:
     @property
     def truth(self) -> Truth:
         """What really is; for evaluation, never for a controller."""
-        return self._truth(self.state)
+        scene = self._scene
+        return truth_of(self.state, self.machine, scene.kg_m3, toe_of(scene.heights, _ORIGIN_M), self._number)
 
     @property
     def pile(self) -> tuple[FloatArray, FloatArray]:
@@ -145,14 +148,10 @@ class Loader:
         )  # fmt: skip
         still = np.array([0.0, 0.0, 0.0, 0.0, 1.0])
         advance(scene.state, scene.rig, scene.rock, self._world, still, 1, self._sub_step_s)
-        self._hearing.begin(scene.seed, self._number, chance.toe_error_m)
+        self._hearing.begin(scene.seed, self._number, self._now_ns, begin - ahead, chance.toe_error_m)
         return self._heard()
 
     def _heard(self) -> Signals:
-        state = self.state
-        return self._hearing.signals(self._now_ns, state, self._truth(state))
-
-    def _truth(self, state: State) -> Truth:
-        rock = self._scene.rock
-        kg_m3 = float(rock["density"][0] / rock["swell"][0])
-        return truth_of(state, self.machine, kg_m3, toe_of(self._scene.heights, _ORIGIN_M), self._number)
+        scene, state = self._scene, self.state
+        toe_m = toe_of(scene.heights, _ORIGIN_M) - state.lip_x_m
+        return self._hearing.signals(self._now_ns, state, toe_m, state.content_m3 * scene.kg_m3)
