@@ -1,7 +1,7 @@
 """Calibrate a mine's ground: random search over its settings against Tables 3 to 5 of the loading paper.
 
     python -m tools.evaluate.grounds judge datasets/grounds/default.toml 200
-    python -m tools.evaluate.grounds search SEED CANDIDATES LOADS OUT.jsonl
+    python -m tools.evaluate.grounds search SEED CANDIDATES LOADS OUT.jsonl [BEGIN.jsonl]
 
 The controller is the paper's law as printed in Fig. 19, with `else if` (findings: as printed S_push lasts one tick), a guard of
 1.5 s at the launch and 0.03 rad of tolerance at the bucket's stop.
@@ -25,17 +25,17 @@ from lhdmap.simulation.ground.sections import Grounds, load_ground
 
 _STEP_S, _PEDAL, _APPROACH_M = 0.02, 0.5, 3.0
 _PAPER = {
-    "fill 1": (0.62, 0.04), "fill 2": (0.77, 0.04), "fill 3": (0.82, 0.04), "fill 4": (0.90, 0.06),
+    "fill 1": (0.62, 0.03), "fill 2": (0.77, 0.04), "fill 3": (0.82, 0.04), "fill 4": (0.90, 0.04),
     "reach 2": (0.70, 0.08), "reach 3": (0.57, 0.09), "reach 4": (0.20, 0.07), "attempts": (2.47, 0.17),
     "dig 1": (12.7, 1.5), "dig 2": (10.2, 0.6), "dig 3": (10.8, 0.7), "dig 4": (10.7, 1.2),
     "final": (0.906, 0.015), "in time": (0.99, 0.02),
 }  # fmt: skip
 _RANGES = {
-    "rock.hardness": (1.2, 3.6), "rock.hardness_sigma": (0.4, 0.9), "rock.loosened": (0.72, 1.0), "rock.loosening": (3.0, 8.0),
-    "rock.rake_factor": (1.2, 3.0), "rock.fee_scale": (0.25, 0.75), "rock.tensile_kpa": (8.0, 28.0),
-    "face.slide_per_s": (3.0, 20.0), "face.lateral_share": (0.0, 0.5), "filling.entering": (0.8, 0.97),
-    "filling.level_share": (0.62, 0.9), "filling.heap": (1.0, 1.25), "filling.boulder_chance": (0.03, 0.07),
-    "hydraulic.tilt_factor": (0.85, 1.1), "operator.stop_fill": (0.76, 0.88),
+    "rock.hardness": (1.0, 4.0), "rock.hardness_sigma": (0.5, 1.2), "rock.loosened": (0.75, 1.0), "rock.loosening": (3.0, 8.0),
+    "rock.rake_factor": (1.2, 3.0), "rock.fee_scale": (0.2, 0.6), "rock.tensile_kpa": (8.0, 28.0),
+    "face.slide_per_s": (3.0, 20.0), "face.lateral_share": (0.0, 0.5), "filling.entering": (0.84, 0.98),
+    "filling.level_share": (0.6, 0.85), "filling.heap": (1.1, 1.4), "filling.boulder_chance": (0.03, 0.07),
+    "hydraulic.tilt_factor": (0.75, 1.05), "operator.stop_fill": (0.76, 0.88),
 }  # fmt: skip
 
 
@@ -52,14 +52,17 @@ class Skid:
     """Eq. (7): over a window of a second, the largest speed at least 0.2 m/s."""
 
     def __init__(self) -> None:
-        self._past: deque[tuple[int, float]] = deque()
+        self._falling: deque[tuple[int, float]] = deque()
 
     def __call__(self, signals: Signals) -> float:
         scan = 0.0 if math.isnan(signals.scan_mps) else signals.scan_mps
-        self._past.append((signals.now_ns, max(signals.tacho_mps, scan)))
-        while self._past[0][0] < signals.now_ns - 1_000_000_000:
-            self._past.popleft()
-        return (signals.tacho_mps - scan) / max(0.2, *(speed for _, speed in self._past))
+        now, fastest = signals.now_ns, max(signals.tacho_mps, scan)
+        while self._falling and self._falling[-1][1] <= fastest:
+            self._falling.pop()
+        self._falling.append((now, fastest))
+        while self._falling[0][0] < now - 1_000_000_000:
+            self._falling.popleft()
+        return (signals.tacho_mps - scan) / max(0.2, self._falling[0][1])
 
 
 def attempt(loader: Loader, signals: Signals) -> Dig:
@@ -86,10 +89,10 @@ def dig(loader: Loader, signals: Signals, skid: Skid) -> tuple[float, str]:
     tilting, start = True, signals.travel_m
     while True:
         since, here, slipping = (signals.now_ns - changed) * 1e-9, (signals.now_ns - begun) * 1e-9, skid(signals)
-        for ended, over in (("lift", signals.boom_rad >= 0.5), ("tilt", signals.bucket_rad >= -0.03),
-                            ("way", signals.travel_m - start >= 2.0), ("time", here > 30.0)):  # fmt: skip
-            if over:
-                return here, ended
+        if signals.boom_rad >= 0.5 or signals.bucket_rad >= -0.03:
+            return here, "stop"
+        if signals.travel_m - start >= 2.0 or here > 30.0:
+            return here, "way" if here <= 30.0 else "time"
         if tilting:
             pedals = Pedals(_PEDAL, min(1.2 * since, 1.0))
             tilting = since <= 1.0
@@ -153,18 +156,23 @@ def judge(ground: Grounds, count: int, first_seed: int, approach_m: float = 7.0)
     return figures([load(loader, first_seed + i, approach_m) for i in range(count)])
 
 
-def search(seed: int, candidates: int, count: int, out: Path) -> None:
-    """Draw grounds, and around the best of them ever closer; a line of JSON for each."""
+def search(seed: int, candidates: int, count: int, out: Path, known: Path | None) -> None:
+    """Draw grounds, and around the best of them ever closer; a line of JSON for each. `known`: begin at the best of these."""
     rng, best = np.random.default_rng(seed), list[tuple[float, dict[str, float]]]()
+    if known is not None:
+        rows = [json.loads(line) for line in known.read_text(encoding="utf-8").splitlines()]
+        best = [(math.inf, row["values"]) for row in sorted(rows, key=lambda row: float(row["loss"]))[:6]]
     for turn in range(candidates):
         values = {key: float(rng.uniform(*both)) for key, both in _RANGES.items()}
-        if turn >= candidates // 3:
-            _, near = best[int(rng.integers(min(4, len(best))))]
+        if known is not None and turn < 6:
+            values = best[turn][1] if turn < len(best) else values
+        elif known is not None or turn >= candidates // 3:
+            _, near = best[int(rng.integers(min(5, len(best))))]
             for key, (low, high) in _RANGES.items():
                 step = 0.12 * (high - low) * float(rng.standard_normal()) * (rng.random() < 0.5)
                 values[key] = float(np.clip(near[key] + step, low, high))
-        found = judge(varied(Grounds(), values), count, 10_000 + 7 * (turn % 3), _APPROACH_M)
-        best = sorted([*best, (loss(found), values)], key=lambda one: one[0])[:8]
+        found = judge(varied(Grounds(), values), count, 10_000 + 1000 * seed, _APPROACH_M)
+        best = sorted([*best, (loss(found), values)], key=lambda one: one[0])[: 8 + 6 * (turn < 6)]
         with out.open("a", encoding="utf-8") as stream:
             stream.write(json.dumps({"loss": loss(found), "values": values, "figures": found}) + "\n")
 
@@ -176,7 +184,8 @@ def main() -> None:
             print(f"{name:10} {value:6.3f}", *(f"paper {_PAPER[name][0]}" for _ in range(name in _PAPER)))
         print(f"loss {loss(found):.2f}")
     else:
-        search(int(sys.argv[2]), int(sys.argv[3]), int(sys.argv[4]), Path(sys.argv[5]))
+        known = Path(sys.argv[6]) if len(sys.argv) > 6 else None
+        search(int(sys.argv[2]), int(sys.argv[3]), int(sys.argv[4]), Path(sys.argv[5]), known)
 
 
 if __name__ == "__main__":
