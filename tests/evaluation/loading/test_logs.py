@@ -32,7 +32,7 @@ def test_digs_fills_and_loads_are_found_in_signals(log: tuple[Path, list[float]]
     assert [len(load.attempts) for load in found.loads] == [3, 2]
     digs = [one for load in found.loads for one in load.attempts]
     np.testing.assert_allclose([one.duration_s for one in digs], durations_s, atol=0.16)
-    np.testing.assert_allclose([one.fill for one in digs], sum(FILLS, []), atol=0.02)
+    np.testing.assert_allclose([one.fill for one in digs], [fill for load in FILLS for fill in load], atol=0.02)
     assert {one.mode for one in digs} == {"autonomous"}
     assert not any(one.early for one in digs)
     assert found.warnings == []

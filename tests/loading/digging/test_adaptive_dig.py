@@ -48,9 +48,9 @@ def test_without_scans_the_wheels_tell_the_advance() -> None:
 
 def test_slip_lifts_and_takes_pedal() -> None:
     slipping = asked(tacho_mps=1.0, scan_mps=0.5)
-    assert (slipping.lift, slipping.propel) == (1.0, pytest.approx(LAW.pedal * LAW.pedal_slipping))
+    assert [slipping.lift, slipping.propel] == pytest.approx([1.0, LAW.pedal * LAW.pedal_slipping])
     holding = asked(tacho_mps=1.0, scan_mps=0.95)
-    assert (holding.lift, holding.propel) == (0.0, pytest.approx(LAW.pedal))
+    assert [holding.lift, holding.propel] == pytest.approx([0.0, LAW.pedal])
 
 
 def test_a_stuck_machine_backs_out_once_and_goes_on() -> None:
@@ -70,7 +70,8 @@ def test_a_stuck_machine_backs_out_once_and_goes_on() -> None:
 def test_what_moves_is_not_stuck(moving: str) -> None:
     back_off = BackOff(ExcavationSettings(stuck_rps=0.02, stuck_mps=0.03))
     for k in range(500):
-        one = QUIET._replace(now_ns=k * 20_000_000, **{moving: 0.05 * 0.02 * k})
+        change: dict[str, Any] = {moving: 0.05 * 0.02 * k}
+        one = QUIET._replace(now_ns=k * 20_000_000, **change)
         assert not back_off.update(one)
 
 

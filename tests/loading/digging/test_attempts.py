@@ -82,5 +82,5 @@ def test_ends_whatever_is_weighed() -> None:
 
 def test_gains_of_loads_are_their_line() -> None:
     gains = fit_gains([[0.5, 0.5 + 0.3], [0.8, 0.8 + 0.15], [0.2, 0.2 + 0.45]])
-    assert (gains.empty, gains.full) == (pytest.approx(0.55), pytest.approx(0.05))
+    assert [gains.empty, gains.full] == pytest.approx([0.55, 0.05])
     assert fit_gains([[0.5], [0.7]]).gain(0.2) == 0.0

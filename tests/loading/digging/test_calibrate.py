@@ -18,7 +18,7 @@ M, N = 0.0207, 1.0774
 def test_table_2_comes_back() -> None:
     fill = np.linspace(0.0, 1.1, 7)
     model = fit_weights((fill + N) / M, fill)
-    assert (model.m, model.n) == (pytest.approx(M), pytest.approx(N))
+    assert [model.m, model.n] == pytest.approx([M, N])
     assert model.m_95 == pytest.approx(0.0, abs=1e-9)
 
 

@@ -87,7 +87,8 @@ def test_the_pedal_is_constant_and_nothing_is_lifted() -> None:
 
 
 def test_nothing_is_touched_by_what_is_not_heard() -> None:
-    nothing = Signals(0, *[math.nan] * 2, 0, *[math.nan] * 8)
+    nan = math.nan
+    nothing = Signals(0, nan, nan, 0, nan, nan, nan, nan, nan, nan, nan)
     for name in ("paper", "fused"):
         charge = Charge(SETTINGS, name)
         charge.begin(nothing)

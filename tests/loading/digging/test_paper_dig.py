@@ -103,7 +103,7 @@ def test_hysteresis_ends_chatter() -> None:
         ({"boom_rad": math.nan, "bucket_rad": math.nan, "travel_m": math.nan}, ""),
     ],
 )
-def test_stops(heard: dict[str, float], ended: str) -> None:
+def test_stops(heard: dict[str, Any], ended: str) -> None:
     dig = PaperDig(ExcavationSettings(), PaperDigSettings())
     dig.begin(QUIET)
     turn = dig.step(QUIET._replace(now_ns=20_000_000, **heard))

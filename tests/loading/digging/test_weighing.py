@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from dataclasses import replace
 
@@ -91,7 +92,7 @@ def test_a_pressure_that_is_not_heard_gives_no_fill() -> None:
 @pytest.mark.parametrize("damping", [0.03, 0.08])
 def test_the_centre_of_a_damped_sinusoid(frequency_hz: float, damping: float) -> None:
     """1 s of a swing of 12 bar about 90 bar, noise 1.5 bar: the mean is off by bars, the fit by tenths."""
-    t, rng, errors, plain = np.arange(50) * 0.02, np.random.default_rng(5), [], []
+    t, rng, errors, plain = 0.02 * np.arange(50, dtype=float), np.random.default_rng(5), [], []
     w = 2.0 * math.pi * frequency_hz
     for phase in np.linspace(0.0, 6.0, 12):
         swing = 90.0 + 12.0 * np.exp(-damping * w * t) * np.cos(w * t + phase) + 1.5 * rng.standard_normal(50)
@@ -106,7 +107,7 @@ def test_the_shake_goes_down_and_up_and_back() -> None:
     loader = Loader(World(), bucket_rad=-0.1)
     turn, turns, _ = run(Shake(SETTINGS, ExcavationSettings()), loader)
     tilts = [one.pedals.tilt for one in turns]
-    signs = [tilts[0]] + [b for a, b in zip(tilts, tilts[1:], strict=False) if b != a]
+    signs = [tilts[0]] + [b for a, b in itertools.pairwise(tilts) if b != a]
     assert signs == [-1.0, 1.0, -1.0, 1.0, 0.0]
     assert turn.ended == "shaken"
     assert loader.bucket_rad >= -0.03
