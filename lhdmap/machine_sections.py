@@ -112,7 +112,7 @@ class Linkage:
     )
     boom_min_rad: float = setting(0.0, unit="rad", source=_CLASS, doc="Lower stop of `boom_lift`.")
     boom_max_rad: float = setting(1.2, unit="rad", source=_CLASS, doc="Upper stop of `boom_lift`.")
-    bucket_min_rad: float = setting(-1.8, unit="rad", source=_CLASS, doc="Lower stop of `bucket_tilt`: dumped.")
+    bucket_min_rad: float = setting(-2.2, unit="rad", source=_CLASS, doc="Lower stop of `bucket_tilt`: dumped.")
     bucket_max_rad: float = setting(0.0, unit="rad", source=_CLASS, doc="Upper stop of `bucket_tilt`: rolled back.")
     lift_rate_rps: float = setting(0.16, unit="rad/s", source=_LOADING, minimum=0.01, doc="Boom at full engine speed.")
     tilt_rate_rps: float = setting(

@@ -13,7 +13,7 @@ from lhdmap.simulation.ground.records import Record
 BUCKET_LENGTH_M = 1.4  # over which the content spreads
 _PUSHED = 6  # cells ahead of the lip that get what is pushed on
 _REACH = 100  # cells ahead of the lip that slide while it is in the pile
-_DUMPED_RAD = -0.75  # floor angle at which nothing stays in the bucket
+_DUMPED_RAD = -0.65  # floor angle at which nothing stays in the bucket
 _ROUNDED_RAD = 0.5  # floor angle from which on the whole heap stays
 
 
@@ -121,3 +121,18 @@ def settle(state: Record, rig: Record, rock: Record, heights: FloatArray) -> Non
     for _ in range(4000):
         if slide(state, rig, rock, heights, 1.0, in_pile=False) < 1e-3:
             break
+
+
+@nb.njit(cache=True, nogil=True)
+def take_boulder(state: Record, rig: Record, rock: Record, heights: FloatArray, volume_m3: float) -> None:
+    """Put a boulder of the pile into the bucket: its volume comes off the face above the lip."""
+    area = volume_m3 / (rock.swell * rig.width_m)
+    left = area
+    first = max(math.floor((state.lip_x_m + 0.3 - rock.origin_m) / rock.step_m + 0.5), 0)
+    for k in range(first, len(heights)):
+        taken = min(left / rock.step_m, 0.5 * heights[k])
+        heights[k] -= taken
+        left -= taken * rock.step_m
+        if left <= 0.0:
+            break
+    state.content_m3 += (area - left) * rock.swell * rig.width_m

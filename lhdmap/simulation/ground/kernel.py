@@ -17,6 +17,7 @@ GRAVITY_MPS2 = 9.81
 NOISE_STEP_M = 0.02
 _STANDS_M = 1e-4  # a face steeper by less than this over a cell stands
 _COVER_M = 0.4  # depth from which on the rock holds the lip with all its strength
+_BACKWARDS = 0.15  # of the resistance, out of the pile
 _RESTING, _RELAXING_S = (
     0.4,
     0.2,
@@ -163,13 +164,13 @@ def _roll(state: Record, rig: Record, drive_n: float, brake: bool, step_s: float
     held = rig.loss_pa * rig.displacement_m3 / rig.wheel_radius_m + state.brake * rig.brake_n
     free = wheel + a * (drive_n - force)
     push = drive_n - math.copysign(min(held, abs(free) / a), free)
-    rolling = rig.rolling * weight
-    way = 1.0 if speed + b * force > 0.0 else -1.0
-    resist = rolling + (state.resist_n if way > 0.0 else 0.15 * state.resist_n)
-    total = (force + slope * (a * push + way * b * resist)) / (1.0 + slope * (a + b))
+    rolling, pull = rig.rolling * weight, state.pull_n
+    way = 1.0 if speed + b * (force + pull) > 0.0 else -1.0
+    resist = rolling + (state.resist_n if way > 0.0 else _BACKWARDS * state.resist_n)
+    total = (force + slope * (a * push + b * (way * resist - pull))) / (1.0 + slope * (a + b))
     total = min(max(total, -state.grip_n), state.grip_n)
-    after = speed + b * (total - way * resist)
-    if after * way <= 0.0 and abs(speed) < 5.0:
+    after = speed + b * (total + pull - way * resist)
+    if after * way <= 0.0:
         total = (force + slope * (a * push + speed)) / (1.0 + slope * a)
         total = min(max(total, -state.grip_n), state.grip_n)
         after = 0.0

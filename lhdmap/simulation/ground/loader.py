@@ -17,7 +17,7 @@ from lhdmap.loading.signals import Pedals, Signals
 from lhdmap.machine import Machine
 from lhdmap.messages import FloatArray
 from lhdmap.simulation.ground.draws import CELL_M, Attempt, draw_attempt, draw_load, hardness_factor
-from lhdmap.simulation.ground.face import capacity, put_ahead, settle
+from lhdmap.simulation.ground.face import capacity, put_ahead, settle, take_boulder
 from lhdmap.simulation.ground.hearing import Hearing
 from lhdmap.simulation.ground.kernel import advance
 from lhdmap.simulation.ground.records import State, record, state_of
@@ -73,7 +73,8 @@ class Loader:
         advance(self._state, self._rig, self._rock, self._world, row, steps, dt_s / steps)
         self._now_ns += round(dt_s * 1e9)
         if self._chance.boulder_m3 > 0.0 and self._state["way_m"][0] > _BOULDER_WAY_M:
-            self._take_boulder(self._chance.boulder_m3)
+            take_boulder(self._state[0], self._rig[0], self._rock[0], self._heights, self._chance.boulder_m3)
+            self._chance = self._chance._replace(boulder_m3=0.0)
         return self._hearing.signals(self._now_ns, state_of(self._state), self.truth)
 
     @property
@@ -134,17 +135,3 @@ class Loader:
         put_ahead(self._heights, toe, self._rock[0], share)
         self._state["lateral_m3"] += share * self._rig["width_m"]
         settle(self._state[0], self._rig[0], self._rock[0], self._heights)
-
-    def _take_boulder(self, volume_m3: float) -> None:
-        """Put a boulder of the pile into the bucket: its volume comes off the face above the lip."""
-        self._chance = self._chance._replace(boulder_m3=0.0)
-        area = volume_m3 / float(self._rock["swell"][0] * self._rig["width_m"][0])
-        first = round((float(self._state["lip_x_m"][0]) + 0.3 - _ORIGIN_M) / CELL_M)
-        for k in range(first, _CELLS):
-            taken = min(area / CELL_M, 0.5 * float(self._heights[k]))
-            self._heights[k] -= taken
-            area -= taken * CELL_M
-            if area <= 0.0:
-                break
-        got = volume_m3 - area * float(self._rock["swell"][0] * self._rig["width_m"][0])
-        self._state["content_m3"] += got
