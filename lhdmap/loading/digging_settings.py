@@ -236,6 +236,9 @@ class ExcavationSettings:
     advance_max_m: float = setting(
         3.4, unit="m", minimum=0.1, maximum=10.0, source=_FINDINGS, doc="adaptive: stop d_max."
     )
+    resists_kn: float = setting(
+        100.0, unit="kN", minimum=0.0, maximum=1000.0, doc="adaptive: the way of d_max begins at this force, or after 2 m."
+    )
     stuck_s: float = setting(
         0.8,
         unit="s",

@@ -12,6 +12,10 @@ from lhdmap.loading.signals import Pedals, Signals, Turn
 from lhdmap.loading.skid import SkidFactor
 
 
+_TICK_S = 0.02
+_SPILLED_M = 2.0  # of way at most before the pile resists
+
+
 class AdaptiveDig:
     """An admittance: `tilt = (F - F_0) / F_1 + (v_0 - v) / v_1`, within 0 and 1.
 
@@ -30,11 +34,15 @@ class AdaptiveDig:
         self._lift = SlipLift(one.skid_max, one.hysteresis, one.lift_least_s)
         self._back_off = BackOff(one)
         self._stops.begin(signals)
+        self._smoothed = 0.0
+        self._resisted, self._begun_m = False, signals.travel_m
 
     def step(self, signals: Signals) -> Turn:
         """Return the pedals of this moment, and the stop where one is reached."""
-        one, skid, ended = self._settings, self._skid.update(signals), self._stops.reached(signals)
+        one, skid = self._settings, self._smooth(self._skid.update(signals))
         force_kn = one.force_kn_per_bar * signals.transmission_bar
+        self._count_way(force_kn, signals)
+        ended = self._stops.reached(signals)
         values = (
             ("advance_m", self._stops.advance_m(signals)),
             ("skid", skid),
@@ -51,6 +59,20 @@ class AdaptiveDig:
         pedal = one.pedal * (one.pedal_slipping if slipping else 1.0)
         tilt = self._tilt(force_kn, signals)
         return Turn(Pedals(pedal, tilt=tilt, lift=float(slipping), full_rpm=True), values=values)
+
+    def _smooth(self, skid: float) -> float:
+        """Return the low-passed skid; where it is not known, the one before."""
+        if math.isfinite(skid):
+            smooth_s = self._settings.skid_smooth_s
+            self._smoothed += (skid - self._smoothed) * (_TICK_S / (smooth_s + _TICK_S))
+        return self._smoothed
+
+    def _count_way(self, force_kn: float, signals: Signals) -> None:
+        """Let the way begin where the pile first resists: spilled rock before it is felt, too, and is soon passed."""
+        if not self._resisted:
+            spilled_m = signals.travel_m - self._begun_m
+            self._resisted = force_kn > self._settings.resists_kn or spilled_m > _SPILLED_M
+            self._stops.begin(signals)
 
     def _tilt(self, force_kn: float, signals: Signals) -> float:
         """Return the tilt command; without scan odometry the tachometer tells the advance, without a pressure it is half."""
