@@ -43,7 +43,7 @@ class State(Protocol):
     def speed_mps(self) -> float: ...
 
     def row(self) -> FloatArray:
-        """Return it as a row of a history, shape (17,)."""
+        """Return it as a row of a history, shape (20,)."""
         ...
 
 

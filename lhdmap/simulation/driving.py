@@ -46,7 +46,7 @@ class Plan(NamedTuple):
 
 
 def simulate_motion(drift: Drift, plan: Plan, machine: Machine, shaking: Shaking) -> FloatArray:
-    """Return the motion of `machine` over the floor of `drift` as planned: rows (N, 17) of a history at `TABLE_RATE_HZ`.
+    """Return the motion of `machine` over the floor of `drift` as planned: rows (N, 20) of a history at `TABLE_RATE_HZ`.
 
     The wheels do not slip: their speed is that of the machine.
     """

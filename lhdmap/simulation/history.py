@@ -24,7 +24,8 @@ class Column(IntEnum):
 
     `SPEED` is that of the front axle along its heading, signed; `WHEEL_SPEED` that of the drive line; `TRACTION` the
     acceleration (m/s²) that the wheels' force would give the machine on a level and without resistance, signed along x;
-    `LOAD` the mass in the bucket (kg); `CURL` the torque share (0 … 1) at which the tilt cylinder works against something.
+    `LOAD` the mass in the bucket (kg); `CURL` the torque share (0 … 1) at which the tilt cylinder works against something;
+    `TRANSMISSION`, `LIFT` and `TILT` the pressures (bar) of a machine that reckons them, 0 where the others say them.
     """
 
     X = 0
@@ -44,10 +45,13 @@ class Column(IntEnum):
     TRACTION = 14
     LOAD = 15
     CURL = 16
+    TRANSMISSION = 17
+    LIFT = 18
+    TILT = 19
 
 
 class History:
-    """Rows (N, 17) of the `Column`s at `rate_hz` (a whole number), the first at the start of the clock.
+    """Rows (N, 20) of the `Column`s at `rate_hz` (a whole number), the first at the start of the clock.
 
     A stepped run forgets what is older than `keep_s`.
     """
@@ -61,7 +65,7 @@ class History:
         self._first = 0  # index of the first row that is kept, from the start of the clock
 
     def append(self, row: FloatArray) -> None:
-        """Take the state of the next moment, shape (17,)."""
+        """Take the state of the next moment, shape (20,)."""
         if self._count == len(self._rows):
             self._make_room()
         self._rows[self._count] = row
@@ -79,7 +83,7 @@ class History:
 
     @property
     def rows(self) -> FloatArray:
-        """The rows that are kept, shape (N, 17): a view."""
+        """The rows that are kept, shape (N, 20): a view."""
         return self._rows[: self._count]
 
     @property
@@ -102,14 +106,14 @@ class History:
         return index, rest / SECOND_NS
 
     def state(self, stamp_ns: int) -> FloatArray:
-        """Return the state at a stamp, shape (17,), linear between the rows, the ends held; raises as `split`."""
+        """Return the state at a stamp, shape (20,), linear between the rows, the ends held; raises as `split`."""
         index, share = self.split(stamp_ns)
         if share == 0.0:
             return self._rows[index].copy()
         return self._rows[index] * (1.0 - share) + self._rows[index + 1] * share
 
     def at(self, time_s: FloatArray) -> FloatArray:
-        """Return states at any times, shape (M, 17), linear in between, the ends held."""
+        """Return states at any times, shape (M, 20), linear in between, the ends held."""
         position = np.clip(np.asarray(time_s, dtype=float) * self.rate_hz - self._first, 0.0, self._count - 1.0)
         index = np.minimum(position.astype(np.int64), max(self._count - 2, 0))
         share = (position - index)[:, None]

@@ -198,7 +198,7 @@ def planned(
 
 
 def node_of(directory: Directory) -> Callable[[int, FloatArray], str]:
-    """Return what tells the node that a machine is in for a stamp and its state (17,): the operator's `/operation/node`."""
+    """Return what tells the node that a machine is in for a stamp and its state (20,): the operator's `/operation/node`."""
 
     def told(_stamp_ns: int, state: FloatArray) -> str:
         return directory.at(state[[Column.X, Column.Y, Column.Z]]).node

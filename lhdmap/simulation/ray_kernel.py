@@ -93,7 +93,7 @@ def fill_rays(
 ) -> None:
     """Fill `rays` (N, 6), origin less `origin_m` and direction in `map`, and `blocked_m` (N,), to the own body.
 
-    `rows` (M, 17) at `rate_hz` are a history's, `position` where in them the sweep begins (row, share of the step to the
+    `rows` (M, 20) at `rate_hz` are a history's, `position` where in them the sweep begins (row, share of the step to the
     next), `sweep` the directions (N, 3) in the scanner's frame and the delays (N,) in s.
     """
     T_parent_scanner, on_rear, joint_m, front_boxes, rear_boxes = rig

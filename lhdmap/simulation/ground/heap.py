@@ -49,6 +49,12 @@ class Heap:
         """Volume of the pile, in place."""
         return float(self.heights_m.sum()) * CELL_M2
 
+    def height_at(self, points_m: FloatArray) -> FloatArray:
+        """Return the pile's height (...,) over the floor at points (..., 2) of `map`; 0 where it is not."""
+        at = np.moveaxis(self.grid.places(points_m), -1, 0)
+        height: FloatArray = map_coordinates(self.heights_m, at, order=1, mode="constant")
+        return height
+
     def turn_to(self, through_m: FloatArray, heading_rad: float) -> int:
         """Turn the grid to a heading (rad) through a point (x, y); returns the first column on its left. Volume is kept."""
         grid = turned(self.grid, through_m, heading_rad)

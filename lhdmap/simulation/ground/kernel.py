@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numba as nb
 
@@ -27,16 +28,29 @@ _AHEAD_M = 0.10  # where the depth over the lip is taken
 _LOAD_BACK_M = 0.9  # the content's middle behind the lip
 
 
+class World(NamedTuple):
+    """What the bucket meets.
+
+    Heights (N,) of the pile's cells, m; table (15, 3) of `earth.bearing_table`; noise (M,) of the resistance over the lip's way
+    in rock, each 2 cm; strikes (K, 3) of boulders: way, length, force; bumps (J, 3) of the floor: x, length, force per press
+    force.
+    """
+
+    heights: FloatArray
+    table: FloatArray
+    noise: FloatArray
+    strikes: FloatArray
+    bumps: FloatArray
+
+
 @nb.njit(cache=True, nogil=True)
 def advance(
-    state: Record, rig: Record, rock: Record, world: tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray],
+    state: Record, rig: Record, rock: Record, world: World,
     pedals: FloatArray, steps: int, step_s: float,
 ) -> None:  # fmt: skip
     """Move a machine on by `steps` sub-steps; `state` and the heights in `world` are changed.
 
-    `world`: heights (N,) of the pile's cells, m; table (15, 3) of `earth.bearing_table`; noise (M,) of the resistance over
-    the lip's way in rock, each 2 cm; strikes (K, 3) of boulders: way, length, force; bumps (J, 3) of the floor: x, length,
-    force per press force. `pedals`: propel, tilt, lift, full_rpm, brake.
+    `pedals`: propel, tilt, lift, full_rpm, brake.
     """
     one, machine, stone = state[0], rig[0], rock[0]
     for _ in range(steps):
@@ -45,10 +59,10 @@ def advance(
 
 @nb.njit(cache=True, nogil=True)
 def _sub_step(
-    state: Record, rig: Record, rock: Record, world: tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray],
+    state: Record, rig: Record, rock: Record, world: World,
     pedals: FloatArray, step_s: float,
 ) -> None:  # fmt: skip
-    heights = world[0]
+    heights = world.heights
     engine(state, rig, pedals[0], pedals[3] > 0.5, step_s)
     cylinders(state, rig, pedals[1], pedals[2], step_s)
     moved, rise = _move_lip(state, rig, step_s)
@@ -101,11 +115,11 @@ def _touch(
 @nb.njit(cache=True, nogil=True)
 def _rock_forces(
     state: Record, rig: Record, rock: Record,
-    world: tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray], cover: float,
+    world: World, cover: float,
     pedals: FloatArray, step_s: float,
 ) -> None:  # fmt: skip
     """Set what rock and floor do to the bucket: along the drive, against a lip that rises, against one that is pressed down."""
-    heights, table, noise, strikes, bumps = world
+    heights, noise, strikes, bumps = world.heights, world.noise, world.strikes, world.bumps
     psi = floor_angle(rig, state.boom_rad, state.bucket_rad)
     state.press_n = rig.floor_stiffness * max(-state.lip_z_m, 0.0)
     state.resist_n = 0.4 * state.press_n
@@ -117,7 +131,7 @@ def _rock_forces(
     if cover > 0.0:
         depth = height_at(heights, rock, state.lip_x_m + _AHEAD_M) - max(state.lip_z_m, 0.0)
         load = state.content_m3 * rock.density / rock.swell * GRAVITY_MPS2
-        earth = earth_force(rock, rig, table, psi, max(depth, 0.0), load)
+        earth = earth_force(rock, rig, world.table, psi, max(depth, 0.0), load)
         i = min(int(state.way_m / NOISE_STEP_M), len(noise) - 1)
         state.rock_n = penetration(rock, rig, state.embed_m, psi, cover) * noise[i] + earth
         for k in range(len(strikes)):

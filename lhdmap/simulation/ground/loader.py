@@ -19,7 +19,7 @@ from lhdmap.messages import FloatArray
 from lhdmap.simulation.ground.draws import CELL_M, Attempt, draw_attempt, draw_load, hardness_factor
 from lhdmap.simulation.ground.face import capacity, put_ahead, settle, take_boulder
 from lhdmap.simulation.ground.hearing import Hearing
-from lhdmap.simulation.ground.kernel import advance
+from lhdmap.simulation.ground.kernel import World, advance
 from lhdmap.simulation.ground.records import State, record, state_of
 from lhdmap.simulation.ground.rig import bucket_for, press_force_n, rig_of
 from lhdmap.simulation.ground.sections import Grounds
@@ -125,7 +125,7 @@ class Loader:
     def _set_chance(self, chance: Attempt) -> None:
         self._chance = chance
         self._dug_m2 = float(self._heights.sum()) * CELL_M
-        self._world = (self._heights, self._load.table, chance.noise, chance.strikes, chance.bumps)
+        self._world = World(self._heights, self._load.table, chance.noise, chance.strikes, chance.bumps)
 
     def _from_the_sides(self) -> None:
         """Let a share of what the attempt dug come from the sides: onto the lower half of the face."""

@@ -17,8 +17,9 @@ class State(NamedTuple):
 
     `engine`, `stroke` and `brake` are shares; `content_m3` is loose ore; `embed_m` is how deep the lip sits as the rock
     resists it, `way_m` its way in rock. `rock_n` is what the pile holds against the drive, `resist_n` this and the floor,
-    `up_n` what a rising lip meets at most, `down_n` what it meets, `press_n` the floor's force on a pressed lip. `tilting`, `lifting`: shares of the cylinders'
-    largest forces, positive against lifting. `pull_n`: gravity along x on a slope. `busy`: the face may slide. `begun_m`: up to there the lip has cut.
+    `up_n` what a rising lip meets at most, `down_n` what it meets, `press_n` the floor's force on a pressed lip. `tilting`,
+    `lifting`: shares of the cylinders' largest forces, positive against lifting. `pull_n`: gravity along x on a slope.
+    `busy`: the face may slide. `begun_m`: up to there the lip has cut.
     """
 
     x_m: float = 0.0

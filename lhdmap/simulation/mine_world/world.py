@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import functools
 from collections import OrderedDict
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import NamedTuple, Protocol, TypeVar
 
 import numpy as np
@@ -72,6 +72,7 @@ class MineWorld:
         self._here: tuple[tuple[float, ...], Surface] | None = None
         self._things: dict[str, Thing] = {}
         self._passing: dict[str, tuple[Thing, Surface]] = {}
+        self._dug: set[str] = set()
         self._version = 0
         self._taken_m: dict[str, float] = {}
         self._pits = _pits(network)
@@ -110,7 +111,9 @@ class MineWorld:
         things = {**self._things, **{name: thing for name, (thing, _) in self._passing.items()}}
         pieces: list[int | str] = list(np.flatnonzero(_overlap(self._boxes, box_m)).tolist())
         return pieces + [
-            f"{name}#{thing.version}" for name, thing in things.items() if _overlap(thing.box_m[None], box_m)[0]
+            f"{name}#{thing.version}"
+            for name, thing in things.items()
+            if name not in self._dug and _overlap(thing.box_m[None], box_m)[0]
         ]
 
     def solid(self, key: int | str) -> tuple[Mesh, npt.NDArray[np.bool_] | None]:
@@ -147,6 +150,20 @@ class MineWorld:
         self._version += 1
         self._passing[name] = (_thing(mesh, self._version), Surface(mesh))
 
+    def dig(self, name: str, mesh: Mesh) -> None:
+        """Put the pile `name` as it is now in place of the one that stood there; buckets go into it, so it is no contact."""
+        self._version += 1
+        if self._things.pop(name, None) is not None:
+            self._scenes.clear()
+            self._here = None
+        self._passing[name] = (_thing(mesh, self._version), Surface(mesh))
+        self._dug.add(name)
+
+    @property
+    def things(self) -> Mapping[str, Thing]:
+        """What stands in the mine for long, by name."""
+        return self._things
+
     def vanish(self, name: str) -> None:
         """Take away what has appeared."""
         self._passing.pop(name, None)
@@ -156,7 +173,7 @@ class MineWorld:
         """Yield the whole surface, piece by piece, and all things."""
         for index in range(len(self._boxes)):
             yield self.piece(index).mesh
-        for thing in self._things.values():
+        for thing in [*self._things.values(), *(self._passing[name][0] for name in sorted(self._dug))]:
             yield thing.mesh
 
     # How it is made.

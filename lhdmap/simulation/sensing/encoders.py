@@ -75,7 +75,12 @@ class PressureGauge:
 
 
 def transmission_bar(settings: PressureSettings, state: FloatArray) -> float:
-    """Return the transmission's pressure: idle, and what the wheels give along the drive; all that they give when stalled."""
+    """Return the transmission's pressure: idle, and what the wheels give along the drive; all that they give when stalled.
+
+    A machine that reckons its pressures says them itself, here as below.
+    """
+    if state[Column.TRANSMISSION] > 0.0:
+        return float(state[Column.TRANSMISSION])
     speed, traction = float(state[Column.SPEED]), float(state[Column.TRACTION])
     along = abs(traction) if abs(speed) < _STALLED_MPS else math.copysign(traction, traction * speed)
     return min(settings.idle_bar + settings.drive_bar * max(along, 0.0), settings.relief_bar)
@@ -86,12 +91,16 @@ def lift_bar(settings: PressureSettings, state: FloatArray) -> float:
 
     At a given angle it is affine in the load, as in Eq. (9) of the autonomous-loading paper.
     """
+    if state[Column.LIFT] > 0.0:
+        return float(state[Column.LIFT])
     level = max(math.cos(float(state[Column.BOOM])), 0.0)
     return level * (settings.lift_bar + settings.load_bar * 1e-3 * float(state[Column.LOAD]))
 
 
 def tilt_bar(settings: PressureSettings, state: FloatArray) -> float:
     """Return the tilt cylinder's pressure: between free and relief by the share of its torque that meets something."""
+    if state[Column.TILT] > 0.0:
+        return float(state[Column.TILT])
     share = min(max(float(state[Column.CURL]), 0.0), 1.0)
     return settings.tilt_bar + share * (settings.tilt_relief_bar - settings.tilt_bar)
 

@@ -63,7 +63,7 @@ class Beat:
 
 
 Measure = Callable[[int, FloatArray, np.random.Generator], Message | None]
-"""What is measured: message for stamp, state (17,) at it and source of chance; None for nothing to say."""
+"""What is measured: message for stamp, state (20,) at it and source of chance; None for nothing to say."""
 
 
 class Sampled:

@@ -15,7 +15,7 @@ from lhdmap.simulation.sensing.sensor import NEVER_NS
 from lhdmap.simulation.surroundings import View
 
 Told = Callable[[int, FloatArray], str]
-"""A text for a stamp and the machine's state at it, shape (17,); empty for nothing to say."""
+"""A text for a stamp and the machine's state at it, shape (20,); empty for nothing to say."""
 
 
 @dataclass(frozen=True, slots=True)

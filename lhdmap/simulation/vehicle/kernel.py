@@ -1,6 +1,6 @@
 """A step of the machine in sub-steps, on flat arrays: joints, drive, motion on the floor; and the pose on the floor.
 
-A row has the columns of a history, and after them the brake. The floor under the machine is taken for a plane
+A row has the columns of a history up to `CURL`, and after them the brake. The floor under the machine is taken for a plane
 during a step, the one on which its wheels stood before.
 """
 
@@ -17,7 +17,7 @@ from lhdmap.simulation.vehicle.plant import GRAVITY_MPS2, Plant
 from lhdmap.simulation.vehicle.propulsion import braked, driven
 
 PROPEL, STEERING, TILT, LIFT, FULL_RPM, BRAKING = range(6)  # columns of a command
-BRAKE = len(Column)
+BRAKE = int(Column.CURL) + 1
 FOOTPRINT_M = 0.25  # half length and width of the patch under a tyre that carries it
 _PATCH = 9  # points of a footprint
 _EPS_S = 1e-9
@@ -49,6 +49,22 @@ def advance(
         _lift_and_tilt(row, plant, command, step_s)
         _drive(row, plant, command, rise, friction, step_s)
         _move(row, plant, rise, 0.5 * (before + row[_SPEED]), bend, step_s)
+    return wheel_points(row, plant, rise)
+
+
+@nb.njit(cache=True, nogil=True)
+def carry(
+    row: FloatArray, plant: Plant, steering_rps: float, before_mps: float, steps: int, step_s: float
+) -> FloatArray:
+    """Move the pose of `row` (18,) on as `advance` does, by a speed that another model reckons: from `before_mps` to the row's.
+
+    Returns the points (36, 3) at which it asks for the floor.
+    """
+    rise, after = _rise(row), row[_SPEED]
+    for i in range(steps):
+        bend, middle = row[_BEND], before_mps + (i + 0.5) / steps * (after - before_mps)
+        _steer(row, plant, steering_rps, step_s)
+        _move(row, plant, rise, middle, bend, step_s)
     return wheel_points(row, plant, rise)
 
 

@@ -30,6 +30,6 @@ class Shaking:
         return angles
 
     def onto(self, row: FloatArray, time_s: float) -> FloatArray:
-        """Return a row (17,) of a `History` with it; the row is changed."""
+        """Return a row (20,) of a `History` with it; the row is changed."""
         row[[Column.ROLL, Column.PITCH]] += self.at(time_s)
         return row

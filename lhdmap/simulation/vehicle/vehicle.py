@@ -11,9 +11,10 @@ from lhdmap.messages import Command, FloatArray
 from lhdmap.simulation.surroundings import Ground
 from lhdmap.simulation.vehicle import kernel
 from lhdmap.simulation.vehicle.plant import Plant, drawn_errors, plant_of
-from lhdmap.simulation.vehicle.state import VehicleState
+from lhdmap.simulation.vehicle.state import VehicleState, state_of_row
 
 SUB_STEP_S = 0.001
+ROW = kernel.BRAKE + 1  # of a row of the kernel
 _LEAST_FRICTION = 1e-3
 
 Pending = tuple[tuple[int, Command], ...]
@@ -44,27 +45,27 @@ class Vehicle:
     ) -> VehicleState:
         """Return the machine standing at a place, in tramming posture, held by its drive; `near_z_m` says on which level."""
         linkage, plant = self.machine.linkage, self._plant_with(load_kg)
-        row = np.zeros(len(VehicleState._fields) - 2)
+        row = np.zeros(ROW)
         row[:7] = x_m, y_m, near_z_m, 0.0, 0.0, yaw_rad, articulation_rad
         row[10:12], row[15] = (linkage.boom_min_rad, linkage.bucket_max_rad), load_kg
         for _ in range(3):  # z of the points says which level: from the plane that was found
             points = kernel.points_at_rest(row, plant)
             kernel.stand(row, plant, points, self._ground.floor_height(points))
         still = Command(time_ns, 0.0, 0.0, 0.0, 0.0, full_rpm=False, brake=False)
-        return VehicleState._make((time_ns, *row.tolist(), ((time_ns, still),)))
+        return state_of_row(time_ns, row, ((time_ns, still),))
 
     def step(self, state: VehicleState, command: Command, dt_s: float) -> VehicleState:
         """Return the state after `dt_s` with a command given now: it counts when its dead time has passed."""
         now_ns = state.time_ns
         end_ns = now_ns + round(dt_s * 1e9)
-        pending = _queued(state.pending, now_ns, now_ns + self._dead_ns, command)
-        commands, since_s = _in_force(pending, now_ns, end_ns)
-        plant, row = self._plant_with(state.load_kg), np.array(state[1:-1])
+        pending = queued(state.pending, now_ns, now_ns + self._dead_ns, command)
+        commands, since_s = in_force(pending, now_ns, end_ns)
+        plant, row = self._plant_with(state.load_kg), np.array(state[1 : 1 + ROW])
         friction = max(self._ground.friction(row[:3]), _LEAST_FRICTION)
         steps = max(1, math.ceil(dt_s / SUB_STEP_S - 1e-6))
         points = kernel.advance(row, plant, commands, since_s, steps, dt_s / steps, friction)
         kernel.stand(row, plant, points, self._ground.floor_height(points))
-        return VehicleState._make((end_ns, *row.tolist(), pending))
+        return state_of_row(end_ns, row, pending)
 
     def _plant_with(self, load_kg: float) -> Plant:
         if load_kg != self._load_kg:
@@ -72,7 +73,7 @@ class Vehicle:
         return self._plant
 
 
-def _queued(pending: Pending, now_ns: int, counts_ns: int, command: Command) -> Pending:
+def queued(pending: Pending, now_ns: int, counts_ns: int, command: Command) -> Pending:
     """Return the command in force and those to come; one that says the same as the one before it is none."""
     first = 0
     while first + 1 < len(pending) and pending[first + 1][0] <= now_ns:
@@ -81,14 +82,14 @@ def _queued(pending: Pending, now_ns: int, counts_ns: int, command: Command) -> 
     return kept if kept[-1][1][1:] == command[1:] else (*kept, (counts_ns, command))
 
 
-def _in_force(pending: Pending, now_ns: int, end_ns: int) -> tuple[FloatArray, FloatArray]:
+def in_force(pending: Pending, now_ns: int, end_ns: int) -> tuple[FloatArray, FloatArray]:
     """Return the commands that count during a step, shape (K, 6), and from when (K,), s; the first from before."""
     due = [one for one in pending if one[0] < end_ns]
     since = np.array([(one[0] - now_ns) * 1e-9 for one in due])
-    return np.array([_within(one[1]) for one in due]), since
+    return np.array([within(one[1]) for one in due]), since
 
 
-def _within(command: Command) -> tuple[float, ...]:
+def within(command: Command) -> tuple[float, ...]:
     """Return a command as numbers, within its range; what is no number is none."""
     _, propel, steering, tilt, lift, full_rpm, brake = command
     return _share(propel), (steering if math.isfinite(steering) else 0.0), _share(tilt), _share(lift), full_rpm, brake

@@ -158,7 +158,7 @@ def test_a_row_of_the_history_is_the_state() -> None:
         vehicle, vehicle.at_rest(1.0, 2.0, 0.3, near_z_m=0.0, load_kg=500.0, time_ns=7), command(0.5, 0.1), 1.0
     )[-1]
     row = state.row()
-    assert row.shape == (17,)
+    assert row.shape == (20,)
     assert row[:9].tolist() == [
         state.x_m, state.y_m, state.z_m, state.roll_rad, state.pitch_rad, state.yaw_rad,
         state.articulation_rad, state.speed_mps, state.wheel_speed_mps,
