@@ -224,7 +224,14 @@ class ExcavationSettings:
         0.22, minimum=0.0, maximum=5.0, source=_FINDINGS, doc="adaptive: the boom is lifted above this skid."
     )
     lag_matched: bool = setting(
-        False, source="finding E3", doc="adaptive: Eq. (7) with the wheels of the scan's moment."
+        True, source="finding E3", doc="adaptive: Eq. (7) with the wheels of the scan's moment."
+    )
+    skid_smooth_s: float = setting(
+        0.2,
+        unit="s",
+        minimum=0.0,
+        maximum=5.0,
+        doc="adaptive: time constant of the skid, whose noise is that of the scans.",
     )
     hysteresis: float = setting(
         0.05, minimum=0.0, maximum=2.0, doc="adaptive: skid falls by so much before the lift ends."
@@ -237,7 +244,11 @@ class ExcavationSettings:
         3.4, unit="m", minimum=0.1, maximum=10.0, source=_FINDINGS, doc="adaptive: stop d_max."
     )
     resists_kn: float = setting(
-        100.0, unit="kN", minimum=0.0, maximum=1000.0, doc="adaptive: the way of d_max begins at this force, or after 2 m."
+        100.0,
+        unit="kN",
+        minimum=0.0,
+        maximum=1000.0,
+        doc="adaptive: the way of d_max begins at this force, or after 2 m.",
     )
     stuck_s: float = setting(
         0.8,

@@ -107,7 +107,9 @@ def charged(loader: Loader, plan: Plan, signals: Signals) -> tuple[Charged, Sign
         touched_s = now_s if math.isnan(touched_s) and truth.rock_n > 0.0 else touched_s
         forced_s = now_s if math.isnan(forced_s) and truth.rock_n > FORCE_N else forced_s
         if turn.ended:
-            return Charged(int(math.isnan(touched_s)), False, now_s - touched_s, now_s - forced_s, now_s, turn.ended), signals
+            return Charged(
+                int(math.isnan(touched_s)), False, now_s - touched_s, now_s - forced_s, now_s, turn.ended
+            ), signals
         signals = loader.step(turn.pedals, TICK_S)
     return Charged(0, True, math.nan, math.nan, CHARGE_LIMIT_S, ""), signals
 
@@ -138,10 +140,10 @@ def dug(loader: Loader, plan: Plan, signals: Signals, charge: Charged) -> Dug:
 
 def racked(loader: Loader) -> None:
     """Tilt back, then reverse: the bucket leaves the pile racked."""
-    for _ in range(round(1.5 / TICK_S)):
-        loader.step(Pedals(tilt=1.0, full_rpm=True), TICK_S)
-    for _ in range(round(3.0 / TICK_S)):
-        loader.step(Pedals(propel=-0.5, tilt=1.0, full_rpm=True), TICK_S)
+    for _ in range(15):
+        loader.step(Pedals(tilt=1.0, full_rpm=True), 0.1)
+    for _ in range(30):
+        loader.step(Pedals(propel=-0.5, tilt=1.0, full_rpm=True), 0.1)
 
 
 def with_paper(plan: Plan, **changes: object) -> Plan:

@@ -19,7 +19,7 @@ import numpy as np
 
 from tools.evaluate.loading_loads import Dug, Plan, run_load
 
-ROUNDS = ((120, range(16)), (24, range(100, 140)), (6, range(200, 320)))
+ROUNDS = ((80, range(10)), (12, range(100, 130)), (4, range(200, 280)))
 """Candidates and loads of each round."""
 Range = tuple[float, float]
 _SHARED: dict[str, Range] = {"boom_max_rad": (0.4, 0.8), "advance_max_m": (2.0, 5.0), "pedal": (0.45, 1.0)}
@@ -61,7 +61,9 @@ def search(method: str, ground: str, seed: int, out: Path) -> dict[str, Any]:
     """Return the best candidate; all are written to `out`."""
     rng = np.random.default_rng(seed)
     ranges = PAPER if method == "paper-tuned" else ADAPTIVE
-    candidates = [{name: round(float(rng.uniform(*span)), 3) for name, span in ranges.items()} for _ in range(ROUNDS[0][0])]
+    candidates = [
+        {name: round(float(rng.uniform(*span)), 3) for name, span in ranges.items()} for _ in range(ROUNDS[0][0])
+    ]
     results: list[dict[str, Any]] = []
     with out.open("w", encoding="utf-8") as file:
         for number, (most, seeds) in enumerate(ROUNDS):
