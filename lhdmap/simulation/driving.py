@@ -22,7 +22,7 @@ from lhdmap.simulation.sensing.sections import WheelSettings
 from lhdmap.simulation.timetable import Timetable
 
 TABLE_RATE_HZ = 1000.0
-BOOM_RAD, BUCKET_RAD = -0.35, 0.6
+BOOM_RAD, BUCKET_RAD = 0.0, 0.0
 """Tramming posture: boom down, bucket rolled back."""
 _GRAVITY_MPS2, _ROLLING_RESISTANCE_MPS2 = 9.81, 0.3
 _EVERY = 4  # of the path's samples the floor is asked for: 4 cm, far below a footprint

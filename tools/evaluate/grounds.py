@@ -31,11 +31,11 @@ _PAPER = {
     "final": (0.906, 0.015), "in time": (0.99, 0.02),
 }  # fmt: skip
 _RANGES = {
-    "rock.hardness": (1.2, 3.6), "rock.hardness_sigma": (0.4, 0.9), "rock.loosened": (0.72, 1.0), "rock.loosening": (3.0, 8.0),
-    "rock.rake_factor": (1.2, 3.0), "rock.fee_scale": (0.25, 0.75), "rock.tensile_kpa": (8.0, 28.0),
-    "face.slide_per_s": (3.0, 20.0), "face.lateral_share": (0.0, 0.5), "filling.entering": (0.8, 0.97),
-    "filling.level_share": (0.62, 0.9), "filling.heap": (1.0, 1.25), "filling.boulder_chance": (0.03, 0.07),
-    "hydraulic.tilt_factor": (0.85, 1.1), "operator.stop_fill": (0.76, 0.88),
+    "rock.hardness": (1.0, 4.0), "rock.hardness_sigma": (0.5, 1.2), "rock.loosened": (0.75, 1.0), "rock.loosening": (3.0, 8.0),
+    "rock.rake_factor": (1.2, 3.0), "rock.fee_scale": (0.2, 0.6), "rock.tensile_kpa": (8.0, 28.0),
+    "face.slide_per_s": (3.0, 20.0), "face.lateral_share": (0.0, 0.5), "filling.entering": (0.84, 0.98),
+    "filling.level_share": (0.6, 0.85), "filling.heap": (1.1, 1.4), "filling.boulder_chance": (0.03, 0.07),
+    "hydraulic.tilt_factor": (0.75, 1.05), "operator.stop_fill": (0.76, 0.88),
 }  # fmt: skip
 
 
@@ -52,14 +52,17 @@ class Skid:
     """Eq. (7): over a window of a second, the largest speed at least 0.2 m/s."""
 
     def __init__(self) -> None:
-        self._past: deque[tuple[int, float]] = deque()
+        self._falling: deque[tuple[int, float]] = deque()
 
     def __call__(self, signals: Signals) -> float:
         scan = 0.0 if math.isnan(signals.scan_mps) else signals.scan_mps
-        self._past.append((signals.now_ns, max(signals.tacho_mps, scan)))
-        while self._past[0][0] < signals.now_ns - 1_000_000_000:
-            self._past.popleft()
-        return (signals.tacho_mps - scan) / max(0.2, *(speed for _, speed in self._past))
+        now, fastest = signals.now_ns, max(signals.tacho_mps, scan)
+        while self._falling and self._falling[-1][1] <= fastest:
+            self._falling.pop()
+        self._falling.append((now, fastest))
+        while self._falling[0][0] < now - 1_000_000_000:
+            self._falling.popleft()
+        return (signals.tacho_mps - scan) / max(0.2, self._falling[0][1])
 
 
 def attempt(loader: Loader, signals: Signals) -> Dig:
@@ -86,10 +89,10 @@ def dig(loader: Loader, signals: Signals, skid: Skid) -> tuple[float, str]:
     tilting, start = True, signals.travel_m
     while True:
         since, here, slipping = (signals.now_ns - changed) * 1e-9, (signals.now_ns - begun) * 1e-9, skid(signals)
-        for ended, over in (("lift", signals.boom_rad >= 0.5), ("tilt", signals.bucket_rad >= -0.03),
-                            ("way", signals.travel_m - start >= 2.0), ("time", here > 30.0)):  # fmt: skip
-            if over:
-                return here, ended
+        if signals.boom_rad >= 0.5 or signals.bucket_rad >= -0.03:
+            return here, "stop"
+        if signals.travel_m - start >= 2.0 or here > 30.0:
+            return here, "way" if here <= 30.0 else "time"
         if tilting:
             pedals = Pedals(_PEDAL, min(1.2 * since, 1.0))
             tilting = since <= 1.0

@@ -1,1 +1,1 @@
-"""Machine and ground while loading: bucket in the pile, traction, hydraulics, the pile that is dug. docs/ground.md has the model."""
+"""Machine and ground while loading: bucket in the pile, traction, hydraulics, a pile that is dug. The model: docs/ground.md."""

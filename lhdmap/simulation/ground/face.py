@@ -39,7 +39,7 @@ def height_at(heights: FloatArray, rock: Record, x_m: float) -> float:
 
 
 @nb.njit(cache=True, nogil=True)
-def take(state: Record, rig: Record, rock: Record, heights: FloatArray, volume_m2: float) -> float:
+def take(state: Record, rig: Record, rock: Record, volume_m2: float) -> float:
     """Put a volume (in place, per metre of width) into the bucket and return what has no room."""
     room = capacity(rock, rig, floor_angle(rig, state.boom_rad, state.bucket_rad))
     full = min(state.content_m3 / max(room, 1e-3), 1.0)
@@ -66,7 +66,7 @@ def cut(state: Record, rig: Record, rock: Record, heights: FloatArray, before_m:
         over = heights[k] - level
         if over > 0.0:
             heights[k], state.busy = level, 1.0
-            put_ahead(heights, k + 1, rock, take(state, rig, rock, heights, over * rock.step_m))
+            put_ahead(heights, k + 1, rock, take(state, rig, rock, over * rock.step_m))
 
 
 @nb.njit(cache=True, nogil=True)
@@ -84,7 +84,7 @@ def slide(state: Record, rig: Record, rock: Record, heights: FloatArray, share: 
             excess = heights[k + 1] - level - drop
             if excess > 0.0:
                 moved = 0.5 * excess * share * rock.step_m
-                left = take(state, rig, rock, heights, moved)
+                left = take(state, rig, rock, moved)
                 heights[k + 1] -= (moved - left) / rock.step_m
             continue
         excess = heights[k + 1] - heights[k] - drop

@@ -92,17 +92,20 @@ def slide_field(
 
 
 @nb.njit(cache=True, nogil=True)
-def spread_back(heights: FloatArray, first: int, last: int, change: FloatArray) -> None:
-    """Give the changes (N,) of the side view's mean heights back to the columns: taken by share of height, put evenly."""
-    width = last - first + 1
+def spread_back(heights: FloatArray, open_cells: Bools, first: int, last: int, change: FloatArray) -> None:
+    """Give the changes (N,) of the side view's mean heights back to the columns: taken by share of height, put evenly.
+
+    The mean is over all columns, those in rock too (they have no ore): so volumes agree.
+    """
     for i in range(len(change)):
         if change[i] == 0.0:
             continue
-        mean = 0.0
+        mean, room = 0.0, 0
         for j in range(first, last + 1):
-            mean += heights[i, j] / width
+            mean += heights[i, j] / (last - first + 1)
+            room += open_cells[i, j]
         for j in range(first, last + 1):
-            if change[i] > 0.0 or mean <= 1e-9:
-                heights[i, j] += change[i]
-            else:
-                heights[i, j] *= 1.0 + change[i] / mean
+            if change[i] <= 0.0 and mean > 1e-9:
+                heights[i, j] *= max(1.0 + change[i] / mean, 0.0)
+            elif room == 0 or open_cells[i, j]:
+                heights[i, j] += change[i] * (last - first + 1) / (room if room > 0 else last - first + 1)

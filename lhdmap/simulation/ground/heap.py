@@ -14,6 +14,7 @@ from lhdmap.simulation.ground.field import ACROSS_M, ALONG_M, CELL_M2, Bools, Gr
 from lhdmap.simulation.pile_face import sheet
 
 _STANDS_M = 1e-3
+_SEEN_M = 1e-3  # changes of a height that scanners are shown
 _FED_M = 0.6  # of the far end: it stays as high as it was, ore comes from the stope
 _SHOWN_M = 0.03
 _BURIED_M = 0.08  # how far the mesh is under the floor where there is no ore
@@ -32,11 +33,13 @@ class Heap:
     def __init__(
         self, grid: Grid, heights_m: FloatArray, slope: float, inside: Inside, floor: FloorAt, *, fed: bool = True
     ) -> None:
+        self._home = grid  # what all grids cover
         self.grid, self.slope, self._inside, self._floor = grid, slope, inside, floor
         self.version, self.came_m3, self.calm = 0, 0.0, False
         far_m = (grid.shape[0] - 1) * ALONG_M - _FED_M if fed else math.inf
         self._behind = (grid.x_m, grid.y_m, grid.heading_rad, far_m)
-        self._set(grid, np.maximum(heights_m, 0.0))
+        self.heights_m: FloatArray = np.maximum(heights_m, 0.0)
+        self._open, self._floor_m, self._back = self._surroundings(grid)
         smooth = gaussian_filter(self.heights_m, (0.3 / ALONG_M, 0.3 / ACROSS_M), mode="nearest")
         self.texture_m = np.where(self.heights_m > _SHOWN_M, self.heights_m - smooth, 0.0)
         self.heights_m = np.where(self._open, np.maximum(smooth, 0.0), 0.0)
@@ -57,15 +60,16 @@ class Heap:
 
     def turn_to(self, through_m: FloatArray, heading_rad: float) -> int:
         """Turn the grid to a heading (rad) through a point (x, y); returns the first column on its left. Volume is kept."""
-        grid = turned(self.grid, through_m, heading_rad)
+        grid = turned(self._home, through_m, heading_rad)
         at = np.moveaxis(self.grid.places(grid.points()), 2, 0)
         old, volume = self.heights_m, self.volume_m3
         fields = [
             map_coordinates(one, at, order=1, mode="constant")
             for one in (old, self.texture_m, self._fed_m, self._was_m)
         ]
-        self._set(grid, fields[0])
-        self.heights_m = np.where(self._open, self.heights_m, 0.0)
+        self.grid = grid
+        self._open, self._floor_m, self._back = self._surroundings(grid)
+        self.heights_m = np.where(self._open, fields[0], 0.0)
         self.heights_m *= volume / max(self.volume_m3, 1e-9)
         self.texture_m, self._fed_m, self._was_m = fields[1:]
         return round(grid.places(through_m)[1] + 0.5)
@@ -76,16 +80,20 @@ class Heap:
 
     def give_back(self, first: int, last: int, slice_m: FloatArray) -> None:
         """Take the heights (N,) that the side view made of `slice_m`."""
-        spread_back(self.heights_m, first, last, slice_m - self.slice_m(first, last))
-        self.version += 1
+        change = slice_m - self.slice_m(first, last)
+        spread_back(self.heights_m, self._open, first, last, change)
+        self.version += bool(np.abs(change).max() > _SEEN_M)
 
     def slide(self, dt_s: float, per_s: float, bucket: tuple[int, int, int, int] = _NO_BUCKET) -> None:
         """Let it slide for a while, at a rate per second, around a bucket (`field.slide_field`)."""
-        for _ in range(max(1, round(dt_s * per_s * 2.0))):
+        worst, most = 0.0, max(1, round(dt_s * per_s * 2.0))
+        for _ in range(most):
             worst = slide_field(self.heights_m, self._open, self.slope, 0.8, bucket)
+            if worst < _STANDS_M:
+                break
         self._feed()
         self.calm = worst < _STANDS_M and bucket == _NO_BUCKET
-        self.version += 1
+        self.version += worst >= _STANDS_M
 
     def settle(self) -> None:
         """Let it slide until it stands."""
@@ -107,13 +115,13 @@ class Heap:
         ore = (height[::_EVERY] > _SHOWN_M).ravel()[faces].any(axis=1)
         return Mesh(points.reshape(-1, 3), faces[ore] if ore.any() else faces[:1])
 
-    def _set(self, grid: Grid, heights_m: FloatArray) -> None:
+    def _surroundings(self, grid: Grid) -> tuple[Bools, FloatArray, Bools]:
+        """Return which cells of a grid are in the drift, the floor's height in them, and which of them are the far end."""
         points = grid.points()
-        self.grid, self.heights_m = grid, np.ascontiguousarray(heights_m)
-        self._open, self._floor_m = self._inside(points), self._floor(points)
+        inside = self._inside(points)
         x, y, heading, from_m = self._behind
         along = (points - np.array([x, y])) @ np.array([math.cos(heading), math.sin(heading)])
-        self._back = (along >= from_m) & self._open
+        return inside, self._floor(points), (along >= from_m) & inside
 
     def _feed(self) -> None:
         """Fill the far end up to what it was."""

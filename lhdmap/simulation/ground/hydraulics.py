@@ -40,7 +40,8 @@ def transmission(state: Record, rig: Record, step_s: float) -> float:
 @nb.njit(cache=True, nogil=True)
 def cylinders(state: Record, rig: Record, tilt: float, lift: float, step_s: float) -> None:
     """Move boom and bucket: the speeds fall with the fourth power of the share of the largest force that is met."""
-    share = state.engine * (rig.shared if tilt != 0.0 and lift != 0.0 else 1.0)
+    revved = max(state.engine - rig.idle, 0.0) / max(1.0 - rig.idle, 1e-6)
+    share = (rig.idle_share + (1.0 - rig.idle_share) * revved) * (rig.shared if tilt != 0.0 and lift != 0.0 else 1.0)
     gone = -math.expm1(-step_s / rig.linkage_lag_s)
     tilting, lifting = _meets(state.tilting, tilt), _meets(state.lifting, lift)
     wanted = rig.tilt_rps * share * tilt * max(1.0 - tilting**4, 0.0)

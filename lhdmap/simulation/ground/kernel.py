@@ -16,14 +16,14 @@ from lhdmap.simulation.ground.records import Record
 
 GRAVITY_MPS2 = 9.81
 NOISE_STEP_M = 0.02
+SLIPS = 0.5  # slip ratio from which on the wheels count as slipping
 _STANDS_M = 1e-4  # a face steeper by less than this over a cell stands
-_COVER_M = 0.4  # depth from which on the rock holds the lip with all its strength
+_COVER_M = 0.8  # depth from which on the rock holds the lip with all its strength
 _BACKWARDS = 0.15  # of the resistance, out of the pile
-_RESTING, _RELAXING_S = (
-    0.4,
-    0.2,
-)  # what of the rock's reaction stays on a bucket that is not moved, and how fast it goes
+_RESTING = 0.8  # of the rock's reaction, on a bucket that is held
+_RELAXING_S = 0.2  # how fast the reaction comes and goes
 _SLOW_MPS = 0.2
+_STANDS_MPS = 0.02
 _AHEAD_M = 0.10  # where the depth over the lip is taken
 _LOAD_BACK_M = 0.9  # the content's middle behind the lip
 
@@ -65,8 +65,8 @@ def _sub_step(
     heights = world.heights
     engine(state, rig, pedals[0], pedals[3] > 0.5, step_s)
     cylinders(state, rig, pedals[1], pedals[2], step_s)
-    moved, rise = _move_lip(state, rig, step_s)
-    cover = _touch(state, rig, rock, heights, moved, rise, step_s)
+    moved, rise = _move_lip(state, rig)
+    cover = _touch(state, rock, heights, moved, rise, step_s)
     _rock_forces(state, rig, rock, world, cover, pedals, step_s)
     _axles(state, rig, rock)
     drive = transmission(state, rig, step_s)
@@ -87,7 +87,7 @@ def _sub_step(
 
 
 @nb.njit(cache=True, nogil=True)
-def _move_lip(state: Record, rig: Record, step_s: float) -> tuple[float, float]:
+def _move_lip(state: Record, rig: Record) -> tuple[float, float]:
     """Put the lip where boom and bucket hold it; returns how far they moved it along x, and the speed at which it rises."""
     x, z = lip(rig, state.boom_rad, state.bucket_rad)
     _, rise = lip_rates(rig, state.boom_rad, state.bucket_rad, state.boom_rps, state.bucket_rps)
@@ -97,9 +97,7 @@ def _move_lip(state: Record, rig: Record, step_s: float) -> tuple[float, float]:
 
 
 @nb.njit(cache=True, nogil=True)
-def _touch(
-    state: Record, rig: Record, rock: Record, heights: FloatArray, moved_m: float, rise_mps: float, step_s: float
-) -> float:
+def _touch(state: Record, rock: Record, heights: FloatArray, moved_m: float, rise_mps: float, step_s: float) -> float:
     """Move on how deep the lip sits in rock, and return how well it is covered, 0 to 1: a rising lip loosens the rock."""
     depth = height_at(heights, rock, state.lip_x_m + _AHEAD_M) - max(state.lip_z_m, 0.0)
     if depth <= 0.02:
@@ -188,10 +186,17 @@ def _roll(state: Record, rig: Record, drive_n: float, brake: bool, step_s: float
         total = (force + slope * (a * push + speed)) / (1.0 + slope * a)
         total = min(max(total, -state.grip_n), state.grip_n)
         after = 0.0
-    state.speed_mps = after
-    state.wheel_mps = wheel + a * (push - total)
+    turning = wheel + a * (push - total)
+    if (
+        state.brake > 0.99
+        and abs(turning) < _STANDS_MPS
+        and abs(after) < _STANDS_MPS
+        and abs(pull) < 0.9 * state.grip_n
+    ):
+        after, turning, total = 0.0, 0.0, -pull  # locked tyres hold without creeping
+    state.speed_mps, state.wheel_mps = after, turning
     state.traction_n = total
-    if state.wheel_mps - after > 0.2 * max(abs(state.wheel_mps), 0.2):
+    if abs(state.wheel_mps - after) > SLIPS * max(abs(state.wheel_mps), abs(after), _SLOW_MPS):
         state.slip_s += step_s
     if state.rear_n <= 0.0:
         state.rear_up_s += step_s

@@ -22,6 +22,7 @@ from lhdmap.simulation.raycast import Surface
 _BEFORE_M = 6.0  # of the grid before the toe
 _STATION_M = 0.1
 _BESIDE_M = 0.2  # how far ore reaches into a rough wall
+_NOT_ORE = ("wall", "hang_up")  # nothing to dig at the floor
 _OVER_M = 12.0  # from where the drawn pile is looked at
 _SLOPE_DEG = (46.0, 53.0)  # autonomous_loading, Table 6
 
@@ -29,7 +30,7 @@ _SLOPE_DEG = (46.0, 53.0)  # autonomous_loading, Table 6
 def mine_piles(world: MineWorld, ground: Grounds, *, seed: int = 0) -> Piles:
     """Return the piles of all draw points of `world`, which shows them from now on; of a surveyed mine there are none."""
     places = [place for place in world.network.plan.places if place.kind == "draw_point" and place.name in world.things]
-    heaps = {place.name: heap_of(world, place, seed) for place in places}
+    heaps = {place.name: heap_of(world, place, seed) for place in places if place.pile not in _NOT_ORE}
     return Piles(heaps, ground, world.machine.digging.bucket_width_m, seed, world.dig)
 
 

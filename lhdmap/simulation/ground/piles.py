@@ -47,7 +47,8 @@ class Cut:
 
     def place_m(self, x_m: float, y_m: float) -> float:
         """Return where a point of `map` is along the heading."""
-        return float(self.heap.grid.places(np.array([x_m, y_m]))[0]) * ALONG_M
+        grid = self.heap.grid
+        return (x_m - grid.x_m) * math.cos(grid.heading_rad) + (y_m - grid.y_m) * math.sin(grid.heading_rad)
 
     @property
     def toe_m(self) -> float:

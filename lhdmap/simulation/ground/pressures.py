@@ -31,7 +31,7 @@ class Gauges:
         self._omega = 2.0 * math.pi * rng.uniform(*_ROCK_HZ)
         self._damping = rng.uniform(*_DAMPING)
         self._zero_bar = _ZERO_BAR * float(rng.standard_normal())
-        self._seed = seed
+        self._seed, self._centre = seed, (0, 0.0)
 
     def read(self, before: VehicleState, state: VehicleState, dt_s: float) -> VehicleState:
         """Return `state` with its pressures; it has come from `before` in `dt_s`."""
@@ -70,4 +70,7 @@ class Gauges:
         return digging._replace(rocking=swing + dt_s * rate, rocking_rate=rate, lifted=lifted)
 
     def _of_load(self, session: int) -> float:
-        return float(generator(self._seed, 9, session).standard_normal())
+        """Return the error of the load's centre after an attempt, in its standard deviations."""
+        if self._centre[0] != session:
+            self._centre = (session, float(generator(self._seed, 9, session).standard_normal()))
+        return self._centre[1]

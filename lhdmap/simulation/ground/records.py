@@ -94,6 +94,7 @@ class Rig(NamedTuple):
     tilt_rps: float
     linkage_lag_s: float
     shared: float
+    idle_share: float
     width_m: float
     nominal_m3: float
     lift_force_n: float

@@ -54,6 +54,7 @@ def rig_of(machine: Machine, tilt_factor: float = 1.0) -> Record:
             tilt_rps=linkage.tilt_rate_rps * tilt_factor,
             linkage_lag_s=linkage.lag_s,
             shared=linkage.shared,
+            idle_share=linkage.idle_share,
             width_m=digging.bucket_width_m,
             nominal_m3=digging.bucket_volume_m3,
             lift_force_n=1e3 * digging.lift_force_kn,

@@ -18,7 +18,7 @@ class Truth(NamedTuple):
     """The machine and its bucket; forces in newton, `rock_n` what the pile alone holds against the drive.
 
     `fill` is the content's weight over the payload. `toe_m` is the way of the lip to the toe. `slip` is the tyres' slip
-    ratio, `slip_s` the time with more than 0.2, `rear_up_s` the time that the rear axle was in the air, of this attempt.
+    ratio, `slip_s` the time with more than 0.5, `rear_up_s` the time that the rear axle was in the air, of this attempt.
     """
 
     attempt: int

@@ -20,6 +20,7 @@ from lhdmap.simulation.ground.draws import CELL_M, draw_load, generator
 from lhdmap.simulation.ground.face import take_boulder
 from lhdmap.simulation.ground.kernel import GRAVITY_MPS2, World, advance
 from lhdmap.simulation.ground.linkage import lip
+from lhdmap.simulation.ground.loader import BOULDER_WAY_M
 from lhdmap.simulation.ground.piles import Cut, Piles
 from lhdmap.simulation.ground.pressures import Gauges
 from lhdmap.simulation.ground.records import Record, State, record, state_of
@@ -33,7 +34,7 @@ from lhdmap.simulation.vehicle.vehicle import ROW, SUB_STEP_S, Vehicle, in_force
 
 _SIDE_STEP_S = 0.002
 _LOWERED_RAD, _RACKED_RAD = 0.15, 0.05  # from the upper stop: lowered from the first on, until the second
-_BOULDER_WAY_M = 0.6  # in rock, after which the boulder of an attempt has fallen into the bucket
+
 _NO_WORLD = World(np.zeros(40), np.zeros((15, 3)), np.ones(1), np.zeros((0, 3)), np.zeros((0, 3)))
 
 
@@ -108,7 +109,7 @@ class LoadingVehicle:
         advance(side, self._rig, rock, world, pedals, steps, dt_s / steps)
         if cut is None:
             _NO_WORLD.heights[:] = 0.0  # what fell is gone: over a dump, or too little to drive over
-        elif cut.chance.boulder_m3 > 0.0 and side["way_m"][0] > _BOULDER_WAY_M:
+        elif cut.chance.boulder_m3 > 0.0 and side["way_m"][0] > BOULDER_WAY_M:
             take_boulder(side[0], self._rig[0], rock[0], world.heights, cut.chance.boulder_m3)
             cut.chance = cut.chance._replace(boulder_m3=0.0)
         return self._carried(state, state_of(side), pending, float(commands[-1][kernel.STEERING]), dt_s)

@@ -114,9 +114,9 @@ def random_state(rng: np.random.Generator) -> VehicleState:
     still = Vehicle(Machine(), Plane()).at_rest(0.0, 0.0, 0.0, near_z_m=0.0, time_ns=0)
     x, y, z = ORIGIN + rng.uniform((-1.0, -0.5, 0.0), (2.0, 0.5, 0.3))
     roll, pitch, yaw, bend = rng.uniform(-1.0, 1.0, 4) * (0.05, 0.05, 0.15, 0.3)
-    boom = -0.35 if rng.random() < 0.75 else rng.uniform(-0.35, 0.85)
+    boom = 0.0 if rng.random() < 0.75 else rng.uniform(0.0, 1.2)
     turned = still._replace(x_m=x, y_m=y, z_m=z, roll_rad=roll, pitch_rad=pitch, yaw_rad=yaw, articulation_rad=bend)
-    return turned._replace(boom_rad=boom, bucket_rad=rng.uniform(-1.2, 0.6))
+    return turned._replace(boom_rad=boom, bucket_rad=rng.uniform(-1.8, 0.0))
 
 
 def test_a_thousand_poses_in_a_rough_tunnel() -> None:
@@ -219,7 +219,7 @@ def corners_of(boxes: Boxes, name: str) -> FloatArray:
 
 def test_bodies_are_where_their_frames_are() -> None:
     machine = Machine()
-    state = random_state(np.random.default_rng(2))._replace(boom_rad=-0.35, bucket_rad=0.6)
+    state = random_state(np.random.default_rng(2))._replace(boom_rad=0.0, bucket_rad=0.0)
     base = se3.from_rpy(state.roll_rad, state.pitch_rad, state.yaw_rad, (state.x_m, state.y_m, state.z_m))
     boxes = body_boxes(machine, state)
     for name, body in machine.bodies.items():
@@ -229,8 +229,8 @@ def test_bodies_are_where_their_frames_are() -> None:
         assert np.abs(np.sort(corners_of(boxes, name), axis=0) - np.sort(wanted, axis=0)).max() < 1e-9
 
 
-@pytest.mark.parametrize("boom_rad", [-0.35, 0.15, 0.85])
-@pytest.mark.parametrize("bucket_rad", [-1.2, -0.23, 0.6])
+@pytest.mark.parametrize("boom_rad", [0.0, 0.5, 1.2])
+@pytest.mark.parametrize("bucket_rad", [-1.8, -0.83, 0.0])
 def test_the_bucket_is_in_its_box(boom_rad: float, bucket_rad: float) -> None:
     machine = Machine()
     low, high = Bodies(machine).corners(boom_rad, bucket_rad)[list(machine.bodies).index("boom_and_bucket")]
@@ -242,8 +242,8 @@ def test_the_bucket_is_in_its_box(boom_rad: float, bucket_rad: float) -> None:
 def test_the_linkage_is_that_of_the_loading_model() -> None:
     """Raising the boom by 0.5 rad raises the pin by 1.06 m; rolled forward by 0.83 rad the bucket's floor is level."""
     linkage = Machine().linkage
-    low, high = bucket_outline(linkage, -0.35, 0.6), bucket_outline(linkage, 0.15, 0.6)
+    low, high = bucket_outline(linkage, 0.0, 0.0), bucket_outline(linkage, 0.5, 0.0)
     assert high[0, 1] - low[0, 1] == pytest.approx(1.06, abs=0.01)
-    level = bucket_outline(linkage, -0.35, 0.6 - 0.8)
+    level = bucket_outline(linkage, 0.0, -0.8)
     assert level[1, 1] == pytest.approx(level[2, 1], abs=1e-9)
     assert level[1, 1] == pytest.approx(0.0, abs=0.01)

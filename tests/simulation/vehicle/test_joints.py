@@ -121,8 +121,8 @@ def test_any_commands_leave_the_state_finite_and_within_its_limits(
             assert abs(state.articulation_rad) <= MOST_RAD
             assert abs(state.articulation_rate_rps) <= MOST_RPS + 1e-12
             assert abs(state.wheel_speed_mps) < 40.0
-            assert -0.35 <= state.boom_rad <= 0.85
-            assert -1.2 <= state.bucket_rad <= 0.6
+            assert 0.0 <= state.boom_rad <= 1.2
+            assert -2.2 <= state.bucket_rad <= 0.0
             assert 0.0 <= state.brake <= 1.0
             assert 0.0 <= state.curl <= 1.0
             assert abs(state.traction_mps2) <= 9.81 * max(plane.mu, 1e-3) + 1e-6
