@@ -86,7 +86,7 @@ class ChargingSettings:
         0.1, unit="m", minimum=0.0, maximum=5.0, doc="fused: ... and so much before that, for what rolls down."
     )
     inside_m: float = setting(
-        0.5,
+        2.0,
         unit="m",
         minimum=0.0,
         maximum=5.0,
@@ -203,6 +203,12 @@ class ExcavationSettings:
         maximum=10.0,
         source="assumed: 3 litres per radian, tyres of 0.8 m",
         doc="adaptive: force at the tyres for a bar of the transmission.",
+    )
+    mass_t: float = setting(
+        34.0, unit="t", minimum=1.0, maximum=300.0, source="class figure, wheels included", doc="adaptive: mass driven."
+    )
+    slope_s: float = setting(
+        0.2, unit="s", minimum=0.06, maximum=2.0, doc="adaptive: window of the acceleration, a line through the speed."
     )
     pedal: float = setting(0.8, minimum=0.05, maximum=1.0, source=_FINDINGS, doc="adaptive: pedal.")
     pedal_slipping: float = setting(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 
+from lhdmap.loading.detector_force import ForceResidual
 from lhdmap.loading.digging_settings import ExcavationSettings
 from lhdmap.loading.excavation_lift import SlipLift
 from lhdmap.loading.excavation_stops import Stops
@@ -17,7 +18,7 @@ _SPILLED_M = 2.0  # of way at most before the pile resists
 
 
 class AdaptiveDig:
-    """An admittance: `tilt = (F - F_0) / F_1 + (v_0 - v) / v_1`, within 0 and 1.
+    """An admittance: `tilt = (F - F_0) / F_1 + (v_0 - v) / v_1`, within 0 and 1; F is what the pile holds, without inertia.
 
     While the lip goes in easily, nothing is tilted; the more the rock resists and the slower the machine gets on, the more
     the bucket turns. Slip lifts the boom (as in the paper) and takes pedal away. Where nothing moves, it backs out a little.
@@ -32,6 +33,7 @@ class AdaptiveDig:
         one = self._settings
         self._skid = SkidFactor(one.window_s, one.floor_mps, lag_matched=one.lag_matched)
         self._lift = SlipLift(one.skid_max, one.hysteresis, one.lift_least_s)
+        self._force = ForceResidual(one.force_kn_per_bar, one.mass_t, 0.0, one.slope_s)
         self._back_off = BackOff(one)
         self._stops.begin(signals)
         self._smoothed = 0.0
@@ -40,7 +42,7 @@ class AdaptiveDig:
     def step(self, signals: Signals) -> Turn:
         """Return the pedals of this moment, and the stop where one is reached."""
         one, skid = self._settings, self._smooth(self._skid.update(signals))
-        force_kn = one.force_kn_per_bar * signals.transmission_bar
+        force_kn = self._force.update(signals)
         self._count_way(force_kn, signals)
         ended = self._stops.reached(signals)
         values = (

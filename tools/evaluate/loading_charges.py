@@ -28,7 +28,10 @@ class Charges:
     def share(self, what: str, kind: str = "") -> float:
         """Return the share of charges that were `right`, `early`, `none`."""
         rows = [one for disturbed, one in self.rows if not kind or disturbed == kind]
-        hits = [one.early > 0 if what == "early" else one.none if what == "none" else not (one.early or one.none) for one in rows]
+        hits = [
+            one.early > 0 if what == "early" else one.none if what == "none" else not (one.early or one.none)
+            for one in rows
+        ]
         return float(np.mean(hits)) if hits else float("nan")
 
     def delays_s(self, since: str) -> np.ndarray:

@@ -19,7 +19,7 @@ import numpy as np
 
 from tools.evaluate.loading_loads import Dug, Plan, run_load
 
-ROUNDS = ((80, range(10)), (12, range(100, 130)), (4, range(200, 280)))
+ROUNDS = ((120, range(10)), (16, range(100, 130)), (4, range(200, 280)))
 """Candidates and loads of each round."""
 Range = tuple[float, float]
 _SHARED: dict[str, Range] = {"boom_max_rad": (0.4, 0.8), "advance_max_m": (2.0, 5.0), "pedal": (0.45, 1.0)}
@@ -29,7 +29,7 @@ PAPER: dict[str, Range] = {
 }  # fmt: skip
 ADAPTIVE: dict[str, Range] = {
     **_SHARED, "pedal_slipping": (0.4, 1.0), "force_kn": (50.0, 170.0), "force_range_kn": (20.0, 200.0),
-    "advance_mps": (-0.05, 0.3), "advance_range_mps": (0.05, 0.8), "skid_max": (0.05, 0.5), "hysteresis": (0.0, 0.1),
+    "advance_mps": (-0.05, 0.4), "advance_range_mps": (0.05, 1.0), "skid_max": (0.05, 0.5), "hysteresis": (0.0, 0.1),
     "lift_least_s": (0.0, 0.4), "skid_smooth_s": (0.0, 0.4), "stuck_s": (0.5, 1.5), "back_off_s": (0.4, 1.2),
 }  # fmt: skip
 
@@ -53,7 +53,7 @@ def loss(loads: Sequence[Sequence[Dug]]) -> dict[str, float]:
         "slip_s": sum(dig.slip_s for dig in digs) / count,
         "time_outs": sum(not dig.ended for dig in digs) / len(digs),
     }
-    found["loss"] = found["attempts"] + 0.04 * found["dig_s"] + 0.08 * found["slip_s"] + 8.0 * found["time_outs"]
+    found["loss"] = found["attempts"] + 0.06 * found["dig_s"] + 0.3 * found["slip_s"] + 8.0 * found["time_outs"]
     return found
 
 
