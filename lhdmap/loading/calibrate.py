@@ -77,7 +77,8 @@ def student_95(degrees: int) -> float:
         return _T_95[degrees - 1]
     z = 1.959964
     g1, g2 = (z**3 + z) / 4.0, (5.0 * z**5 + 16.0 * z**3 + 3.0 * z) / 96.0
-    return z + g1 / degrees + g2 / degrees**2
+    g3 = (3.0 * z**7 + 19.0 * z**5 + 17.0 * z**3 - 15.0 * z) / 384.0
+    return z + g1 / degrees + g2 / degrees**2 + g3 / degrees**3
 
 
 def read_weighings(path: Path, full_t: float) -> tuple[FloatArray, FloatArray]:

@@ -86,7 +86,7 @@ class ChargingSettings:
         0.1, unit="m", minimum=0.0, maximum=5.0, doc="fused: ... and so much before that, for what rolls down."
     )
     inside_m: float = setting(
-        0.5,
+        2.0,
         unit="m",
         minimum=0.0,
         maximum=5.0,
@@ -204,6 +204,12 @@ class ExcavationSettings:
         source="assumed: 3 litres per radian, tyres of 0.8 m",
         doc="adaptive: force at the tyres for a bar of the transmission.",
     )
+    mass_t: float = setting(
+        34.0, unit="t", minimum=1.0, maximum=300.0, source="class figure, wheels included", doc="adaptive: mass driven."
+    )
+    slope_s: float = setting(
+        0.2, unit="s", minimum=0.06, maximum=2.0, doc="adaptive: window of the acceleration, a line through the speed."
+    )
     pedal: float = setting(0.8, minimum=0.05, maximum=1.0, source=_FINDINGS, doc="adaptive: pedal.")
     pedal_slipping: float = setting(
         0.65, minimum=0.0, maximum=1.0, source=_FINDINGS, doc="adaptive: share of the pedal while the wheels slip."
@@ -224,7 +230,14 @@ class ExcavationSettings:
         0.22, minimum=0.0, maximum=5.0, source=_FINDINGS, doc="adaptive: the boom is lifted above this skid."
     )
     lag_matched: bool = setting(
-        False, source="finding E3", doc="adaptive: Eq. (7) with the wheels of the scan's moment."
+        True, source="finding E3", doc="adaptive: Eq. (7) with the wheels of the scan's moment."
+    )
+    skid_smooth_s: float = setting(
+        0.2,
+        unit="s",
+        minimum=0.0,
+        maximum=5.0,
+        doc="adaptive: time constant of the skid, whose noise is that of the scans.",
     )
     hysteresis: float = setting(
         0.05, minimum=0.0, maximum=2.0, doc="adaptive: skid falls by so much before the lift ends."
@@ -235,6 +248,13 @@ class ExcavationSettings:
     )
     advance_max_m: float = setting(
         3.4, unit="m", minimum=0.1, maximum=10.0, source=_FINDINGS, doc="adaptive: stop d_max."
+    )
+    resists_kn: float = setting(
+        100.0,
+        unit="kN",
+        minimum=0.0,
+        maximum=1000.0,
+        doc="adaptive: the way of d_max begins at this force, or after 2 m.",
     )
     stuck_s: float = setting(
         0.8,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 
+from lhdmap.loading.detector_force import ForceResidual
 from lhdmap.loading.digging_settings import ExcavationSettings
 from lhdmap.loading.excavation_lift import SlipLift
 from lhdmap.loading.excavation_stops import Stops
@@ -12,8 +13,12 @@ from lhdmap.loading.signals import Pedals, Signals, Turn
 from lhdmap.loading.skid import SkidFactor
 
 
+_TICK_S = 0.02
+_SPILLED_M = 2.0  # of way at most before the pile resists
+
+
 class AdaptiveDig:
-    """An admittance: `tilt = (F - F_0) / F_1 + (v_0 - v) / v_1`, within 0 and 1.
+    """An admittance: `tilt = (F - F_0) / F_1 + (v_0 - v) / v_1`, within 0 and 1; F is what the pile holds, without inertia.
 
     While the lip goes in easily, nothing is tilted; the more the rock resists and the slower the machine gets on, the more
     the bucket turns. Slip lifts the boom (as in the paper) and takes pedal away. Where nothing moves, it backs out a little.
@@ -28,13 +33,18 @@ class AdaptiveDig:
         one = self._settings
         self._skid = SkidFactor(one.window_s, one.floor_mps, lag_matched=one.lag_matched)
         self._lift = SlipLift(one.skid_max, one.hysteresis, one.lift_least_s)
+        self._force = ForceResidual(one.force_kn_per_bar, one.mass_t, 0.0, one.slope_s)
         self._back_off = BackOff(one)
         self._stops.begin(signals)
+        self._smoothed = 0.0
+        self._resisted, self._begun_m = False, signals.travel_m
 
     def step(self, signals: Signals) -> Turn:
         """Return the pedals of this moment, and the stop where one is reached."""
-        one, skid, ended = self._settings, self._skid.update(signals), self._stops.reached(signals)
-        force_kn = one.force_kn_per_bar * signals.transmission_bar
+        one, skid = self._settings, self._smooth(self._skid.update(signals))
+        force_kn = self._force.update(signals)
+        self._count_way(force_kn, signals)
+        ended = self._stops.reached(signals)
         values = (
             ("advance_m", self._stops.advance_m(signals)),
             ("skid", skid),
@@ -51,6 +61,20 @@ class AdaptiveDig:
         pedal = one.pedal * (one.pedal_slipping if slipping else 1.0)
         tilt = self._tilt(force_kn, signals)
         return Turn(Pedals(pedal, tilt=tilt, lift=float(slipping), full_rpm=True), values=values)
+
+    def _smooth(self, skid: float) -> float:
+        """Return the low-passed skid; where it is not known, the one before."""
+        if math.isfinite(skid):
+            smooth_s = self._settings.skid_smooth_s
+            self._smoothed += (skid - self._smoothed) * (_TICK_S / (smooth_s + _TICK_S))
+        return self._smoothed
+
+    def _count_way(self, force_kn: float, signals: Signals) -> None:
+        """Let the way begin where the pile first resists: spilled rock before it is felt, too, and is soon passed."""
+        if not self._resisted:
+            spilled_m = signals.travel_m - self._begun_m
+            self._resisted = force_kn > self._settings.resists_kn or spilled_m > _SPILLED_M
+            self._stops.begin(signals)
 
     def _tilt(self, force_kn: float, signals: Signals) -> float:
         """Return the tilt command; without scan odometry the tachometer tells the advance, without a pressure it is half."""

@@ -47,6 +47,12 @@ _SECTIONS = {
     "executor": Case("driven"),
     "guidance": Case("guided"),
     "navigation": Case("navigated"),
+    "charging": Case("charged"),
+    "excavation": Case("dug"),
+    "excavation_paper": Case("dug_as_printed"),
+    "excavation_tuned": Case("dug_tuned"),
+    "weighing": Case("weighed"),
+    "attempts": Case("decided"),
     "pile": Case("pile"),
     "figure9": Case("pile", base=_FOUND),
     "figure9_repaired": Case("pile", base={"pile.method": "figure9_repaired"}),
@@ -80,6 +86,15 @@ def _figure9(section: str, found: Mapping[str, Any]) -> dict[str, Case]:
         "overhang_deg": Case("pile", 26.0, {**steep, f"{section}.wall_deg": 25.0}),
     }
     return {f"{section}.{key}": case for key, case in values.items()}
+
+
+def _dig_case(section: str, probe: str) -> dict[str, Case]:
+    """Return the cases of the paper's law that begin at nought."""
+    return {
+        f"{section}.hysteresis": Case(probe, 0.2),
+        f"{section}.lift_least_s": Case(probe, 0.4),
+        f"{section}.boom_max_rad": Case(probe, -0.3),
+    }
 
 
 _WAITS = {"cloud_odometry.step_m": 5.0, "cloud_odometry.step_deg": 50.0, "cloud_odometry.step_s": 60.0}
@@ -179,6 +194,19 @@ _SETTINGS = {
     "navigation.arrived_m": Case("navigated", 0.02),
     "navigation.approach_mps": Case("navigated", 4.9),
     "navigation.heading_deg": Case("navigated", 1.0),
+    "charging.pressure_bar": Case("charged_as_printed", 200.0),
+    "charging.skid": Case("charged_as_printed", 0.05),
+    "charging.slip_m": Case("charged", 0.005),
+    "charging.gate_m": Case("charged", 1.0),
+    "charging.launch_s": Case("charged", 0.0),
+    "excavation.racked_rad": Case("dug_as_printed", -0.6),
+    "excavation.alpha_max_rad": Case("dug_as_printed", -0.6),
+    "excavation.alpha_tolerance_rad": Case("dug_as_printed", 0.5),
+    "excavation.boom_max_rad": Case("dug", -0.3),
+    "excavation.stuck_rps": Case("dug", 1.0),
+    **_dig_case("excavation_paper", "dug_as_printed"),
+    **_dig_case("excavation_tuned", "dug_tuned"),
+    "attempts.full": Case("decided", base={"attempts.rule": "threshold"}),
     "pile.reach_m": Case("pile", 15.0),
     "pile.deadline_m": Case("pile", 20.0),
     "pile.sure": Case("pile", 0.9),

@@ -50,6 +50,7 @@ from tests.movement.mines import fast_ladder
 from tests.report.synthetic import START_NS, report_data
 from tests.report.test_recording import read
 from tests.settings import streams
+from tests.settings.digs import charges, decisions, digs, weighings
 from tests.settings.guided import barred, plans, remembered, stops, trips
 from tests.settings.streams import Stream
 
@@ -315,6 +316,10 @@ def navigated(settings: Settings) -> str:
     return digest(trips(settings))
 
 
+def _dug(method: str) -> Probe:
+    return lambda settings: digest(digs(settings, method))
+
+
 def _mapped(stream: Callable[[], Stream], primary: Literal["front", "points"] = "front", *, own: bool = False) -> Probe:
     return lambda settings: run(settings, stream(), primary, own=own)
 
@@ -337,6 +342,13 @@ PROBES: dict[str, Probe] = {
     "driven": driven,
     "guided": guided,
     "navigated": navigated,
+    "charged": lambda settings: digest(charges(settings)),
+    "charged_as_printed": lambda settings: digest(charges(settings, "paper")),
+    "dug": _dug(""),
+    "dug_as_printed": _dug("paper"),
+    "dug_tuned": _dug("paper-tuned"),
+    "weighed": lambda settings: digest(weighings(settings)),
+    "decided": lambda settings: digest(decisions(settings)),
     "landmarks": landmarks,
     "pile": pile,
     "recording": recording,

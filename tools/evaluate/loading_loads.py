@@ -1,7 +1,7 @@
 """Loads on the simulated ground, attempt after attempt, with the controllers of lhdmap.loading: shared by the figures.
 
 An attempt: charge until the touch is told, dig until a stop, tilt back while reversing, judge the fill. A touch told before the
-lip has met the pile is counted as early, and charging goes on; one that is not told in time is counted, and the dig begins.
+lip has met the pile is counted as early, and the machine goes back for another try; one that is not told in time is counted, and the dig begins.
 """
 
 from __future__ import annotations
@@ -23,6 +23,7 @@ from lhdmap.simulation.ground.sections import load_ground
 TICK_S = 0.02
 CHARGE_LIMIT_S, DIG_LIMIT_S = 15.0, 30.0
 FORCE_N = 40e3
+_MOST_EARLY = 8
 
 
 @dataclass(frozen=True)
@@ -78,8 +79,14 @@ def run_load(plan: Plan, seed: int) -> list[Dug]:
     rng = np.random.default_rng([seed, 77])
     found: list[Dug] = []
     signals = loader.begin(seed, approach_m=plan.approach_m)
+    early = 0
     while True:
         charge, signals = charged(loader, plan, signals)
+        if charge.early and early < _MOST_EARLY:
+            early += 1
+            signals = loader.retry(approach_m=plan.approach_m)
+            continue
+        charge, early = charge._replace(early=early), 0
         found.append(dug(loader, plan, signals, charge))
         seen = found[-1].fill + plan.stop_std * rng.standard_normal()
         if len(found) >= plan.most or (seen >= plan.stop_fill and not plan.forced):
@@ -91,7 +98,7 @@ def charged(loader: Loader, plan: Plan, signals: Signals) -> tuple[Charged, Sign
     """Charge until the touch is told."""
     control = Charge(plan.charging, plan.detector)
     control.begin(signals)
-    early, touched_s, forced_s = 0, math.nan, math.nan
+    touched_s, forced_s = math.nan, math.nan
     steps = round(CHARGE_LIMIT_S / TICK_S)
     for step in range(steps):
         turn = control.step(signals)
@@ -99,14 +106,12 @@ def charged(loader: Loader, plan: Plan, signals: Signals) -> tuple[Charged, Sign
         now_s = step * TICK_S
         touched_s = now_s if math.isnan(touched_s) and truth.rock_n > 0.0 else touched_s
         forced_s = now_s if math.isnan(forced_s) and truth.rock_n > FORCE_N else forced_s
-        if turn.ended and math.isnan(touched_s):
-            early += 1
-            control = Charge(plan.charging, plan.detector)
-            control.begin(signals)
-        elif turn.ended:
-            return Charged(early, False, now_s - touched_s, now_s - forced_s, now_s, turn.ended), signals
+        if turn.ended:
+            return Charged(
+                int(math.isnan(touched_s)), False, now_s - touched_s, now_s - forced_s, now_s, turn.ended
+            ), signals
         signals = loader.step(turn.pedals, TICK_S)
-    return Charged(early, True, math.nan, math.nan, CHARGE_LIMIT_S, ""), signals
+    return Charged(0, True, math.nan, math.nan, CHARGE_LIMIT_S, ""), signals
 
 
 def dug(loader: Loader, plan: Plan, signals: Signals, charge: Charged) -> Dug:
@@ -135,10 +140,10 @@ def dug(loader: Loader, plan: Plan, signals: Signals, charge: Charged) -> Dug:
 
 def racked(loader: Loader) -> None:
     """Tilt back, then reverse: the bucket leaves the pile racked."""
-    for _ in range(round(1.5 / TICK_S)):
-        loader.step(Pedals(tilt=1.0, full_rpm=True), TICK_S)
-    for _ in range(round(3.0 / TICK_S)):
-        loader.step(Pedals(propel=-0.5, tilt=1.0, full_rpm=True), TICK_S)
+    for _ in range(15):
+        loader.step(Pedals(tilt=1.0, full_rpm=True), 0.1)
+    for _ in range(30):
+        loader.step(Pedals(propel=-0.5, tilt=1.0, full_rpm=True), 0.1)
 
 
 def with_paper(plan: Plan, **changes: object) -> Plan:

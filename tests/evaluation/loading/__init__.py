@@ -1,0 +1,1 @@
+"""Tests of Tables 3, 4 and 5."""
