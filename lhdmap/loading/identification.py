@@ -10,11 +10,13 @@ import numpy.typing as npt
 from lhdmap.driving.model import DriveModel
 from lhdmap.geometry import se2
 from lhdmap.loading.moment import Moment, Step, Target, pose_of
+from lhdmap.loading.seen_again import face_behind_m, moved
 from lhdmap.loading.states import Event
 from lhdmap.loading.task_settings import LoadingSettings
 from lhdmap.messages import FloatArray
 from lhdmap.pile.result import PileEstimate
 
+_AGAIN_NS, _MOVED_M = 1_000_000_000, 3.0  # a face that has moved farther is another one
 _BEFORE_M, _BEHIND_M = 0.7, 3.0  # hits on a face lie behind its toe, by the scanner's height over its slope
 
 
@@ -37,6 +39,12 @@ class Identification:
         target = target_of(estimate, stamp_ns) if estimate is not None else None
         if target is not None and (why := self._gone(target, moment)) == "":
             return Step(self.phase, Event.PILE_FOUND, "loadable", moment.approach, target=target)
+        again = self._again(moment)
+        if again is not None:
+            values = (
+                (("shift_m", float(np.hypot(*(again.center_m - moment.target.center_m)))),) if moment.target else ()
+            )
+            return Step(self.phase, Event.PILE_FOUND, "the face seen again", target=again, values=values)
         far_m = self._distance_m(moment)
         late = far_m < self._settings.identify_m
         if self._near:
@@ -46,6 +54,19 @@ class Identification:
             event = Event.PILE_UNFIT if unfit else Event.PILE_UNKNOWN
             return Step(self.phase, event, why, values=(("distance_m", far_m),))
         return Step(self.phase, directive=None if self._near else moment.approach)
+
+    def _again(self, moment: Moment) -> Target | None:
+        """Return the pile of the attempt before as it is seen now: the machine has looked at it from where it stands."""
+        target = moment.target
+        looked = moment.now_ns - self._since_ns >= _AGAIN_NS
+        if not self._near or target is None or moment.marked is not None or not looked:
+            return None
+        limits = target.limits_in(moment.motion)
+        shift = face_behind_m(moment.walls_m, limits) - moment.face_m
+        hits = int(at_pile(moment.walls_m, limits).sum())
+        if not math.isfinite(shift) or abs(shift) > _MOVED_M or hits < self._settings.pile_hits:
+            return None
+        return moved(target, shift, moment.now_ns)
 
     def _estimate(self, moment: Moment) -> tuple[PileEstimate | None, int, str]:
         """Return the estimate that counts, its stamp, and what is to be said where it does not do."""

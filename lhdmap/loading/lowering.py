@@ -8,6 +8,7 @@ from lhdmap.loading.task_settings import LoadingSettings
 _HELD_NS = 100_000_000  # a peak of the pressure when the valve opens is shorter
 _BOOM_DOWN_RAD = 0.02
 _RELIEVE = 0.1
+_NEAR_FLOOR_RAD = -0.7  # from here on at idle speed, slowly: the floor is at about -0.83
 
 
 class Lowering:
@@ -26,7 +27,7 @@ class Lowering:
         """Return what is to be done now; ended where the bucket is down and pressed, not too hard."""
         settings = self._settings
         if signals.boom_rad > _BOOM_DOWN_RAD and not self._pressed:
-            return Turn(Pedals(lift=-settings.lower, brake=True))
+            return Turn(Pedals(lift=-settings.lower, full_rpm=True, brake=True))
         if self._pressed and signals.tilt_bar > settings.press_most_bar:
             return Turn(Pedals(tilt=_RELIEVE, brake=True))
         if self._pressed:
@@ -40,4 +41,4 @@ class Lowering:
         elif signals.now_ns - self._since_ns >= _HELD_NS:
             self._pressed = True
             return Turn(Pedals(brake=True))
-        return Turn(Pedals(tilt=-settings.lower, brake=True))
+        return Turn(Pedals(tilt=-settings.lower, full_rpm=signals.bucket_rad > _NEAR_FLOOR_RAD, brake=True))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
 
 from lhdmap.loading.moment import Mission, Target
@@ -17,7 +18,7 @@ class Memory:
 
     `active`: a mission is under way; `touched`: the bucket has been in the pile, or may have been; `loaded`: an operator finished
     by hand; `valid_ns`: since when all that re-validation asks for has held; `marked`: a pile that an operator marked; `seen_ns`:
-    of the pile only what is younger counts.
+    of the pile only what is younger counts; `face_m`: how far behind the toe the scan hit the face before the bucket went in.
     """
 
     state: State = State.IDLE
@@ -29,6 +30,7 @@ class Memory:
     touched: bool = False
     loaded: bool = False
     seen_ns: int = 0
+    face_m: float = math.nan
     valid_ns: int | None = None
     holds: int = 0
     tried: list[str] = field(default_factory=list)
@@ -38,7 +40,7 @@ class Memory:
         """Begin a mission; what was before is forgotten."""
         self.mission, self.target, self.marked = mission, None, None
         self.active, self.touched, self.loaded = True, False, False
-        self.holds, self.seen_ns, self.tried = 0, 0, []
+        self.holds, self.seen_ns, self.tried, self.face_m = 0, 0, [], math.nan
 
     def note(self, text: str) -> None:
         """Remember what was tried, for a request; the oldest is forgotten."""

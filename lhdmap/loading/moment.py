@@ -109,6 +109,7 @@ class Moment(NamedTuple):
     target: Target | None
     touched_ns: int
     marked: PileEstimate | None = None
+    face_m: float = float("nan")
 
 
 class Step(NamedTuple):

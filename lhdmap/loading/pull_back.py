@@ -94,7 +94,7 @@ class PullBack:
         settings = self._settings
         over = moment.now_ns - self._since_ns > round(settings.rack_s * 1e9)
         if moment.signals.bucket_rad < -settings.racked_rad and not over:
-            return Step(RACK, pedals=Pedals(tilt=1.0, brake=True))
+            return Step(RACK, pedals=Pedals(tilt=1.0, full_rpm=True, brake=True))
         self.phase = BACK
         return self._back(moment)
 

@@ -22,6 +22,7 @@ from lhdmap.loading.memory import Memory
 from lhdmap.loading.moment import AUTONOMOUS, OPERATED, LoadingInput, LoadingOutput, Moment, Part, Step
 from lhdmap.loading.positioning_steps import Positioning
 from lhdmap.loading.pull_back import PullBack, Trail
+from lhdmap.loading.seen_again import face_behind_m
 from lhdmap.loading.states import ASSISTANCE, MOVING, RESTING, TABLE, Event, Facts, State, event_of
 from lhdmap.loading.task_settings import LoadingSettings
 
@@ -116,7 +117,7 @@ class LoadingTask:
         place = memory.mission.draw_point_m if memory.mission is not None else None
         return Moment(
             told.now_ns, told.signals, told.motion, walls, told.pile, told.approach, place, memory.target,
-            memory.seen_ns, memory.marked,
+            memory.seen_ns, memory.marked, memory.face_m,
         )  # fmt: skip
 
     def _facts(self, told: LoadingInput, wrong: tuple[str, ...], answer: Answer | None) -> Facts:
@@ -202,6 +203,7 @@ class LoadingTask:
             memory.touched, memory.marked, memory.seen_ns = False, None, told.now_ns
         if memory.state == State.CHARGING:
             memory.touched = True
+            memory.face_m = self._face_m(told)
         if memory.state == State.WEIGHING:
             memory.loaded = False
         memory.holds += memory.state == State.HELD
@@ -210,6 +212,13 @@ class LoadingTask:
             moment = self._moment(told)
             assert moment is not None  # noqa: S101  # no event leads to a moving state while signals are missing
             self._parts[memory.state].begin(moment)
+
+    def _face_m(self, told: LoadingInput) -> float:
+        """Return how far behind the toe the scan hits the face now; NaN where it does not."""
+        target = self._memory.target
+        if target is None or told.walls_m is None or told.motion is None:
+            return math.nan
+        return face_behind_m(told.walls_m, target.limits_in(told.motion))
 
 
 _JOINT_RAD = math.radians(2.0)

@@ -51,7 +51,7 @@ class Weighing:
         if not self._held_ns:
             lift = self._way(signals)
             if lift:
-                return Turn(Pedals(lift=lift, brake=True))
+                return Turn(Pedals(lift=lift, full_rpm=lift < 0.0, brake=True))
             self._held_ns = signals.now_ns
         self._add(signals)
         found = self._looked(signals.now_ns)

@@ -79,7 +79,8 @@ class LoadingVehicle:
         """
         lowered = self._lowered(state)
         cut = self.piles.follow(state.time_ns, self._lip_m(state), state.yaw_rad, state.load_kg, lowered=lowered)
-        after = self._dig(state, command, dt_s, cut) if cut is not None or lowered else self._tram(state, command, dt_s)
+        digs = lowered or (cut is not None and command.propel > 0.0)  # a racked bucket leaves the pile as it trams
+        after = self._dig(state, command, dt_s, cut) if digs else self._tram(state, command, dt_s)
         return self._gauges.read(state, after, dt_s)
 
     def _tram(self, state: VehicleState, command: Command, dt_s: float) -> VehicleState:
