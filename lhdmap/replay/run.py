@@ -17,6 +17,7 @@ from lhdmap.replay.journal import Journal
 from lhdmap.replay.parts import Parts
 from lhdmap.replay.processes.film import Film
 from lhdmap.replay.processes.film_drive import DriveFilm
+from lhdmap.replay.processes.film_load import LoadFilm
 from lhdmap.replay.processes.recorder import Recorder
 from lhdmap.replay.scenario import Scenario, scenario_toml
 from lhdmap.replay.series import Timeline
@@ -115,7 +116,8 @@ class _Replay:
             self._recording.begin(self._parts.lines_m, expected_s)
         given = self._parts.autonomous
         drive = None if given is None else DriveFilm(given.known.topology)
-        film = Film(machine, self._recording, live=request.live_port is not None, drive=drive)
+        load = None if self._parts.loading is None else LoadFilm(machine.drive.payload_kg)
+        film = Film(machine, self._recording, live=request.live_port is not None, drive=drive, load=load)
         journal.listeners.append(film.take)
         return film
 
@@ -170,7 +172,7 @@ class _Replay:
         return ReplayData(
             f"Replay {self._request.name}", verdict, rows, START_NS, self._timeline.changes,
             self._parts.lines_m, film.believed_m(), self._parts.goal_m, made, scenario_toml(scenario),
-            warnings if left_out else (), drive, self._stops.rows(),
+            warnings if left_out else (), drive, self._stops.rows(), None if film.load is None else film.load.data(),
         )  # fmt: skip
 
 

@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from lhdmap.messages import FloatArray
+from lhdmap.report.loading_data import LoadData
 from lhdmap.report.route_legs import Leg
 from lhdmap.topology.model import TopologicalMap
 
@@ -86,6 +87,7 @@ class ReplayData:
     warnings: Sequence[str] = ()
     drive: DriveData | None = None
     stops: Sequence[StopRow] = ()
+    load: LoadData | None = None
 
     def column(self, name: str) -> FloatArray:
         """Return a column of `rows` by its name, shape (N,)."""

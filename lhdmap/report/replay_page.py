@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from lhdmap.report import charts, markup, replay_charts, replay_drive_charts
+from lhdmap.report import charts, loading_section, markup, replay_charts, replay_drive_charts
 from lhdmap.report.replay_data import DriveData, ReplayData, StopRow
 
 if TYPE_CHECKING:
@@ -100,6 +100,8 @@ def _pictures(data: ReplayData) -> Iterator[str]:
     if data.drive is not None and len(data.drive.places):
         chart = replay_drive_charts.place_chart(data.drive, data.verdict["duration_s"])
         yield markup.section("Place on the map", _picture(chart, PLACE))
+    if data.load is not None:
+        yield from loading_section.sections(data, data.load)
     if data.changes:
         yield markup.section("States", _picture(replay_charts.state_chart(data), STATES))
 

@@ -26,6 +26,7 @@ from lhdmap.replay.process import (
     Received,
 )
 from lhdmap.replay.processes.film_drive import TOPICS, DriveFilm
+from lhdmap.replay.processes.film_load import LOAD_TOPICS, LoadFilm
 from lhdmap.replay.series import Series
 from lhdmap.report.replay_data import COLUMNS
 from lhdmap.report.replay_recording import ReplayRecording
@@ -42,7 +43,8 @@ class Film(Process):
     """A row each 0.1 s; `recording` is None where none is wanted."""
 
     name, period_ns, priority, site = FILM, 100 * MILLISECOND_NS, 80, EVERYWHERE
-    reads = (STATE, CONTACT, _COMMAND, _SCAN, *TOPICS)
+    reads = tuple(dict.fromkeys((STATE, CONTACT, _COMMAND, _SCAN, *TOPICS, *LOAD_TOPICS)))
+    inbox_size = 4000
 
     def __init__(
         self,
@@ -51,14 +53,15 @@ class Film(Process):
         *,
         live: bool = False,
         drive: DriveFilm | None = None,
+        load: LoadFilm | None = None,
     ) -> None:
-        """`drive`: what is watched of a machine that drives itself; None: it does not."""
+        """`drive`, `load`: what is watched of a machine that drives itself, and of one that loads; None: it does not."""
         self.series, self._believed = Series(len(COLUMNS)), Series(4)
         self._machine, self._recording = machine, recording
         self._most = _LIVE_BATCH if live else _BATCH
         self._batch: list[tuple[float, ...]] = []
         self._attitudes: list[tuple[float, float]] = []
-        self.drive = drive
+        self.drive, self.load = drive, load
         self._wanted_mps = self._steering_rps = self._clearance_m = math.nan
         self._start: State | None = None
         self._mapped = False
@@ -66,7 +69,10 @@ class Film(Process):
     def step(self, now_ns: int, inbox: Sequence[Received]) -> Iterable[Outgoing]:
         """Take what has come."""
         state: State | None = None
-        for topic, _, message in inbox:
+        for received in inbox:
+            topic, _, message = received
+            if self.load is not None:
+                self.load.take(received)
             if self.drive is not None:
                 self._watch(topic, message)
             if topic == STATE:
