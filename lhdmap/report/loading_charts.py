@@ -22,6 +22,11 @@ _SHADES = {
     "pull_back": "#cfd6dc", "payload_weighing": "#d7c5e8", "positioning_assistance": "#e26d6d", "loading_assistance": "#e26d6d",
     "held": "#8a949e",
 }  # fmt: skip
+_TOUCH = (
+    ("transmission_bar", 0.01, charts.WHEELS, "transmission, 100 bar"),
+    ("skid", 1.0, charts.ODOMETRY, "skid factor"),
+    ("embed_m", 1.0, charts.TRUTH, "lip in rock (true), m"),
+)
 _BEFORE_S, _AFTER_S = 4.0, 2.0
 _PANEL_IN = 1.45
 
@@ -74,9 +79,7 @@ def charge_chart(data: LoadData, spans: Sequence[Span]) -> Figure | None:
     time_s = data.column("time_s")
     for number, (axes, at_s) in enumerate(zip(panels, touches, strict=True), start=1):
         near = (time_s > at_s - _BEFORE_S) & (time_s < at_s + _AFTER_S)
-        curves = (("transmission_bar", 0.01, charts.WHEELS, "transmission, 100 bar"), ("skid", 1.0, charts.ODOMETRY, "skid factor"),
-                  ("embed_m", 1.0, charts.TRUTH, "lip in rock (true), m"))  # fmt: skip
-        for name, scale, colour, words in curves:
+        for name, scale, colour, words in _TOUCH:
             axes.plot(time_s[near] - at_s, scale * data.column(name)[near], color=colour, label=words)
         axes.axvline(0.0, color=charts.INK, linewidth=0.8)
         axes.set_xlabel(f"charge {number}: time after the touch was told, s")
