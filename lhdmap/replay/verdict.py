@@ -137,7 +137,7 @@ class Tally:
             off_m = math.dist(_place(self._state), self._goal_m)
         self.arrived = off_m <= self._limits.arrival_m
         if self.arrived:
-            self._end("arrived", ok=True)
+            self._end("arrived" if self._kind == "tram" else "done", ok=True)
         else:
             self._end(f"{off_m:.2f} m beside the goal: {figure(self._limits.arrival_m)} m was wanted")
 
