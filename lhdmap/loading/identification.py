@@ -9,14 +9,16 @@ import numpy.typing as npt
 
 from lhdmap.driving.model import DriveModel
 from lhdmap.geometry import se2
+from lhdmap.guidance.directive import HEADING
 from lhdmap.loading.moment import Moment, Step, Target, pose_of
 from lhdmap.loading.seen_again import face_behind_m, moved
 from lhdmap.loading.states import Event
 from lhdmap.loading.task_settings import LoadingSettings
 from lhdmap.messages import FloatArray
-from lhdmap.pile.result import PileEstimate
+from lhdmap.pile.result import PileEstimate, Snapshot
 
 _AGAIN_NS, _MOVED_M = 1_000_000_000, 3.0  # a face that has moved farther is another one
+_FACING_RAD = math.radians(15.0)
 _BEFORE_M, _BEHIND_M = 0.7, 3.0  # hits on a face lie behind its toe, by the scanner's height over its slope
 
 
@@ -27,11 +29,14 @@ class Identification:
         self._model, self._settings = model, settings
         self.phase = "look"
         self._since_ns, self._near = 0, False
+        self._facing_m = 0.0
+        self._place: FloatArray | None = None
 
     def begin(self, moment: Moment) -> None:
         """Begin to look, from afar, or near the pile before another attempt."""
         self._since_ns = moment.now_ns
-        self._near = self._distance_m(moment) < self._settings.identify_m
+        self._near = self._distance_m(moment) < self._settings.identify_m and moment.target is not None
+        self._facing_m, self._place = 0.0, None
 
     def step(self, moment: Moment) -> Step:
         """Return what navigation drives until the pile is known."""
@@ -46,7 +51,8 @@ class Identification:
             )
             return Step(self.phase, Event.PILE_FOUND, "the face seen again", target=again, values=values)
         far_m = self._distance_m(moment)
-        late = far_m < self._settings.identify_m
+        self._count(moment)
+        late = far_m < self._settings.identify_m and self._facing_m >= self._settings.facing_m
         if self._near:
             late = moment.now_ns - self._since_ns > round(self._settings.look_s * 1e9)
         if late:
@@ -54,6 +60,21 @@ class Identification:
             event = Event.PILE_UNFIT if unfit else Event.PILE_UNKNOWN
             return Step(self.phase, event, why, values=(("distance_m", far_m),))
         return Step(self.phase, directive=None if self._near else moment.approach)
+
+    def _count(self, moment: Moment) -> None:
+        """Count the way on which the machine has faced where it goes: round a bend there is nothing to be seen of a pile.
+
+        A machine that has come to the end of its way, or has none, has seen what it can see after a while.
+        """
+        pose, way = pose_of(moment.motion), moment.approach
+        before, self._place = self._place, pose[:2]
+        standing = abs(moment.motion.speed_mps) < self._settings.standing_mps
+        if standing and moment.now_ns - self._since_ns > round(self._settings.look_s * 1e9):
+            self._facing_m = math.inf
+        if before is None:
+            return
+        faces = way is None or abs(math.remainder(float(way.path[-1, HEADING]) - pose[2], math.tau)) < _FACING_RAD
+        self._facing_m += float(np.hypot(*(self._place - before))) if faces else 0.0
 
     def _again(self, moment: Moment) -> Target | None:
         """Return the pile of the attempt before as it is seen now: the machine has looked at it from where it stands."""
@@ -83,7 +104,7 @@ class Identification:
     def _distance_m(self, moment: Moment) -> float:
         """Return the way from the joint to the pile's centre, or to the draw point; infinite where neither is known."""
         place = joint_of(pose_of(moment.motion), self._model)
-        if moment.pile is not None and np.isfinite(moment.pile.estimate.center_m[:2]).all():
+        if moment.pile is not None and moment.pile.estimate.status not in (None, "none") and _placed(moment.pile):
             return float(np.hypot(*(moment.pile.estimate.center_m[:2] - place)))
         if moment.draw_point_m is not None:
             return math.hypot(moment.draw_point_m[0] - place[0], moment.draw_point_m[1] - place[1])
@@ -95,6 +116,10 @@ class Identification:
             return ""
         hits = int(at_pile(moment.walls_m, target.limits_in(moment.motion)).sum())
         return "" if hits >= self._settings.pile_hits else f"only {hits} scan points where the pile was"
+
+
+def _placed(pile: Snapshot) -> bool:
+    return bool(np.isfinite(pile.estimate.center_m[:2]).all())
 
 
 def target_of(estimate: PileEstimate, stamp_ns: int) -> Target | None:

@@ -22,6 +22,13 @@ class LoadingSettings:
         source=f"{_PAPER}, section 3.2",
         doc="A pile that is not identified this far before it is one for positioning assistance.",
     )
+    facing_m: float = setting(
+        5.0,
+        unit="m",
+        minimum=0.0,
+        maximum=60.0,
+        doc="It must have driven so far towards the pile before that counts: round a bend there is nothing to be seen.",
+    )
     look_s: float = setting(
         10.0, unit="s", minimum=0.1, maximum=120.0, doc="How long it looks where it begins nearer than that."
     )

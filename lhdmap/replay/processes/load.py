@@ -7,8 +7,7 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from lhdmap.geometry import se2
-from lhdmap.guidance.directive import Directive
+from lhdmap.guidance.directive import HEADING, Directive, X, Y
 from lhdmap.loading.assistance import Answer
 from lhdmap.loading.moment import LoadingInput, LoadingOutput, Mission, Target
 from lhdmap.loading.states import ASSISTANCE, Event, State
@@ -36,6 +35,7 @@ from lhdmap.replay.processes.told import Asked, Digs, Health, LoadingNow
 LOADS = "loading"
 _ASKS_NS = 100 * MILLISECOND_NS
 _SETTLED_NS = 1_000_000_000
+_AHEAD_M = 7.5  # of the pile's middle from the front axle of a machine that has been driven up to it
 _IN_THE_PILE = (State.CHARGING, State.EXCAVATION, State.PULL_BACK)
 _BEFORE_M, _BEHIND_M, _BESIDE_M = 1.2, 8.0, 0.1
 
@@ -52,6 +52,7 @@ class Loads(Process):
     def __init__(self, task: LoadingTask, way: Directive | None, scribe: Scribe) -> None:
         self.task, self._way, self._scribe = task, way, scribe
         self._feed, self._signals = MotionFeed(), SignalFeed()
+        self._wanted = Mission(1, None if way is None else draw_point_of(way))
         self._pile: Snapshot | None = None
         self._health: Health | None = None
         self._answer: Answer | None = None
@@ -111,7 +112,7 @@ class Loads(Process):
             health is not None and health.armed,
             answer,
             self._emergency,
-            Mission(1) if self._settled(now_ns) else None,
+            self._wanted if self._settled(now_ns) else None,
             way,
             evidence=(("log", f"run.mcap@{now_ns}"),),
         )
@@ -159,6 +160,7 @@ def mouth_of(target: Target) -> FloatArray:
     )
 
 
-def way_from(start: FloatArray, line_map_m: FloatArray) -> FloatArray:
-    """Return a taught line (N, 2) of the map in `odom`: the odometry begins where the machine is said to stand (3,)."""
-    return se2.transform(se2.inverse(start), line_map_m)
+def draw_point_of(way: Directive) -> tuple[float, float]:
+    """Return about where the pile's middle is: before the end of the taught way."""
+    x, y, heading = way.path[-1, [X, Y, HEADING]].tolist()
+    return x + _AHEAD_M * math.cos(heading), y + _AHEAD_M * math.sin(heading)
