@@ -49,7 +49,7 @@ from tests.localization import known
 from tests.movement.mines import fast_ladder
 from tests.report.synthetic import START_NS, report_data
 from tests.report.test_recording import read
-from tests.settings import streams
+from tests.settings import loading, streams
 from tests.settings.guided import barred, plans, remembered, stops, trips
 from tests.settings.streams import Stream
 
@@ -315,6 +315,16 @@ def navigated(settings: Settings) -> str:
     return digest(trips(settings))
 
 
+def loading_cycle(settings: Settings) -> str:
+    """Return the digest of what the loading task says and asks for in short cycles."""
+    return digest(loading.cycle(settings.loading))
+
+
+def loading_limits(settings: Settings) -> str:
+    """Return the digest of when each limit of the loading task counts."""
+    return digest(loading.limits(settings.loading))
+
+
 def _mapped(stream: Callable[[], Stream], primary: Literal["front", "points"] = "front", *, own: bool = False) -> Probe:
     return lambda settings: run(settings, stream(), primary, own=own)
 
@@ -337,6 +347,8 @@ PROBES: dict[str, Probe] = {
     "driven": driven,
     "guided": guided,
     "navigated": navigated,
+    "loading_cycle": loading_cycle,
+    "loading_limits": loading_limits,
     "landmarks": landmarks,
     "pile": pile,
     "recording": recording,

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 import pytest
 from lhdmap.loading.assistance import ABORT, GO_ON, LOADED, Reply, ScriptedOperator
+from lhdmap.loading.digging_parts import Controllers
 from lhdmap.loading.moment import LoadingInput, LoadingOutput
 from lhdmap.loading.signals import Pedals, Turn
 from lhdmap.loading.states import ASSISTANCE, State
@@ -94,8 +96,13 @@ def test_without_a_pile_15_m_before_it_help_is_asked_for_at_once() -> None:
     assert out.state == State.POSITIONING_ASSISTANCE
 
 
-def never(pedals: Pedals) -> object:
+def never(pedals: Pedals) -> Any:
     return shown(lambda s, n: Turn(pedals))
+
+
+def replaced(name: str, controller: Any) -> Controllers:
+    change: dict[str, Any] = {name: controller}
+    return controllers()._replace(**change)
 
 
 @pytest.mark.parametrize(
@@ -108,7 +115,7 @@ def never(pedals: Pedals) -> object:
     ],
 )
 def test_what_does_not_end_is_one_for_an_operator_at_its_limit(broken: str, state: State, limit_s: float) -> None:
-    one = bench(start=(12.0, 0.0, 0.0), controllers=controllers()._replace(**{broken: never(Pedals())}))
+    one = bench(start=(12.0, 0.0, 0.0), controllers=replaced(broken, never(Pedals())))
     out = one.run(200.0, lambda said: said.request is not None)
     assert out.state == State.LOADING_ASSISTANCE
     assert out.request is not None
@@ -121,7 +128,7 @@ def test_what_does_not_end_is_one_for_an_operator_at_its_limit(broken: str, stat
 @pytest.mark.parametrize("broken", ["charge", "dig", "weigh"])
 def test_a_controller_that_gives_up_is_one_for_an_operator(broken: str) -> None:
     fails = shown(lambda s, n: Turn(Pedals(), "stuck", (("failed", 1.0),)))
-    one = bench(start=(12.0, 0.0, 0.0), controllers=controllers()._replace(**{broken: fails}))
+    one = bench(start=(12.0, 0.0, 0.0), controllers=replaced(broken, fails))
     out = one.run(200.0, lambda said: said.request is not None)
     assert out.state == State.LOADING_ASSISTANCE
     assert "stuck" in (out.request.why if out.request else "")
