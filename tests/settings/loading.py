@@ -173,7 +173,9 @@ def _newer(settings: LoadingSettings) -> list[Any]:
     near.begin(moment)
     target = near.step(moment).target
     one.begin(moment._replace(target=target))
-    return [one.step(moment._replace(target=target, pile=moved)).target]
+    newer = one.step(moment._replace(target=target, pile=moved)).target
+    stuck = (k for k in range(600) if one.step(moment._replace(target=target, now_ns=k * _SECOND_NS // 10)).event)
+    return [newer, next(stuck, None)]
 
 
 def _toes(settings: LoadingSettings) -> list[Any]:

@@ -233,6 +233,15 @@ def test_a_wall_point_in_a_box_is_one_for_an_operator() -> None:
     assert "wall" in (out.request.why if out.request else "")
 
 
+def test_an_approach_that_stands_is_one_for_an_operator_before_its_limit() -> None:
+    one = bench(start=(8.0, 0.0, 0.0), guided=True)
+    one._near = lambda: np.array([[13.0, y] for y in np.arange(-1.0, 1.0, 0.1)])  # type: ignore[method-assign]
+    out = one.run(30.0, lambda said: said.request is not None)
+    assert out.state == State.POSITIONING_ASSISTANCE
+    assert "does not drive on" in (out.request.why if out.request else "")
+    assert one.now_ns < 15e9
+
+
 def test_the_same_run_says_the_same() -> None:
     runs = [bench(start=(12.0, 0.2, 0.05)) for _ in range(2)]
     for one in runs:
