@@ -35,7 +35,6 @@ class Positioning:
 
     def __init__(self, model: DriveModel, bodies: Bodies, settings: LoadingSettings) -> None:
         self._model, self._settings = model, settings
-        self._nose_m = float(bodies.front_box_m[1, 0])
         self._aligner, self._lowering = Aligner(model, bodies, settings), Lowering(settings)
         self.phase = APPROACH
         self._path: FloatArray | None = None

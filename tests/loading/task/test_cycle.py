@@ -60,7 +60,6 @@ def test_attempts_go_on_until_the_bucket_is_full_and_each_is_weighed() -> None:
     out = one.run(240.0, over)
     assert states(one) == [*CYCLE * 3, State.DONE]
     assert (out.attempts, out.fill) == (3, 0.92)
-    assert min(one.rooms_m) > 0.0
 
 
 def test_each_attempt_begins_far_enough_from_the_pile() -> None:
@@ -84,7 +83,7 @@ def test_a_pile_that_is_not_loadable_is_one_for_an_operator(status: str, why: st
     assert why in out.request.why
     assert out.request.kind == "positioning"
     assert out.request.evidence["pile_status"] == status
-    assert one.now_ns <= 11e9
+    assert one.now_ns <= 12.1e9
 
 
 def test_without_a_pile_15_m_before_it_help_is_asked_for_at_once() -> None:
@@ -234,12 +233,12 @@ def test_a_wall_point_in_a_box_is_one_for_an_operator() -> None:
 
 
 def test_an_approach_that_stands_is_one_for_an_operator_before_its_limit() -> None:
-    one = bench(start=(8.0, 0.0, 0.0), guided=True)
-    one._near = lambda: np.array([[13.0, y] for y in np.arange(-1.0, 1.0, 0.1)])  # type: ignore[method-assign]
+    one = bench(start=(8.0, 0.0, 0.0))
+    one._follow = lambda directive, step_s: None  # type: ignore[method-assign]
     out = one.run(30.0, lambda said: said.request is not None)
     assert out.state == State.POSITIONING_ASSISTANCE
     assert "does not drive on" in (out.request.why if out.request else "")
-    assert one.now_ns < 15e9
+    assert one.now_ns < 10e9
 
 
 def test_the_same_run_says_the_same() -> None:
