@@ -53,11 +53,11 @@ class Aligner:
 
     def aim(self, bend_rad: float, limits_m: FloatArray, walls_m: FloatArray) -> Aim:
         """Return the angle to turn the joint to; limits (2, 2) and wall points (N, 2) in `base_link`."""
-        walls, margin_m, walled = self._walls(limits_m, walls_m), self._settings.landing_m, False
+        walls, walled = self._walls(limits_m, walls_m), False
         for bend in self._candidates(bend_rad):
             turn = turned(bend_rad, bend, self._model)
             limits = se2.transform(se2.inverse(np.array([0.0, 0.0, turn])), limits_m)
-            if not self.lands(bend, limits, margin_m=margin_m).good:
+            if not self._stays(bend, limits):
                 continue
             landed = self.lands(bend, limits)
             start = Posture(np.array([0.0, 0.0, turn]), bend)
@@ -65,6 +65,19 @@ class Aligner:
                 return Aim(bend)
             walled = True
         return Aim(None, walled)
+
+    def _stays(self, bend_rad: float, limits_m: FloatArray) -> bool:
+        """Return whether both sides land, and are still between the limits when the bucket is as deep as it digs.
+
+        The walls go on beside the pile: with the joint bent the bucket runs into them while it digs.
+        """
+        settings = self._settings
+        E = limits_m[1] - limits_m[0]
+        deep = limits_m + settings.dig_m * np.array([E[1], -E[0]]) / max(float(np.hypot(*E)), 1e-9)
+        return (
+            self.lands(bend_rad, limits_m, margin_m=settings.landing_m).good
+            and self.lands(bend_rad, deep, margin_m=settings.landing_m).good
+        )
 
     def _candidates(self, bend_rad: float) -> Iterator[float]:
         """Yield joint angles, the nearest to that of now first."""

@@ -35,16 +35,16 @@ class Positioning:
 
     def __init__(self, model: DriveModel, bodies: Bodies, settings: LoadingSettings) -> None:
         self._model, self._settings = model, settings
-        self._nose_m = float(bodies.front_box_m[1, 0])
         self._aligner, self._lowering = Aligner(model, bodies, settings), Lowering(settings)
         self.phase = APPROACH
         self._path: FloatArray | None = None
         self._planned: Target | None = None
-        self._aim, self._aimed_ns = Aim(None), 0
+        self._aim, self._aimed_ns, self._rolled_ns = Aim(None), 0, 0
 
-    def begin(self, moment: Moment) -> None:  # noqa: ARG002
+    def begin(self, moment: Moment) -> None:
         """Begin with the approach."""
         self.phase, self._path, self._planned = APPROACH, None, None
+        self._rolled_ns = moment.now_ns
 
     def step(self, moment: Moment) -> Step:
         """Return what is to be done now."""
@@ -76,6 +76,10 @@ class Positioning:
         if far_m <= settings.reach_m:
             self.phase, self._aimed_ns = ALIGN, -_LOOK_NS
             return self._align(moment, target)
+        if abs(moment.motion.speed_mps) > settings.standing_mps:
+            self._rolled_ns = moment.now_ns
+        if moment.now_ns - self._rolled_ns > round(settings.stuck_s * 1e9):
+            return Step(APPROACH, Event.BLOCKED, f"guidance does not drive on, {far_m:.1f} m before the pile")
         before_m = settings.reach_m - self._model.front_m
         moved = self._planned is None or float(np.abs(target.limits_m - self._planned.limits_m).max()) > _REPLAN_M
         if self._path is None or moved:

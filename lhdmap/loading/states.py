@@ -128,7 +128,7 @@ class Facts(NamedTuple):
         healthy: what the state needs is heard, finite, fresh and alive.
         wanted: there is a mission; in a resting state: a new one.
         expired: the state's time limit is over.
-        valid: all that re-validation asks for holds, and has for a while.
+        valid: all that re-validation asks for holds, and has for a while; at rest: it has been ready for a while.
         touched: the bucket has been in the pile, or may have been, since the last weighing.
         loaded: an operator said that the loading was finished by hand.
         answer: what the operator answers to the open request: empty, `go_on`, `loaded`, `abort`.
@@ -177,7 +177,7 @@ def event_of(state: State, facts: Facts) -> Event | None:
 
 def _at_rest(state: State, facts: Facts) -> Event | None:
     if state != State.EMERGENCY:
-        return Event.MISSION if facts.wanted and facts.ready else None
+        return Event.MISSION if facts.wanted and facts.ready and facts.valid else None
     if not facts.armed:
         return None
     if not facts.wanted:

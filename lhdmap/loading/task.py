@@ -136,7 +136,7 @@ class LoadingTask:
             loaded=memory.loaded,
             answer="" if answer is None else answer.kind,
         )
-        return facts._replace(valid=memory.state == State.HELD and self._valid(told, facts))
+        return facts._replace(valid=memory.state in _VALIDATED and self._valid(told, facts))
 
     def _wanted(self, told: LoadingInput) -> bool:
         """Return whether there is a mission; at rest: another one than the last."""
@@ -148,10 +148,14 @@ class LoadingTask:
         return same and memory.active if memory.state not in _AT_REST else not same
 
     def _valid(self, told: LoadingInput, facts: Facts) -> bool:
-        """Return whether all that re-validation asks for has held for a while: ready, at rest, joint agrees, on the trail."""
+        """Return whether all that re-validation asks for has held for a while: ready, at rest, joint agrees, on the trail.
+
+        A mission may begin while the machine rolls: there being ready is enough.
+        """
         memory, settings = self._memory, self._settings
         good = facts.ready and told.motion is not None and told.signals is not None
-        if good and told.motion is not None and told.signals is not None:
+        held = memory.state == State.HELD
+        if good and held and told.motion is not None and told.signals is not None:
             good = abs(told.motion.speed_mps) < settings.standing_mps
             good &= abs(told.motion.articulation_rad - told.signals.articulation_rad) <= _JOINT_RAD
             if memory.touched and not memory.loaded:
@@ -223,6 +227,7 @@ class LoadingTask:
 
 _JOINT_RAD = math.radians(2.0)
 _AT_REST = RESTING - {State.EMERGENCY}
+_VALIDATED = _AT_REST | {State.HELD}
 
 
 def limits_s(settings: LoadingSettings) -> dict[State, float]:

@@ -100,8 +100,22 @@ class LoadingSettings:
         doc="Distance of the joint to the pile's centre at which guidance hands over.",
     )
     approach_kmh: float = setting(5.0, unit="km/h", minimum=0.5, maximum=20.0, doc="Speed up to there.")
+    stuck_s: float = setting(
+        8.0,
+        unit="s",
+        minimum=1.0,
+        maximum=600.0,
+        doc="Standing so long in the approach is being stuck: help is asked for.",
+    )
     landing_m: float = setting(
         0.15, unit="m", minimum=0.0, maximum=1.0, doc="How far inside the pile's limits both sides have to land."
+    )
+    dig_m: float = setting(
+        2.0,
+        unit="m",
+        minimum=0.0,
+        maximum=6.0,
+        doc="... and so far behind the toe, too: the bucket digs on as it landed.",
     )
     wall_m: float = setting(
         0.05, unit="m", minimum=0.0, maximum=1.0, doc="Margin of the boxes of Eq. (6) around both bodies."

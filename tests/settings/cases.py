@@ -53,6 +53,7 @@ _SECTIONS = {
     "excavation_tuned": Case("dug_tuned"),
     "weighing": Case("weighed"),
     "attempts": Case("decided"),
+    "loading": Case("loading_limits"),
     "pile": Case("pile"),
     "figure9": Case("pile", base=_FOUND),
     "figure9_repaired": Case("pile", base={"pile.method": "figure9_repaired"}),
@@ -99,7 +100,15 @@ def _dig_case(section: str, probe: str) -> dict[str, Case]:
 
 _WAITS = {"cloud_odometry.step_m": 5.0, "cloud_odometry.step_deg": 50.0, "cloud_odometry.step_s": 60.0}
 _PRINTED = {"guidance.method": "paper", "guidance.samples": 16, "guidance.rounds": 2}
+_LOADING_CYCLE = (
+    "reach_m", "approach_kmh", "align_dps", "creep", "run_up_m", "lower", "press_bar", "pull_back_m",
+    "back_kmh", "racked_rad",
+)  # fmt: skip
 _SETTINGS = {
+    **{f"loading.{key}": Case("loading_cycle") for key in _LOADING_CYCLE},
+    "loading.press_most_bar": Case("loading_cycle", 28.0),
+    "loading.rack_s": Case("loading_cycle", 0.5),
+    "loading.align_deg": Case("loading_limits", 5.0),
     "odometry.max_beams": Case("tilted", 100),
     "odometry.max_rear_beams": Case("tilted", 65),
     "odometry.step_deg": Case("tilted", 0.05),

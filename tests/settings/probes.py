@@ -49,7 +49,7 @@ from tests.localization import known
 from tests.movement.mines import fast_ladder
 from tests.report.synthetic import START_NS, report_data
 from tests.report.test_recording import read
-from tests.settings import streams
+from tests.settings import loading, streams
 from tests.settings.digs import charges, decisions, digs, weighings
 from tests.settings.guided import barred, plans, remembered, stops, trips
 from tests.settings.streams import Stream
@@ -320,6 +320,16 @@ def _dug(method: str) -> Probe:
     return lambda settings: digest(digs(settings, method))
 
 
+def loading_cycle(settings: Settings) -> str:
+    """Return the digest of what the loading task says and asks for in short cycles."""
+    return digest(loading.cycle(settings.loading))
+
+
+def loading_limits(settings: Settings) -> str:
+    """Return the digest of when each limit of the loading task counts."""
+    return digest(loading.limits(settings.loading))
+
+
 def _mapped(stream: Callable[[], Stream], primary: Literal["front", "points"] = "front", *, own: bool = False) -> Probe:
     return lambda settings: run(settings, stream(), primary, own=own)
 
@@ -349,6 +359,8 @@ PROBES: dict[str, Probe] = {
     "dug_tuned": _dug("paper-tuned"),
     "weighed": lambda settings: digest(weighings(settings)),
     "decided": lambda settings: digest(decisions(settings)),
+    "loading_cycle": loading_cycle,
+    "loading_limits": loading_limits,
     "landmarks": landmarks,
     "pile": pile,
     "recording": recording,

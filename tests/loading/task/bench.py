@@ -145,11 +145,13 @@ class Bench:
         self.truth = Truth(np.array([*self.start, self.bend_rad, 0.0]), MODEL, Errors())
         settings = GuidanceSettings()
         self._guidance = Guidance(MODEL, BODIES, EYES_M, settings, method_of(settings))
-        self._points = np.vstack([self.drift.walls_m, self.drift.face_m])
+        self._walls_m = self.drift.walls_m
+        self._points = np.vstack([self._walls_m, self.drift.face_m])
         self._queue: Setpoints = ()
         self._planned_ns = -SECOND_NS
         self._pedals = Pedals(brake=True)
         self._travel_m = 0.0
+        self._pile: Snapshot | None = None
         self._rng = np.random.default_rng(5)
 
     def run(self, seconds: float, until: Callable[[LoadingOutput], bool] = lambda out: False) -> LoadingOutput:
@@ -168,7 +170,7 @@ class Bench:
         answer = self.operator.answer(asked, self.now_ns) if self.operator is not None and asked is not None else None
         motion = self.motion()
         told = LoadingInput(
-            self.now_ns, self.signals(), motion, self.drift.snapshot(self.now_ns), self._walls(motion),
+            self.now_ns, self.signals(), motion, self._seen(), self._walls(motion),
             answer=answer, mission=Mission(1, (self.drift.toe_m, 0.0)),
         )  # fmt: skip
         out = self.task.update(self.change(told))
@@ -176,6 +178,12 @@ class Bench:
         self.notes += [(self.now_ns, note) for note in out.notes]
         self._command(out, motion)
         return out
+
+    def _seen(self) -> Snapshot:
+        """Return what perception says, twice a second."""
+        if self._pile is None or self.now_ns - self._pile.stamp_ns >= SECOND_NS // 2:
+            self._pile = self.drift.snapshot(self.now_ns)
+        return self._pile
 
     def _walls(self, motion: Motion) -> FloatArray:
         c, s = math.cos(motion.heading_rad), math.sin(motion.heading_rad)
@@ -227,8 +235,8 @@ class Bench:
         self.press_bar += 0.01 * (60.0 if pressing else -300.0 * (self._pedals.tilt > 0.0 or self.bucket_rad > -0.83))
         self.press_bar = min(max(self.press_bar, 8.0), 90.0)
         self.now_ns += STEP_NS
-        if self.now_ns % 100_000_000 == 0:
-            walls = self.drift.walls_m
+        if self.guided and self.now_ns % 100_000_000 == 0:
+            walls = self._walls_m
             near = walls[np.hypot(*(walls - self.truth.state[:2]).T) < 12.0]
             self.rooms_m.append(room(self.truth.state, near))
             self.speeds_mps.append(self.truth.speed)

@@ -94,7 +94,7 @@ def test_update_goes_where_the_table_says(state: State) -> None:
         if node.state != state:
             continue
         for facts in all_facts(node):
-            if facts.valid and not (facts.ready and state == State.HELD):
+            if facts.valid and not (facts.ready and state in RESTING | {State.HELD}):
                 continue  # cannot be: what is valid is ready
             event = event_of(state, facts)
             task = task_in(node, facts)

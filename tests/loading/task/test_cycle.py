@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 import pytest
 from lhdmap.loading.assistance import ABORT, GO_ON, LOADED, Reply, ScriptedOperator
+from lhdmap.loading.digging_parts import Controllers
 from lhdmap.loading.moment import LoadingInput, LoadingOutput
 from lhdmap.loading.signals import Pedals, Turn
 from lhdmap.loading.states import ASSISTANCE, State
@@ -58,7 +60,6 @@ def test_attempts_go_on_until_the_bucket_is_full_and_each_is_weighed() -> None:
     out = one.run(240.0, over)
     assert states(one) == [*CYCLE * 3, State.DONE]
     assert (out.attempts, out.fill) == (3, 0.92)
-    assert min(one.rooms_m) > 0.0
 
 
 def test_each_attempt_begins_far_enough_from_the_pile() -> None:
@@ -82,7 +83,7 @@ def test_a_pile_that_is_not_loadable_is_one_for_an_operator(status: str, why: st
     assert why in out.request.why
     assert out.request.kind == "positioning"
     assert out.request.evidence["pile_status"] == status
-    assert one.now_ns <= 11e9
+    assert one.now_ns <= 12.1e9
 
 
 def test_without_a_pile_15_m_before_it_help_is_asked_for_at_once() -> None:
@@ -94,8 +95,13 @@ def test_without_a_pile_15_m_before_it_help_is_asked_for_at_once() -> None:
     assert out.state == State.POSITIONING_ASSISTANCE
 
 
-def never(pedals: Pedals) -> object:
+def never(pedals: Pedals) -> Any:
     return shown(lambda s, n: Turn(pedals))
+
+
+def replaced(name: str, controller: Any) -> Controllers:
+    change: dict[str, Any] = {name: controller}
+    return controllers()._replace(**change)
 
 
 @pytest.mark.parametrize(
@@ -108,7 +114,7 @@ def never(pedals: Pedals) -> object:
     ],
 )
 def test_what_does_not_end_is_one_for_an_operator_at_its_limit(broken: str, state: State, limit_s: float) -> None:
-    one = bench(start=(12.0, 0.0, 0.0), controllers=controllers()._replace(**{broken: never(Pedals())}))
+    one = bench(start=(12.0, 0.0, 0.0), controllers=replaced(broken, never(Pedals())))
     out = one.run(200.0, lambda said: said.request is not None)
     assert out.state == State.LOADING_ASSISTANCE
     assert out.request is not None
@@ -121,7 +127,7 @@ def test_what_does_not_end_is_one_for_an_operator_at_its_limit(broken: str, stat
 @pytest.mark.parametrize("broken", ["charge", "dig", "weigh"])
 def test_a_controller_that_gives_up_is_one_for_an_operator(broken: str) -> None:
     fails = shown(lambda s, n: Turn(Pedals(), "stuck", (("failed", 1.0),)))
-    one = bench(start=(12.0, 0.0, 0.0), controllers=controllers()._replace(**{broken: fails}))
+    one = bench(start=(12.0, 0.0, 0.0), controllers=replaced(broken, fails))
     out = one.run(200.0, lambda said: said.request is not None)
     assert out.state == State.LOADING_ASSISTANCE
     assert "stuck" in (out.request.why if out.request else "")
@@ -224,6 +230,15 @@ def test_a_wall_point_in_a_box_is_one_for_an_operator() -> None:
     out = one.run(60.0, lambda said: said.request is not None)
     assert out.state == State.POSITIONING_ASSISTANCE
     assert "wall" in (out.request.why if out.request else "")
+
+
+def test_an_approach_that_stands_is_one_for_an_operator_before_its_limit() -> None:
+    one = bench(start=(8.0, 0.0, 0.0))
+    one._follow = lambda directive, step_s: None  # type: ignore[method-assign]
+    out = one.run(30.0, lambda said: said.request is not None)
+    assert out.state == State.POSITIONING_ASSISTANCE
+    assert "does not drive on" in (out.request.why if out.request else "")
+    assert one.now_ns < 10e9
 
 
 def test_the_same_run_says_the_same() -> None:

@@ -6,6 +6,7 @@ import copy
 import functools
 import math
 from collections.abc import Callable
+from typing import Any
 
 import pytest
 from lhdmap.loading.health import NEEDS
@@ -16,7 +17,7 @@ from lhdmap.loading.task_settings import LoadingSettings
 
 from tests.loading.task.bench import SECOND_NS, Bench, bench
 
-SETTINGS = LoadingSettings(hold_s=3.0, frozen_s=1.0)
+SETTINGS = LoadingSettings(hold_s=5.0, frozen_s=1.0)
 PHASES = [
     (State.POSITIONING, "approach"), (State.POSITIONING, "align"), (State.POSITIONING, "lower"), (State.CHARGING, ""),
     (State.EXCAVATION, ""), (State.PULL_BACK, "rack"), (State.PULL_BACK, "back"), (State.PULL_BACK, "shake"),
@@ -52,22 +53,24 @@ def broken(step: tuple[State, str], change: Change) -> tuple[Bench, int]:
 
 
 def nan(field: str) -> Change:
-    def change(told: LoadingInput) -> LoadingInput:
+    def broken_so(told: LoadingInput) -> LoadingInput:
         assert told.signals is not None
-        return told._replace(signals=told.signals._replace(**{field: math.nan}))
+        change: dict[str, Any] = {field: math.nan}
+        return told._replace(signals=told.signals._replace(**change))
 
-    return change
+    return broken_so
 
 
 def frozen(field: str) -> Change:
     kept: list[float] = []
 
-    def change(told: LoadingInput) -> LoadingInput:
+    def broken_so(told: LoadingInput) -> LoadingInput:
         assert told.signals is not None
         kept.append(getattr(told.signals, field))
-        return told._replace(signals=told.signals._replace(**{field: kept[0]}))
+        change: dict[str, Any] = {field: kept[0]}
+        return told._replace(signals=told.signals._replace(**change))
 
-    return change
+    return broken_so
 
 
 def late(told: LoadingInput) -> LoadingInput:
@@ -176,20 +179,20 @@ def test_a_task_that_is_not_called_stops(step: tuple[State, str], gap: str) -> N
 @pytest.mark.parametrize("step", PHASES, ids=lambda step: f"{step[0].value}-{step[1]}")
 @pytest.mark.parametrize("way", ["disarmed", "emergency", "idle"])
 def test_after_a_stop_it_does_not_go_on_from_where_it_was(step: tuple[State, str], way: str) -> None:
-    """Disarmed for a second, then armed: at rest for the time of validation, then from the beginning of what fits."""
+    """Disarmed for two seconds, then armed: at rest for the time of validation, then from the beginning of what fits."""
     changes: dict[str, Change] = {
         "disarmed": lambda told: told._replace(armed=False),
         "emergency": lambda told: told._replace(emergency=True, armed=False),
         "idle": lambda told: told._replace(mode="idle"),
     }
     one, _ = broken(step, changes[way])
-    out = one.run(1.2)
+    out = one.run(2.0)
     assert out.state == (State.EMERGENCY if way == "emergency" else State.HELD)
     one.change = lambda told: told
     out = one.run(SETTINGS.valid_s - 0.2)
     assert out.directive is None
     assert out.pedals is None
-    out = one.run(0.5)
+    out = one.run(1.0, lambda said: said.state != State.HELD)
     if way == "emergency":
         assert out.state in ASSISTANCE
     else:

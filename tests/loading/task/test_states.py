@@ -187,6 +187,7 @@ def test_from_a_stop_nothing_moves_but_through_arming_and_validation() -> None:
                 assert event in (Event.RESTORED_FREE, Event.RESTORED_TOUCHED, Event.RESTORED_LOADED)
             if node.state in RESTING and end.state in MOVING:
                 assert facts.ready
+                assert facts.valid
                 assert event == Event.MISSION
 
 
