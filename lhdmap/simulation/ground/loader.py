@@ -17,7 +17,7 @@ import numpy as np
 from lhdmap.loading.signals import Pedals, Signals
 from lhdmap.machine import Machine
 from lhdmap.messages import FloatArray
-from lhdmap.simulation.ground.draws import CELL_M, Attempt, Load, draw_attempt, draw_load, hardness_factor
+from lhdmap.simulation.ground.draws import CELL_M, DUG_M3, Attempt, Load, draw_attempt, draw_load, hardness_factor
 from lhdmap.simulation.ground.face import capacity, put_ahead, settle, take_boulder
 from lhdmap.simulation.ground.hearing import Hearing
 from lhdmap.simulation.ground.kernel import World, advance
@@ -66,7 +66,7 @@ class Loader:
         heights = np.clip(x * rock["slope"], 0.0, load.crest_m)
         kg_m3 = float(rock["density"][0] / rock["swell"][0])
         self._scene = _Scene(seed, load, rig_of(self.machine, load.tilt_factor), rock, heights, record(State()), kg_m3)
-        self._number, self._now_ns = 0, time_ns
+        self._number, self._digs, self._now_ns = 0, 0, time_ns
         return self._attempt(approach_m)
 
     def retry(self, *, approach_m: float = 7.0) -> Signals:
@@ -75,6 +75,7 @@ class Loader:
         rig, rock = scene.rig[0], scene.rock[0]
         settle(state[0], rig, rock, scene.heights)
         dug = max(self._begun_m2 - float(scene.heights.sum()) * CELL_M, 0.0)
+        self._digs += dug * float(rig["width_m"]) > DUG_M3  # a charge that ended early loosens nothing
         beside = dug * float(rock["lateral_share"])
         state["lateral_m3"] += beside * rig["width_m"]
         lost = max(float(state["content_m3"][0]) - capacity(rock, rig, 0.0), 0.0)
@@ -133,7 +134,7 @@ class Loader:
         self._begun_m2 = float(scene.heights.sum()) * CELL_M
         chance = self._chance
         self._world = World(scene.heights, scene.load.table, chance.noise, chance.strikes, chance.bumps)
-        scene.rock["hardness"] = scene.load.rock["hardness"] * hardness_factor(self.ground, scene.seed, self._number)
+        scene.rock["hardness"] = scene.load.rock["hardness"] * hardness_factor(self.ground, scene.seed, self._digs + 1)
         press_m = press_force_n(self.machine, self.ground.floor.press_bar) / float(scene.rig["floor_stiffness"][0])
         bucket = bucket_for(self.machine, chance.lip_high_m if chance.lip_high_m > 0.0 else -press_m)
         boom = self.machine.linkage.boom_min_rad
@@ -148,7 +149,7 @@ class Loader:
         )  # fmt: skip
         still = np.array([0.0, 0.0, 0.0, 0.0, 1.0])
         advance(scene.state, scene.rig, scene.rock, self._world, still, 1, self._sub_step_s)
-        self._hearing.begin(scene.seed, self._number, self._now_ns, begin - ahead, chance.toe_error_m)
+        self._hearing.begin(scene.seed, self._number, self.state, self._now_ns, chance.toe_error_m)
         return self._heard()
 
     def _heard(self) -> Signals:
