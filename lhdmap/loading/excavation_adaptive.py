@@ -12,7 +12,6 @@ from lhdmap.loading.excavation_stuck import BackOff
 from lhdmap.loading.signals import Pedals, Signals, Turn
 from lhdmap.loading.skid import SkidFactor
 
-
 _TICK_S = 0.02
 _SPILLED_M = 2.0  # of way at most before the pile resists
 

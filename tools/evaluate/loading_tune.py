@@ -34,7 +34,7 @@ ADAPTIVE: dict[str, Range] = {
 }  # fmt: skip
 
 
-def plan_of(method: str, numbers: dict[str, float], ground: str) -> Plan:
+def plan_of(method: str, numbers: dict[str, Any], ground: str) -> Plan:
     """Return the plan of a candidate."""
     plan = Plan(method, "fused", ground=ground, approach_m=3.0)
     if method == "paper-tuned":
