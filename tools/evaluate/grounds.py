@@ -1,7 +1,7 @@
 """Calibrate a mine's ground: random search over its settings against Tables 3 to 5 of the loading paper.
 
     python -m tools.evaluate.grounds judge datasets/grounds/default.toml 200
-    python -m tools.evaluate.grounds search SEED CANDIDATES LOADS OUT.jsonl
+    python -m tools.evaluate.grounds search SEED CANDIDATES LOADS OUT.jsonl [BEGIN.jsonl]
 
 The controller is the paper's law as printed in Fig. 19, with `else if` (findings: as printed S_push lasts one tick), a guard of
 1.5 s at the launch and 0.03 rad of tolerance at the bucket's stop.
@@ -25,7 +25,7 @@ from lhdmap.simulation.ground.sections import Grounds, load_ground
 
 _STEP_S, _PEDAL, _APPROACH_M = 0.02, 0.5, 3.0
 _PAPER = {
-    "fill 1": (0.62, 0.04), "fill 2": (0.77, 0.04), "fill 3": (0.82, 0.04), "fill 4": (0.90, 0.06),
+    "fill 1": (0.62, 0.03), "fill 2": (0.77, 0.04), "fill 3": (0.82, 0.04), "fill 4": (0.90, 0.04),
     "reach 2": (0.70, 0.08), "reach 3": (0.57, 0.09), "reach 4": (0.20, 0.07), "attempts": (2.47, 0.17),
     "dig 1": (12.7, 1.5), "dig 2": (10.2, 0.6), "dig 3": (10.8, 0.7), "dig 4": (10.7, 1.2),
     "final": (0.906, 0.015), "in time": (0.99, 0.02),
@@ -156,18 +156,23 @@ def judge(ground: Grounds, count: int, first_seed: int, approach_m: float = 7.0)
     return figures([load(loader, first_seed + i, approach_m) for i in range(count)])
 
 
-def search(seed: int, candidates: int, count: int, out: Path) -> None:
-    """Draw grounds, and around the best of them ever closer; a line of JSON for each."""
+def search(seed: int, candidates: int, count: int, out: Path, known: Path | None) -> None:
+    """Draw grounds, and around the best of them ever closer; a line of JSON for each. `known`: begin at the best of these."""
     rng, best = np.random.default_rng(seed), list[tuple[float, dict[str, float]]]()
+    if known is not None:
+        rows = [json.loads(line) for line in known.read_text(encoding="utf-8").splitlines()]
+        best = [(math.inf, row["values"]) for row in sorted(rows, key=lambda row: float(row["loss"]))[:6]]
     for turn in range(candidates):
         values = {key: float(rng.uniform(*both)) for key, both in _RANGES.items()}
-        if turn >= candidates // 3:
-            _, near = best[int(rng.integers(min(4, len(best))))]
+        if known is not None and turn < 6:
+            values = best[turn][1] if turn < len(best) else values
+        elif known is not None or turn >= candidates // 3:
+            _, near = best[int(rng.integers(min(5, len(best))))]
             for key, (low, high) in _RANGES.items():
                 step = 0.12 * (high - low) * float(rng.standard_normal()) * (rng.random() < 0.5)
                 values[key] = float(np.clip(near[key] + step, low, high))
-        found = judge(varied(Grounds(), values), count, 10_000 + 7 * (turn % 3), _APPROACH_M)
-        best = sorted([*best, (loss(found), values)], key=lambda one: one[0])[:8]
+        found = judge(varied(Grounds(), values), count, 10_000 + 1000 * seed, _APPROACH_M)
+        best = sorted([*best, (loss(found), values)], key=lambda one: one[0])[: 8 + 6 * (turn < 6)]
         with out.open("a", encoding="utf-8") as stream:
             stream.write(json.dumps({"loss": loss(found), "values": values, "figures": found}) + "\n")
 
@@ -179,7 +184,8 @@ def main() -> None:
             print(f"{name:10} {value:6.3f}", *(f"paper {_PAPER[name][0]}" for _ in range(name in _PAPER)))
         print(f"loss {loss(found):.2f}")
     else:
-        search(int(sys.argv[2]), int(sys.argv[3]), int(sys.argv[4]), Path(sys.argv[5]))
+        known = Path(sys.argv[6]) if len(sys.argv) > 6 else None
+        search(int(sys.argv[2]), int(sys.argv[3]), int(sys.argv[4]), Path(sys.argv[5]), known)
 
 
 if __name__ == "__main__":
