@@ -10,6 +10,7 @@ from __future__ import annotations
 import functools
 import math
 from dataclasses import dataclass, field, replace
+from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
@@ -70,8 +71,8 @@ class Dug(NamedTuple):
 
 @functools.cache
 def loader_on(ground: str) -> Loader:
-    """Return a machine on a ground."""
-    return Loader(Machine(), load_ground(ground))
+    """Return a machine on a ground: the name of one that ships, or a file."""
+    return Loader(Machine(), load_ground(Path(ground) if ground.endswith(".toml") else ground))
 
 
 def run_load(plan: Plan, seed: int) -> list[Dug]:

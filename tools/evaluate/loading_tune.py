@@ -53,7 +53,7 @@ def loss(loads: Sequence[Sequence[Dug]]) -> dict[str, float]:
         "slip_s": sum(dig.slip_s for dig in digs) / count,
         "time_outs": sum(not dig.ended for dig in digs) / len(digs),
     }
-    found["loss"] = found["attempts"] + 0.06 * found["dig_s"] + 0.3 * found["slip_s"] + 8.0 * found["time_outs"]
+    found["loss"] = found["attempts"] + 0.04 * found["dig_s"] + 0.4 * found["slip_s"] + 8.0 * found["time_outs"]
     return found
 
 
