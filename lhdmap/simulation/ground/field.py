@@ -57,17 +57,19 @@ def turned(grid: Grid, through_m: FloatArray, heading_rad: float) -> Grid:
 
 @nb.njit(cache=True, nogil=True)
 def slide_field(
-    heights: FloatArray, open_cells: Bools, slope: float, share: float, bucket: tuple[int, int, int, int]
+    heights: FloatArray, open_cells: Bools, slope: float, share: float, bucket: tuple[int, int, int, int], *, down: bool
 ) -> float:
     """Let what is steeper than `slope` (a tangent) slide by a share of its excess; returns the largest excess, m.
 
     `heights` (N, M) are changed, their sum is not. Closed cells are rock. `bucket`: first and last column of the bucket, the row
     of its lip and of its heel; (0, -1, 0, 0) for none. Between its columns the side view moves the rock, and none falls on it.
+    `down`: whether rows are gone through from the last to the first; by turns, ore runs far in few sweeps.
     """
     rows, columns = heights.shape
     worst = 0.0
     first, last, lip, heel = bucket
-    for i in range(rows):
+    for n in range(rows):
+        i = rows - 1 - n if down else n
         for j in range(columns):
             if not open_cells[i, j]:
                 continue
@@ -77,14 +79,12 @@ def slide_field(
                 if k >= rows or m >= columns or not open_cells[k, m]:
                     continue
                 other = first <= m <= last
-                if mine and other:
-                    continue
-                if (mine or other) and heel <= i <= lip:
+                if (mine and other) or ((mine or other) and heel <= i <= lip):
                     continue
                 drop = heights[k, m] - heights[i, j]
                 excess = abs(drop) - slope * (ALONG_M if way == 0 else ACROSS_M)
                 if excess > 0.0:
-                    moved = math.copysign(0.25 * share * excess, drop)
+                    moved = math.copysign(0.5 * share * excess, drop)
                     heights[k, m] -= moved
                     heights[i, j] += moved
                     worst = max(worst, excess)

@@ -19,6 +19,8 @@ _FED_M = 0.6  # of the far end: it stays as high as it was, ore comes from the s
 _SHOWN_M = 0.03
 _BURIED_M = 0.08  # how far the mesh is under the floor where there is no ore
 _EVERY = 2  # cells along of a cell of the mesh
+_SWEEPS = 8.0  # for each of the side view's time constants: a field needs more for the same way
+_MOST_SWEEPS = 1500
 _NO_BUCKET = (0, -1, 0, 0)
 
 Inside = Callable[[FloatArray], Bools]
@@ -86,9 +88,9 @@ class Heap:
 
     def slide(self, dt_s: float, per_s: float, bucket: tuple[int, int, int, int] = _NO_BUCKET) -> None:
         """Let it slide for a while, at a rate per second, around a bucket (`field.slide_field`)."""
-        worst, most = 0.0, max(1, round(dt_s * per_s * 2.0))
-        for _ in range(most):
-            worst = slide_field(self.heights_m, self._open, self.slope, 0.8, bucket)
+        worst, most = 0.0, max(1, round(dt_s * per_s * _SWEEPS))
+        for k in range(most):
+            worst = slide_field(self.heights_m, self._open, self.slope, 0.8, bucket, down=k % 2 == 0)
             if worst < _STANDS_M:
                 break
         self._feed()
@@ -97,8 +99,8 @@ class Heap:
 
     def settle(self) -> None:
         """Let it slide until it stands."""
-        for _ in range(400):
-            if slide_field(self.heights_m, self._open, self.slope, 1.0, _NO_BUCKET) < _STANDS_M:
+        for k in range(_MOST_SWEEPS):
+            if slide_field(self.heights_m, self._open, self.slope, 1.0, _NO_BUCKET, down=k % 2 == 0) < _STANDS_M:
                 break
         self.calm = True
         self.version += 1

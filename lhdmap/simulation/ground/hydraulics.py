@@ -50,9 +50,12 @@ def cylinders(state: Record, rig: Record, tilt: float, lift: float, step_s: floa
     state.boom_rps += (wanted - state.boom_rps) * gone
     state.bucket_rad += state.bucket_rps * step_s
     state.boom_rad += state.boom_rps * step_s
+    pressed = False
     if state.bucket_rad >= rig.bucket_max_rad or state.bucket_rad <= rig.bucket_min_rad:
         state.bucket_rad = min(max(state.bucket_rad, rig.bucket_min_rad), rig.bucket_max_rad)
         state.bucket_rps = 0.0
+        pressed = tilt > 0.0 if state.bucket_rad >= rig.bucket_max_rad else tilt < 0.0
+    state.at_stop += ((abs(tilt) if pressed else 0.0) - state.at_stop) * gone
     if state.boom_rad >= rig.boom_max_rad or state.boom_rad <= rig.boom_min_rad:
         state.boom_rad = min(max(state.boom_rad, rig.boom_min_rad), rig.boom_max_rad)
         state.boom_rps = 0.0

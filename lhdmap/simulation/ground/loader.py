@@ -148,7 +148,7 @@ class Loader:
         )  # fmt: skip
         still = np.array([0.0, 0.0, 0.0, 0.0, 1.0])
         advance(scene.state, scene.rig, scene.rock, self._world, still, 1, self._sub_step_s)
-        self._hearing.begin(scene.seed, self._number, self._now_ns, begin - ahead, chance.toe_error_m)
+        self._hearing.begin(scene.seed, self._number, self.state, self._now_ns, chance.toe_error_m)
         return self._heard()
 
     def _heard(self) -> Signals:

@@ -19,7 +19,8 @@ class State(NamedTuple):
     resists it, `way_m` its way in rock. `rock_n` is what the pile holds against the drive, `resist_n` this and the floor,
     `up_n` what a rising lip meets at most, `down_n` what it meets, `press_n` the floor's force on a pressed lip. `tilting`,
     `lifting`: shares of the cylinders' largest forces, positive against lifting. `pull_n`: gravity along x on a slope.
-    `busy`: the face may slide. `begun_m`: up to there the lip has cut.
+    `busy`: the face may slide. `at_stop`: command with which the tilt cylinder presses against its stop. `begun_m`: up to
+    there the lip has cut.
     """
 
     x_m: float = 0.0
@@ -54,6 +55,7 @@ class State(NamedTuple):
     spilled_m3: float = 0.0
     rock_n: float = 0.0
     busy: float = 0.0
+    at_stop: float = 0.0
     down_n: float = 0.0
     pull_n: float = 0.0
 

@@ -161,7 +161,7 @@ class LoadingVehicle:
         return moved._replace(
             wheel_speed_mps=side.wheel_mps, boom_rad=side.boom_rad, bucket_rad=side.bucket_rad,
             boom_rate_rps=side.boom_rps, bucket_rate_rps=side.bucket_rps, load_kg=load_kg, brake=side.brake,
-            traction_mps2=side.traction_n / plant.mass_kg, curl=min(abs(side.tilting), 1.0),
+            traction_mps2=side.traction_n / plant.mass_kg, curl=min(max(abs(side.tilting), side.at_stop), 1.0),
             digging=known._replace(bucket=tuple(side), session=number),
         )  # fmt: skip
 

@@ -58,7 +58,7 @@ def test_the_field_is_the_drawn_pile_and_is_dug(world: MineWorld) -> None:
     assert state.load_kg > 3000.0
     rock_m3 = state.load_kg / 2420.0
     assert before + pile.came_m3 - pile.volume_m3 == pytest.approx(rock_m3, abs=0.005)
-    assert seen_m(world) > drawn + 0.4
+    assert seen_m(world) > drawn + 0.2
 
 
 def test_bodies_may_go_into_a_pile_that_is_dug(world: MineWorld) -> None:
