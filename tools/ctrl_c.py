@@ -20,6 +20,7 @@ from pathlib import Path
 from lhdmap.pipeline.build import BuildRequest, build_map
 from lhdmap.topology.geojson import to_geojson
 from tests.cli.logs import write_room_log
+from tests.evaluation.loading.loadings import write_loading
 from tests.evaluation.navigation.drives import write_log
 from tests.exports.folders import map_folder
 from tests.topology.maps import ladder
@@ -39,6 +40,8 @@ def commands(work: Path) -> dict[str, list[str]]:
     (work / "t.csv").write_text("attempt,log,gt_width_m,gt_inclination_deg\nA,room.mcap,3,-30\nB,room.mcap,3,-30\n")
     (work / "s.toml").write_text('[[scenes]]\nvariant = "wall"\ncount = 2\n', encoding="utf-8")
     (work / "t.geojson").write_text(json.dumps(to_geojson(ladder())), encoding="utf-8")
+    (work / "w.csv").write_text("pressure_bar,fill\n52,0\n64,0.25\n76,0.5\n88,0.75\n100,1\n", encoding="utf-8")
+    write_loading(work / "loading.mcap", [[0.6, 0.8, 0.9]])
     first_map = str(_built(work))
     return {
         "help": ["--help"],
@@ -54,6 +57,8 @@ def commands(work: Path) -> dict[str, list[str]]:
         "suite": ["simulate", "pile", "--suite", str(work / "s.toml"), "--jobs", "2", "-o", "{out}"],
         "eval": ["eval", "trajectory", str(work / "t.tum"), "--truth", str(work / "t.tum"), "--plot", "{out}.png"],
         "eval-navigation": ["eval", "navigation", str(write_log(work / "drive.mcap")), "-o", "{out}"],
+        "eval-loading": ["eval", "loading", str(work / "loading.mcap"), "-o", "{out}"],
+        "calibrate": ["loading", "calibrate", str(work / "w.csv")],
         "eval-pile": ["eval", "pile", "--truth", str(work / "t.csv")],
         "view": ["view", str(log), "--web", "--port", "9191"],
         "screenshot": ["view", str(log), "--screenshot", "{out}.png"],

@@ -12,7 +12,6 @@ from lhdmap.loading.excavation_stuck import BackOff
 from lhdmap.loading.signals import Pedals, Signals, Turn
 from lhdmap.loading.skid import SkidFactor
 
-_TICK_S = 0.02
 _SPILLED_M = 2.0  # of way at most before the pile resists
 
 
@@ -35,12 +34,12 @@ class AdaptiveDig:
         self._force = ForceResidual(one.force_kn_per_bar, one.mass_t, 0.0, one.slope_s)
         self._back_off = BackOff(one)
         self._stops.begin(signals)
-        self._smoothed = 0.0
+        self._smoothed, self._smoothed_ns = 0.0, signals.now_ns
         self._resisted, self._begun_m = False, signals.travel_m
 
     def step(self, signals: Signals) -> Turn:
         """Return the pedals of this moment, and the stop where one is reached."""
-        one, skid = self._settings, self._smooth(self._skid.update(signals))
+        one, skid = self._settings, self._smooth(self._skid.update(signals), signals.now_ns)
         force_kn = self._force.update(signals)
         self._count_way(force_kn, signals)
         ended = self._stops.reached(signals)
@@ -61,11 +60,12 @@ class AdaptiveDig:
         tilt = self._tilt(force_kn, signals)
         return Turn(Pedals(pedal, tilt=tilt, lift=float(slipping), full_rpm=True), values=values)
 
-    def _smooth(self, skid: float) -> float:
+    def _smooth(self, skid: float, now_ns: int) -> float:
         """Return the low-passed skid; where it is not known, the one before."""
         if math.isfinite(skid):
-            smooth_s = self._settings.skid_smooth_s
-            self._smoothed += (skid - self._smoothed) * (_TICK_S / (smooth_s + _TICK_S))
+            passed_s = (now_ns - self._smoothed_ns) * 1e-9
+            self._smoothed += (skid - self._smoothed) * (passed_s / max(self._settings.skid_smooth_s + passed_s, 1e-9))
+        self._smoothed_ns = now_ns
         return self._smoothed
 
     def _count_way(self, force_kn: float, signals: Signals) -> None:

@@ -68,7 +68,7 @@ class Weighing:
         one = self._settings
         self._below = self._below or signals.boom_rad <= one.boom_rad - one.below_rad
         if not self._below:
-            return -one.lift
+            return -1.0
         return one.lift if signals.boom_rad < one.boom_rad else 0.0
 
     def _add(self, signals: Signals) -> None:

@@ -22,7 +22,7 @@ OFFERS = [
     (["build-map", "x", "--topic", "fro"], ["front="]),
     (["build-map", "x", "--poses", "gro"], ["ground-truth"]),
     (["eval", "t"], ["trajectory"]),
-    (["eval", "l"], ["localization"]),
+    (["eval", "loc"], ["localization"]),
     (["localize", "drive.mcap", "--ma"], ["--machine", "--map"]),
     (["localize", "drive.mcap", "--map", "su"], ["sub"]),
     (["eval", "trajectory", "--alignment", "s"], ["se2", "se3"]),

@@ -5,6 +5,7 @@ from __future__ import annotations
 import functools
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 from lhdmap.loading.digging_settings import ChargingSettings
@@ -45,7 +46,7 @@ def disturbed(ground: str, kind: str) -> Grounds:
     """Return the ground on which a kind of charge takes place."""
     base = load_ground(ground)
     calm = replace(base.floor, wet_chance=0.0, high_chance=0.0, bumps_per_m=0.0)
-    changes = {
+    changes: dict[str, dict[str, Any]] = {
         "bumps": {"bumps_per_m": 1.0},
         "wet": {"wet_chance": 1.0},
         "pressed hard": {"press_bar": 60.0, "bumps_per_m": base.floor.bumps_per_m},

@@ -1,7 +1,8 @@
 """Loads on the simulated ground, attempt after attempt, with the controllers of lhdmap.loading: shared by the figures.
 
 An attempt: charge until the touch is told, dig until a stop, tilt back while reversing, judge the fill. A touch told before the
-lip has met the pile is counted as early, and the machine goes back for another try; one that is not told in time is counted, and the dig begins.
+lip has met the pile is counted as early, and the machine goes back for another try; one that is not told in time is counted,
+and the dig begins.
 """
 
 from __future__ import annotations
@@ -9,6 +10,7 @@ from __future__ import annotations
 import functools
 import math
 from dataclasses import dataclass, field, replace
+from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
@@ -69,8 +71,8 @@ class Dug(NamedTuple):
 
 @functools.cache
 def loader_on(ground: str) -> Loader:
-    """Return a machine on a ground."""
-    return Loader(Machine(), load_ground(ground))
+    """Return a machine on a ground: the name of one that ships, or a file."""
+    return Loader(Machine(), load_ground(Path(ground) if ground.endswith(".toml") else ground))
 
 
 def run_load(plan: Plan, seed: int) -> list[Dug]:
@@ -151,6 +153,6 @@ def with_paper(plan: Plan, **changes: object) -> Plan:
     return replace(plan, dig=plan.dig._replace(paper=replace(plan.dig.paper, **changes)))  # type: ignore[arg-type]
 
 
-def with_adaptive(plan: Plan, **changes: object) -> Plan:
-    """Return the plan with other numbers of the adaptive law."""
+def with_common(plan: Plan, **changes: object) -> Plan:
+    """Return the plan with other numbers of `[excavation]`."""
     return replace(plan, dig=plan.dig._replace(excavation=replace(plan.dig.excavation, **changes)))  # type: ignore[arg-type]

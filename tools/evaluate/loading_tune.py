@@ -34,7 +34,7 @@ ADAPTIVE: dict[str, Range] = {
 }  # fmt: skip
 
 
-def plan_of(method: str, numbers: dict[str, float], ground: str) -> Plan:
+def plan_of(method: str, numbers: dict[str, Any], ground: str) -> Plan:
     """Return the plan of a candidate."""
     plan = Plan(method, "fused", ground=ground, approach_m=3.0)
     if method == "paper-tuned":
@@ -53,7 +53,7 @@ def loss(loads: Sequence[Sequence[Dug]]) -> dict[str, float]:
         "slip_s": sum(dig.slip_s for dig in digs) / count,
         "time_outs": sum(not dig.ended for dig in digs) / len(digs),
     }
-    found["loss"] = found["attempts"] + 0.06 * found["dig_s"] + 0.3 * found["slip_s"] + 8.0 * found["time_outs"]
+    found["loss"] = found["attempts"] + 0.04 * found["dig_s"] + 0.4 * found["slip_s"] + 8.0 * found["time_outs"]
     return found
 
 
