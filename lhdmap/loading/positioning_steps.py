@@ -23,7 +23,7 @@ from lhdmap.loading.task_settings import LoadingSettings
 from lhdmap.messages import FloatArray
 
 APPROACH, ALIGN, LOWER = "approach", "align", "lower"
-_REPLAN_M, _BACKSTOP_M = 0.3, 2.0
+_REPLAN_M, _BACKSTOP_M = 0.3, 0.5
 _LOOK_NS = 200_000_000
 _REACHED_RAD = math.radians(0.4)
 _GAIN_PS = 1.0  # rate per angle: the joint answers after dead time and lag, 0.45 s
@@ -34,7 +34,7 @@ class Positioning:
     """Brings the machine before the pile so that driving straight on with the joint held ends in it."""
 
     def __init__(self, model: DriveModel, bodies: Bodies, settings: LoadingSettings) -> None:
-        self._model, self._settings = model, settings
+        self._model, self._settings, self._lip_m = model, settings, float(bodies.front_box_m[1, 0])
         self._aligner, self._lowering = Aligner(model, bodies, settings), Lowering(settings)
         self.phase = APPROACH
         self._path: FloatArray | None = None
@@ -70,10 +70,12 @@ class Positioning:
         return newer
 
     def _approach(self, moment: Moment, target: Target) -> Step:
-        """Drive on by guidance until the joint is at the set distance from the pile's centre."""
+        """Drive on by guidance until the joint is at the set distance from the centre, nearer where it is not square yet."""
         settings = self._settings
         far_m = float(np.hypot(*(target.center_m - joint_of(pose_of(moment.motion), self._model))))
-        if far_m <= settings.reach_m:
+        if far_m <= settings.reach_m and (
+            self._square(moment, target) or self._room_m(moment, target) < settings.run_up_m
+        ):
             self.phase, self._aimed_ns = ALIGN, -_LOOK_NS
             return self._align(moment, target)
         if abs(moment.motion.speed_mps) > settings.standing_mps:
@@ -86,8 +88,19 @@ class Positioning:
             self._path = approach_path(moment.motion, target, before_m, settings.approach_kmh / 3.6)
             self._planned = target
         left = np.hypot(*(self._path[:, :2] - target.limits_m.mean(axis=0)).T)
-        stop_m = float(self._path[int(left.argmin()), WAY]) - before_m + _BACKSTOP_M
+        stop_m = float(self._path[int(left.argmin()), WAY]) - self._lip_m - settings.run_up_m + _BACKSTOP_M
         return Step(APPROACH, directive=Directive(moment.now_ns, 1, self._path, stop_m))
+
+    def _square(self, moment: Moment, target: Target) -> bool:
+        """Return whether the machine stands straight before the pile: a bent one digs towards a wall."""
+        motion, most = moment.motion, math.radians(self._settings.square_deg)
+        off = math.remainder(motion.heading_rad - target.heading_rad, math.tau)
+        return abs(off) < most and abs(motion.articulation_rad) < most
+
+    def _room_m(self, moment: Moment, target: Target) -> float:
+        """Return the way of the lip to the line through the limits, in the direction of the pile."""
+        axis = np.array([math.cos(target.heading_rad), math.sin(target.heading_rad)])
+        return float((target.limits_m.mean(axis=0) - pose_of(moment.motion)[:2]) @ axis) - self._lip_m
 
     def _align(self, moment: Moment, target: Target) -> Step:
         """Turn the joint until both sides land, creeping on while there is room; Eq. (6) all the while."""

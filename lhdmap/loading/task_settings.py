@@ -99,6 +99,13 @@ class LoadingSettings:
         source=f"{_PAPER}, section 3.3; the value is not printed",
         doc="Distance of the joint to the pile's centre at which guidance hands over.",
     )
+    square_deg: float = setting(
+        5.0,
+        unit="deg",
+        minimum=0.5,
+        maximum=45.0,
+        doc="Heading and joint must be this straight before the pile, or the machine is guided on to run_up_m before it.",
+    )
     approach_kmh: float = setting(5.0, unit="km/h", minimum=0.5, maximum=20.0, doc="Speed up to there.")
     stuck_s: float = setting(
         8.0,
