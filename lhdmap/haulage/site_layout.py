@@ -156,10 +156,12 @@ class _Drawing:
             yield made(_edge(queue, f"{area.name} out", State.AREA_OUT, line), queue)
         for place in area.places:
             yield made(self._dock(area, place, at_queue), place.name)
-            end, name = (at_queue, queue) if place.joins == "queue" else (mouth, f"{area.name} out")
+            joins = place.joins == "queue"
+            end, name = (at_queue, queue) if joins else (mouth, f"{area.name} out")
+            kind = State.AREA_IN if joins else State.AREA_OUT
             way = [self._in_map(area, point) for point in place.out]
             line = _way(self._in_map(area, place.pose), end, way)
-            yield made(_edge(place.name, name, State.AREA_OUT, line), place.name)
+            yield made(_edge(place.name, name, kind, line), place.name)
 
     def _dock(self, area: SiteArea, place: SitePlace, at_queue: FloatArray) -> Edge:
         stands = self._in_map(area, place.pose)

@@ -106,7 +106,7 @@ FOLLOWS: dict[State, frozenset[State]] = {
     State.THROUGH: _ON_ROADS,
     State.JUNCTION_OFF: frozenset({State.AREA_IN, State.JUNCTION_ON, State.JUNCTION_OFF, State.DOCK}),
     State.AREA_IN: frozenset({State.AREA_IN, State.AREA_OUT, State.DOCK, State.JUNCTION_ON, State.JUNCTION_OFF}),
-    State.DOCK: frozenset({State.AREA_OUT, State.DOCK}),
+    State.DOCK: frozenset({State.AREA_OUT, State.AREA_IN, State.DOCK}),
 }
 """Which kind of edge may follow which; before a DOCK the machine is in QUEUE. A layout that breaks it is refused."""
 

@@ -6,7 +6,6 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from lhdmap.haulage.along import Along
 from lhdmap.haulage.layout import Layout
 from lhdmap.haulage.mission import MissionTask
 from lhdmap.haulage.mission_io import Buckets, MissionInput, MissionOutput, Navigation, Report

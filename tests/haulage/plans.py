@@ -40,7 +40,8 @@ def map_of_plan(name: str) -> TopologicalMap:
                 if tunnel["ends"][end] == node["name"]:
                     points += _twins(node, tunnel, end)
     waypoints = [_waypoint(place, plan, truth["tunnels"]) for place in truth["places"] if place["kind"] in _PURPOSES]
-    places = {one.id: (one.node, one.pose) for one in (*points, *waypoints)}
+    both: list[AccessPoint | Waypoint] = [*points, *waypoints]
+    places = {one.id: (one.node, one.pose) for one in both}
     ways = [
         _way(a, b, places)
         for a, b in itertools.combinations(places, 2)
