@@ -126,6 +126,8 @@ class HaulageMachine:
     def _holds(self, guard: Guard, at: Status, edge: int) -> bool:
         if guard == Guard.ENDED:
             return at.ended
+        if guard == Guard.RELEASED:
+            return at.permission != Permission.STOPPED
         if guard == Guard.ROUTE:
             return self.has_route(at._replace(left=1, service=False, edge=at.edge if edge == NOWHERE else edge))
         if guard == Guard.TRIES:

@@ -11,7 +11,7 @@ from typing import Literal
 from lhdmap.haulage.events import Moment, event_of
 from lhdmap.haulage.layout import Layout
 from lhdmap.haulage.machine import NOWHERE, Errand, HaulageMachine, Status, Tries
-from lhdmap.haulage.mission_io import Buckets, MissionInput, MissionOutput, Motion
+from lhdmap.haulage.mission_io import Buckets, MissionInput, MissionOutput, Motion, Report
 from lhdmap.haulage.phases import phase_of
 from lhdmap.haulage.places import Whereabouts
 from lhdmap.haulage.records import Cycle, Interval, Ledger
@@ -37,6 +37,7 @@ class MissionTask:
         self._ledger = Ledger()
         self._orders: list[Buckets] = []
         self._taken = self._task = self._number = 0
+        self._bucket = Report()
         self._cycle: Cycle | None = None
 
     def update(self, given: MissionInput) -> MissionOutput:
@@ -71,6 +72,8 @@ class MissionTask:
             self._next_errand()
             before = before._replace(left=1 + self._orders.pop(0).buckets)
         self.status = self.machine.step(before, event, moment.edge, buckets)
+        if self.status.loaded and not before.loaded:
+            self._bucket = given.loading
         if event == Event.ABORT:
             self._orders.clear()
         again = event in (Event.LOAD_FAILED, Event.DUMP_STUCK)
@@ -89,16 +92,14 @@ class MissionTask:
         """Close the cycle whose bucket has just been dumped."""
         phase, cause = phase_of(self.machine, self.status, given, first=False)
         self._ledger.note(given.now_ns, phase, self._where.place(self.status), cause, given.odometer_m)
-        self._cycle = self._made(self._ledger.take(), finished=True, given=given)
+        self._cycle = self._made(self._ledger.take(), finished=True)
         self._number += 1
 
-    def _made(self, intervals: tuple[Interval, ...], *, finished: bool, given: MissionInput | None = None) -> Cycle:
-        errand = self.machine.errand
-        cycle = Cycle(self._name, self._number + 1, errand.load, errand.dump, intervals, finished=finished)
-        if given is None:
-            return cycle
-        loading = given.loading
-        return cycle._replace(mass_t=loading.mass_t, fill=loading.fill, attempts=loading.attempts, slip=loading.slip)
+    def _made(self, intervals: tuple[Interval, ...], *, finished: bool) -> Cycle:
+        errand, told = self.machine.errand, self._bucket
+        self._bucket = Report()
+        measured = (told.mass_t, told.fill, told.attempts, told.slip)
+        return Cycle(self._name, self._number + 1, errand.load, errand.dump, intervals, *measured, finished)
 
     def _output(self, given: MissionInput, events: tuple[Event, ...]) -> MissionOutput:
         at = self.status

@@ -17,7 +17,8 @@ from lhdmap.messages import FloatArray
 from lhdmap.mine.polyline import rounded_line
 
 _SPACING_M = 1.0  # of waypoints
-_LEAST_RADIUS_M = 6.0
+_RADIUS_M = 10.0  # haulage findings, Section 3: twice the least radius of truck and LHD, or more
+_STRAIGHT_M, _S_SHARE = 0.05, 0.25
 
 
 class _Mouth(NamedTuple):
@@ -120,8 +121,7 @@ class _Drawing:
 
     def _turn(self, area: SiteArea, start: str, end: str, a: FloatArray, b: FloatArray) -> Edge:
         """Return a turn between two poses; it gives way where it crosses the opposing lane: to the side that is not kept to."""
-        corner = _meet(a, b)
-        line = _rounded([a[:2], corner, b[:2]], self.site.turn_radius_m)
+        line = _way(a, b, radius_m=self.site.turn_radius_m)
         turn = math.remainder(b[2] - a[2], 2.0 * math.pi)
         kind = State.JUNCTION_ON if start == f"{area.name} out" else State.JUNCTION_OFF
         edge = _edge(start, end, kind, line, self.site.turn_kmh)
@@ -183,32 +183,38 @@ def _length_m(line: FloatArray) -> float:
     return float(np.hypot(*np.diff(line[:, :2], axis=0).T).sum())
 
 
-def _way(a: FloatArray, b: FloatArray, between: Iterable[FloatArray] = ()) -> FloatArray:
-    """Return waypoints from a pose to another: straight on where the headings meet on the way, else by an S."""
+def _way(a: FloatArray, b: FloatArray, between: Iterable[FloatArray] = (), radius_m: float = _RADIUS_M) -> FloatArray:
+    """Return waypoints from a pose to another: straight, by one corner where the headings meet on the way, else by an S."""
     middle = [one[:2] for one in between]
     if not middle:
-        corner, gap = _meet(a, b), float(np.hypot(*(b[:2] - a[:2])))
-        ahead = (corner - a[:2]) @ _unit(a[2]) > 0.5 and (b[:2] - corner) @ _unit(b[2]) > 0.5
-        middle = [corner] if ahead else [a[:2] + 0.35 * gap * _unit(a[2]), b[:2] - 0.35 * gap * _unit(b[2])]
-    return _rounded([a[:2], *middle, b[:2]], _LEAST_RADIUS_M)
+        corner, gap = _meet(a, b), b[:2] - a[:2]
+        if corner is not None and (corner - a[:2]) @ _unit(a[2]) > 0.5 and (b[:2] - corner) @ _unit(b[2]) > 0.5:
+            middle = [corner]
+        elif abs(float(gap[0] * math.sin(a[2]) - gap[1] * math.cos(a[2]))) > _STRAIGHT_M:
+            far = _S_SHARE * float(np.hypot(*gap))
+            middle = [a[:2] + far * _unit(a[2]), b[:2] - far * _unit(b[2])]
+    return _rounded([a[:2], *middle, b[:2]], radius_m)
 
 
-def _meet(a: FloatArray, b: FloatArray) -> FloatArray:
-    """Return where the straight on from pose `a` meets the one that leads to pose `b`; half way where they are parallel."""
+def _meet(a: FloatArray, b: FloatArray) -> FloatArray | None:
+    """Return where the straight on from pose `a` meets the one that leads to pose `b`; None where they are parallel."""
     u, v = _unit(a[2]), _unit(b[2])
     cross = u[0] * v[1] - u[1] * v[0]
     if abs(cross) < 1e-3:
-        return 0.5 * (a[:2] + b[:2])
+        return None
     gap = b[:2] - a[:2]
     return a[:2] + u * float(gap[0] * v[1] - gap[1] * v[0]) / cross
 
 
 def _rounded(points: Sequence[FloatArray], radius_m: float) -> FloatArray:
-    """Return waypoints (N, 2) each metre of the polyline with rounded corners."""
+    """Return waypoints (N, 2) each metre of the polyline with rounded corners; at its ends a corner may take the whole leg."""
     kept = [points[0]] + [b for a, b in pairwise(points) if np.hypot(*(b - a)) > 0.05]
+    first, last = kept[1] - kept[0], kept[-1] - kept[-2]
+    more = [float(np.hypot(*leg)) for leg in (first, last)] if len(kept) > 2 else [0.0, 0.0]
+    kept[0], kept[-1] = kept[0] - (first if more[0] else 0.0), kept[-1] + (last if more[1] else 0.0)
     line = rounded_line(np.array([[*point, 0.0] for point in kept]), radius_m, "way")
-    count = max(int(line.length_m / _SPACING_M), 1) + 1
-    return line.at(np.linspace(0.0, line.length_m, count))[:, :2]
+    count = max(int((line.length_m - sum(more)) / _SPACING_M), 1) + 1
+    return line.at(np.linspace(more[0], line.length_m - more[1], count))[:, :2]
 
 
 def _unit(heading_rad: float) -> FloatArray:

@@ -76,6 +76,7 @@ class Guard(StrEnum):
     WORKING = "task not done"
     DONE = "task done"
     TRIES = "tries left"
+    RELEASED = "no emergency stop"
 
 
 class On(StrEnum):
@@ -125,8 +126,8 @@ def _table() -> dict[tuple[State, Event], tuple[Rule, ...]]:
         (s.DUMP, e.DUMPED): (Rule(g.WORKING, On.NEXT),),
         (s.DUMP, e.DUMP_STUCK): (Rule(g.TRIES, s.DUMP), Rule(g.WORKING, s.ASSIST)),
         (s.REFUEL, e.SERVICED): (Rule(g.WORKING, On.NEXT),),
-        (s.ASSIST, e.ASSISTED): (Rule(g.ALWAYS, On.HERE),),
-        (s.ASSIST, e.COMPLETED): (on,),
+        (s.ASSIST, e.ASSISTED): (Rule(g.RELEASED, On.HERE),),
+        (s.ASSIST, e.COMPLETED): (Rule(g.RELEASED, On.NEXT),),
     }
     for state in MOVING:
         table[state, e.REACH] = (on,)
