@@ -9,10 +9,12 @@ from __future__ import annotations
 import math
 
 import numpy as np
+import numpy.typing as npt
 
 from lhdmap.messages import FloatArray
 
 _BACK_M, _AHEAD_M = 4.0, 12.0  # of where it was: where the place on the line is looked for
+_LOST_M = 6.0
 
 
 class Along:
@@ -44,15 +46,22 @@ class Along:
         if not (math.isfinite(x_m) and math.isfinite(y_m)) or not len(self._steps):
             return self.at_m
         near = (self._s[1:] >= self.at_m - _BACK_M) & (self._s[:-1] <= self.at_m + _AHEAD_M)
-        index = np.flatnonzero(near)
+        point = np.array([x_m, y_m])
+        index, share, off_m = self._nearest(point, np.flatnonzero(near))
+        if off_m > _LOST_M:  # others have moved it
+            index, share, _ = self._nearest(point, np.arange(len(self._steps)))
+        self.at_m = float(self._s[index] + share * self._lengths[index])
+        return self.at_m
+
+    def _nearest(self, point_m: FloatArray, index: npt.NDArray[np.intp]) -> tuple[int, float, float]:
+        """Return the piece of the line, of those in `index`, that is nearest to a point, where on it (share), and how far (m)."""
         if not len(index):
-            index = np.array([len(self._steps) - 1])
-        gap = np.array([x_m, y_m]) - self._line[index]
+            return 0, 0.0, math.inf
+        gap = point_m - self._line[index]
         share = (gap * self._steps[index]).sum(axis=1) / self._lengths[index] ** 2
         low = np.where(index == 0, -np.inf, 0.0)
         high = np.where(index == len(self._steps) - 1, np.inf, 1.0)
         share = np.clip(share, low, high)
-        off = gap - share[:, None] * self._steps[index]
-        best = int(np.argmin((off**2).sum(axis=1)))
-        self.at_m = float(self._s[index[best]] + share[best] * self._lengths[index[best]])
-        return self.at_m
+        off = np.hypot(*(gap - share[:, None] * self._steps[index]).T)
+        best = int(np.argmin(off))
+        return int(index[best]), float(share[best]), float(off[best])

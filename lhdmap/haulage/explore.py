@@ -11,7 +11,7 @@ from collections import deque
 from collections.abc import Iterator
 from typing import NamedTuple
 
-from lhdmap.haulage.layout import CLOSABLE, Layout
+from lhdmap.haulage.layout import CLOSABLE, GOALS, Layout
 from lhdmap.haulage.machine import NOWHERE, HaulageMachine, Status
 from lhdmap.haulage.states import MOVING, OF_PERMISSION, PERMISSIONS, TABLE, Event, State
 
@@ -65,7 +65,7 @@ def explore(machine: HaulageMachine, buckets: int = 2, without: frozenset[Event]
     ends = [k for at, k in number.items() if finished(at)]
     coming = _coming(before, ends)
     stranded = [_told(machine.layout, at) for at, k in number.items() if k not in coming]
-    broken = [text for at in number for text in _broken(machine, at)]
+    broken = [f"{text}: {_told(machine.layout, at)}" for at in number for text in _broken(machine, at)]
     states = frozenset(at.state for at in number)
     return Exploration(len(number), transitions, states, len(ends), tuple(dead_ends), tuple(stranded), tuple(broken))
 
@@ -145,23 +145,22 @@ def _broken(machine: HaulageMachine, at: Status) -> Iterator[str]:
     """Yield what may never be."""
     if at.edge == NOWHERE:
         if at.state not in (State.ASSIST, State.ABORTED):
-            yield f"does not know where it is: {_told(machine.layout, at)}"
+            yield "does not know where it is"
         return
     edge = machine.layout.edges[at.edge]
     purpose = machine.layout.point[edge.end].purpose
-    told = _told(machine.layout, at)
     if at.state == State.LOAD and (not at.ended or purpose != "load"):
-        yield f"loads where nothing is to be loaded: {told}"
+        yield "loads where nothing is to be loaded"
     if at.state == State.DUMP and (not at.ended or purpose != "dump"):
-        yield f"dumps where nothing is to be dumped: {told}"
+        yield "dumps where nothing is to be dumped"
     if at.state in (State.IDLE, State.REFUEL) and (not at.ended or purpose != "park"):
-        yield f"parks where nobody parks: {told}"
+        yield "parks where nobody parks"
     if at.state in MOVING and at.state != edge.kind:
-        yield f"is not what its edge is: {told}"
-    if at.state == State.QUEUE and (not at.ended or purpose in ("load", "dump", "park")):
-        yield f"queues at a point of work: {told}"
+        yield "is not what its edge is"
+    if at.state == State.QUEUE and (not at.ended or purpose in GOALS):
+        yield "queues at a point of work"
     if at.loaded and at.state == State.IDLE:
-        yield f"parks loaded: {told}"
+        yield "parks loaded"
 
 
 def _told(layout: Layout, at: Status) -> str:
