@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from lhdmap.haulage.states import FOLLOWS, MOVING, PERMISSIONS, TABLE, TASKS, Event, On, Permission, State
+from lhdmap.haulage.states import FOLLOWS, MOVING, PERMISSIONS, TABLE, TASKS, Event, Guard, On, Permission, State
 
-_SAME = "again"
 _WAY = "way"  # a composite of all kinds of edges
 
 
@@ -18,7 +17,7 @@ def mermaid() -> str:
     lines += ["    }"]
     lines += [f'    state "{state}" as {state.name}' for state in State if state not in MOVING]
     lines += ["    [*] --> IDLE"]
-    lines += dict.fromkeys(_arrows())
+    lines += _arrows()
     lines += ['    state "permission" as permission {', "        [*] --> GO"]
     lines += [f'        state "{one}" as {one.name}' for one in Permission]
     lines += [f"        {a.name} --> {b.name} : {event}" for (a, event), b in PERMISSIONS.items()]
@@ -26,13 +25,20 @@ def mermaid() -> str:
 
 
 def _arrows() -> Iterator[str]:
+    """Yield an arrow for each pair of states, with all events that lead that way."""
+    labels: dict[tuple[str, str], dict[Guard, list[Event]]] = {}
     for (state, event), rules in TABLE.items():
         first = _WAY if state in MOVING and event != Event.DOCK_MISSED else state.name
         for rule in rules:
-            guard = f" [{rule.guard}]" if rule.guard else ""
-            for target in _targets(state, rule.target):
-                if target != first:
-                    yield f"    {first} --> {target} : {event}{guard}"
+            targets = [] if rule.target == state else _targets(state, rule.target)
+            for target in targets:
+                events = labels.setdefault((first, target), {}).setdefault(rule.guard, [])
+                if target != first and event not in events:
+                    events.append(event)
+    for (first, target), by_guard in labels.items():
+        told = [", ".join(events) + (f" [{guard}]" if guard else "") for guard, events in by_guard.items() if events]
+        if told:
+            yield f"    {first} --> {target} : {' or '.join(told)}"
 
 
 def _targets(state: State, target: State | On) -> list[str]:

@@ -167,7 +167,7 @@ class Times(NamedTuple):
 
 
 def named(sections: Iterable[tuple[str, float]], both: Iterable[str] = (), one_way: Iterable[str] = ()) -> SectionMap:
-    """Return a map from names (those with `bay` in them are bays) and lengths; `both` and `one_way` are chains of names, `A B C`."""
+    """Return a map from names (those with `bay` in them are bays) and lengths; `both`, `one_way`: chains of names, `A B C`."""
     made = tuple(Section(name, length_m, bay="bay" in name) for name, length_m in sections)
     links: Mapping[tuple[str, str], None] = {}
     for chain, back in [(one, True) for one in both] + [(one, False) for one in one_way]:

@@ -7,7 +7,7 @@ from itertools import pairwise
 from typing import Any
 
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from lhdmap.haulage.mission import MissionTask
 from lhdmap.haulage.mission_io import Buckets, MissionInput, Navigation, Report
@@ -172,6 +172,7 @@ def test_a_dock_that_is_missed_is_tried_again_from_the_queue_point(drive: Drive)
     assert drive.tick(ORDER).state == State.DOCK
 
 
+@settings(deadline=None, max_examples=25)
 @given(
     st.lists(st.sampled_from(["estop", "obstacle", "no permit", "busy", "nan", "frozen", "help", "ok"]), max_size=40)
 )

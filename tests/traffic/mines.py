@@ -3,6 +3,8 @@ a pocket at the dump, a loop with a stem."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 from lhdmap.traffic.sections import Haul, SectionMap, named
 
 Mine = tuple[SectionMap, dict[str, Haul]]
@@ -56,11 +58,23 @@ def loop(count: int = 3, *, pocket: bool = False, stem_m: float = 80.0) -> Mine:
     return named(sections, ways, one_way), {f"m{k}": Haul("l6", "dump", parks[k]) for k in range(count)}
 
 
-MINES = {
+def pocket_and_bay(count: int = 3) -> Mine:
+    return drift(count, pocket=True)
+
+
+def loop_and_pocket(count: int = 3) -> Mine:
+    return loop(count, pocket=True)
+
+
+def drift_alone(count: int = 3) -> Mine:
+    return drift(count, bay=False)
+
+
+MINES: dict[str, Callable[[int], Mine]] = {
     "ring": ring,
     "drift with bay": drift,
-    "pocket and bay": lambda count=3: drift(count, pocket=True),
+    "pocket and bay": pocket_and_bay,
     "loop and stem": loop,
-    "loop, stem and pocket": lambda count=3: loop(count, pocket=True),
-    "drift without bay": lambda count=3: drift(count, bay=False),
+    "loop, stem and pocket": loop_and_pocket,
+    "drift without bay": drift_alone,
 }
