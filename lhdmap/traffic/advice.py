@@ -8,7 +8,7 @@ from typing import NamedTuple
 from lhdmap.errors import LhdmapError
 from lhdmap.movement.findings import Finding
 from lhdmap.topology.model import TopologicalMap, Tunnel
-from lhdmap.traffic.of_map import BAY_M, MapSections, sections_of_map
+from lhdmap.traffic.of_map import BAY_M, NOTHING, Extra, MapSections, sections_of_map
 from lhdmap.traffic.sections import Haul, SectionMap
 from lhdmap.traffic.simulation import Chance, simulate
 
@@ -35,19 +35,17 @@ def traffic_findings(topology: TopologicalMap, machines: int = 3) -> Iterator[Fi
             found = throughput(topology, dump, machines)
             if found is None:
                 continue
-            best, where = _best_bay(topology, found)
+            best, what = _best_bay(topology, found)
         except LhdmapError as error:
             yield Finding("note", "traffic", dump, f"throughput is not known: {error}")
             continue
         text = f"{found.machines} machines dump {found.ratio:.1f} times what one does; longest wait {found.longest_wait_s:.0f} s"
         if best >= found.ratio + _PAYS:
-            text += f"; a passing bay in the middle of {where} would make it {best:.1f} times"
+            text += f"; {what} would make it {best:.1f} times"
         yield Finding("note", "traffic", dump, text)
 
 
-def throughput(
-    topology: TopologicalMap, dump: str, machines: int, extra_bays: dict[str, float] | None = None
-) -> Throughput | None:
+def throughput(topology: TopologicalMap, dump: str, machines: int, extra: Extra = NOTHING) -> Throughput | None:
     """Return the throughput to a dump from the nearest draw points; None where there are not two machines' worth of places.
 
     Each machine has a draw point of its own; where there are fewer, the rest share the nearest one and are at home in a park.
@@ -56,7 +54,7 @@ def throughput(
         InputError: a draw point and the dump are not joined.
         UsageError: the map is too large for the search.
     """
-    made = sections_of_map(topology, extra_bays=extra_bays)
+    made = sections_of_map(topology, extra=extra)
     hauls = _hauls(topology, made, dump, machines)
     if len(hauls) < 2:
         return None
@@ -87,17 +85,20 @@ def _to_go_m(sections: SectionMap, goal: str) -> dict[str, float]:
 
 
 def _best_bay(topology: TopologicalMap, found: Throughput) -> tuple[float, str]:
-    """Return the best ratio that one more bay gives, and in which tunnel: those between draw points and dump are tried."""
+    """Return the best ratio that one more place to wait gives, and what: a pocket at the dump, bays on the way to it."""
     made = sections_of_map(topology)
     hauls = _hauls(topology, made, found.dump, found.machines)
     used = [name for haul in hauls.values() for name in _way(made.map, haul.load, haul.dump)]
     tunnels = [one for one in topology.tunnels if _wants_bay(topology, one) and any(_is_of(name, one) for name in used)]
-    best, where = 0.0, ""
-    for tunnel in sorted(tunnels, key=lambda one: -one.length_m)[:_MOST_TRIES]:
-        tried = throughput(topology, found.dump, found.machines, {tunnel.id: 0.5 * tunnel.length_m})
+    longest = sorted(tunnels, key=lambda one: -one.length_m)[:_MOST_TRIES]
+    tries = [(Extra(pocket=found.dump), f"a pocket in front of {found.dump}")]
+    tries += [(Extra(tunnel=one.id), f"a passing bay in the middle of {one.name}") for one in longest]
+    best, what = 0.0, ""
+    for extra, words in tries:
+        tried = throughput(topology, found.dump, found.machines, extra)
         if tried is not None and tried.ratio > best:
-            best, where = tried.ratio, tunnel.name
-    return best, where
+            best, what = tried.ratio, words
+    return best, what
 
 
 def _wants_bay(topology: TopologicalMap, tunnel: Tunnel) -> bool:

@@ -16,7 +16,7 @@ from lhdmap.topology.model import AccessPoint, TopologicalMap, Tunnel, Waypoint
 from lhdmap.traffic.sections import Section, SectionMap
 
 SECTION_M = 60.0
-BAY_M = 25.0
+BAY_M, POCKET_M = 25.0, 14.0
 _LEAST_PIECE_M = 12.0
 _CROSSING_M = 10.0
 WORKS = ("draw_point", "dump", "park")
@@ -37,10 +37,18 @@ class MapSections(NamedTuple):
     places: dict[str, str]
 
 
-def sections_of_map(
-    topology: TopologicalMap, section_m: float = SECTION_M, extra_bays: dict[str, float] | None = None
-) -> MapSections:
-    """Return the sections; none is much longer than `section_m`. `extra_bays`: tunnels (ids) that get a bay, and where (m)."""
+class Extra(NamedTuple):
+    """What is tried on a map: a bay in the middle of a tunnel (id), or a pocket beside the way to a waypoint of work."""
+
+    tunnel: str = ""
+    pocket: str = ""
+
+
+NOTHING = Extra()
+
+
+def sections_of_map(topology: TopologicalMap, section_m: float = SECTION_M, extra: Extra = NOTHING) -> MapSections:
+    """Return the sections; none is much longer than `section_m`."""
     sections: list[Section] = []
     links: list[tuple[str, str]] = []
     places: dict[str, str] = {}
@@ -49,7 +57,7 @@ def sections_of_map(
         if tunnel.closed:
             continue
         waypoints = [one for one in topology.waypoints if one.node == tunnel.id]
-        cuts = _cuts(tunnel, _bays(tunnel, waypoints, (extra_bays or {}).get(tunnel.id)), section_m)
+        cuts = _cuts(tunnel, _bays(tunnel, waypoints, extra.tunnel == tunnel.id), section_m)
         names = [f"{tunnel.name}#{k + 1}" if len(cuts) > 1 else tunnel.name for k in range(len(cuts))]
         sections += [Section(name, cut.to_m - cut.from_m) for name, cut in zip(names, cuts, strict=True)]
         links += pairwise(names)
@@ -66,6 +74,10 @@ def sections_of_map(
         mouths |= {point.id: node.name for point in topology.access_points if point.node == node.id}
         places |= {one.name: node.name for one in topology.waypoints if one.node == node.id and one.purpose in WORKS}
     links += [link for point in topology.access_points if (link := _joint(point, mouths)) is not None]
+    if extra.pocket in places:
+        end, pocket = places[extra.pocket], f"pocket at {extra.pocket}"
+        sections.append(Section(pocket, POCKET_M, bay=True))
+        links += [(one, pocket) for pair in links for one in pair if end in pair and one != end] + [(pocket, end)]
     both = dict.fromkeys(pair for a, b in links for pair in ((a, b), (b, a)))
     return MapSections(SectionMap(tuple(sections), tuple(both)), places)
 
@@ -75,9 +87,9 @@ def _joint(point: AccessPoint, mouths: dict[str, str]) -> tuple[str, str] | None
     return (here, there) if here is not None and there is not None and here != there else None
 
 
-def _bays(tunnel: Tunnel, waypoints: list[Waypoint], extra_m: float | None) -> list[tuple[float, str]]:
+def _bays(tunnel: Tunnel, waypoints: list[Waypoint], extra: bool) -> list[tuple[float, str]]:
     bays = [(_along_m(tunnel, one.pose), one.name) for one in waypoints if one.purpose == "passing_bay"]
-    return sorted(bays if extra_m is None else [*bays, (extra_m, f"bay in {tunnel.name}")])
+    return sorted([*bays, (0.5 * tunnel.length_m, f"bay in {tunnel.name}")] if extra else bays)
 
 
 def _cuts(tunnel: Tunnel, bays: list[tuple[float, str]], section_m: float) -> list[_Cut]:

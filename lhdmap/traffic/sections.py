@@ -141,9 +141,11 @@ class Cycle:
         leg, section = place
         if leg == Leg.EMPTY and section == self.haul.load:  # at home there: it loads where it stands
             return self._nearer(Place(Leg.LOADED, section))
-        far = self._far[leg]
+        far, bays = self._far[leg], {name: one.bay for name, one in self.map.section.items()}
         here = far.get(section, math.inf)
         names = [one for one in self.map.following[section] if far.get(one, math.inf) < here]
+        aside = [one for one in self.map.following[section] if bays[one] and not bays[section] and far.get(one) == here]
+        names += aside  # a pocket before the goal brings nothing nearer, but is one to wait in
         names.sort(key=lambda name: (self.map.section[name].bay, far[name] + self.map.section[name].length_m))
         return [self._arriving(leg, name) for name in names]
 
