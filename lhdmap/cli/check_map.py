@@ -20,6 +20,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--machine", type=Path, metavar="FILE.toml", help="the machine that is to run (default: the map's)"
     )
+    parser.add_argument(
+        "--machines",
+        type=int,
+        default=3,
+        metavar="N",
+        help="machines for which throughput is told (default: 3; 0: none)",
+    )
     add_settings(parser, ["movement"])
 
 
@@ -28,11 +35,16 @@ def run(arguments: argparse.Namespace, console: Console) -> int:
     from lhdmap.config import load_settings
     from lhdmap.machine import load_machine
     from lhdmap.movement.check import check_map
-    from lhdmap.movement.findings import verdict_json
+    from lhdmap.movement.findings import verdict_json, verdict_of
+    from lhdmap.topology.files import read_topology
+    from lhdmap.traffic.advice import traffic_findings
 
     settings = load_settings(arguments.config, arguments.set).movement
     machine = load_machine(arguments.machine) if arguments.machine else None
     verdict = check_map(arguments.map, settings, machine)
+    if arguments.machines > 1:
+        told = traffic_findings(read_topology(arguments.map), arguments.machines)
+        verdict = verdict_of([*verdict.findings, *told])
     failure = None
     if not verdict.ready:
         failure = EvaluationShortfall(f"the map is not ready: {'; '.join(verdict.reasons[:3])}")

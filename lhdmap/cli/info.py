@@ -18,6 +18,7 @@ _WHAT = {
     "replay": "replay",
     "localization": "localization",
     "navigation": "tables of drives",
+    "production": "production of replays",
 }
 
 

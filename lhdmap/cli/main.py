@@ -36,6 +36,7 @@ COMMANDS = {
     "replay": "drive a simulated machine in closed loop: log, journal, verdict, report",
     "route": "movement sequence between two places of a map, with inversions and its cost",
     "check-map": "is the map ready to run on, and if not, why",
+    "production": "what replays produced, and what their time went into",
     "export": "a map in a format that other tools read",
     "eval": "compare results with ground truth",
     "config": "print the settings with unit and source",

@@ -1,0 +1,1 @@
+"""Load, haul, dump: the stages of a cycle as state machines, sites, and the executive of a mission."""

@@ -1,0 +1,126 @@
+"""The event of a moment, from plain facts: safety first, then the station, then permits and ways, then what the task says."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from lhdmap.haulage.layout import CLOSABLE, Layout
+from lhdmap.haulage.machine import NOWHERE, HaulageMachine, Status
+from lhdmap.haulage.mission_io import MissionInput, Report
+from lhdmap.haulage.places import Whereabouts
+from lhdmap.haulage.states import MOVING, WORKS, Event, Permission, State
+
+
+class Moment(NamedTuple):
+    """An event, with the edge that it is about."""
+
+    event: Event
+    edge: int = NOWHERE
+
+
+def event_of(
+    machine: HaulageMachine,
+    at: Status,
+    given: MissionInput,
+    where: Whereabouts,
+    task: int,
+    *,
+    ordered: bool,
+) -> Moment | None:
+    """Return the next event of a moment, None where all of them have been taken. `task`: number of the one that runs."""
+    safety = _permission(at, given)
+    if safety is not None:
+        return Moment(safety)
+    if given.abort and at.state in WORKS:
+        return Moment(Event.ABORT)
+    return (
+        _ways(machine.layout, at, given)
+        or _begins(machine, at, given, where, ordered=ordered)
+        or _service(at, given)
+        or _of_state(machine, at, given, where, task)
+    )
+
+
+def _permission(at: Status, given: MissionInput) -> Event | None:
+    """Return what changes the permission: the hardest that holds wins."""
+    if given.estop:
+        return None if at.permission == Permission.STOPPED else Event.ESTOP
+    if at.permission == Permission.STOPPED:
+        return Event.RESET
+    if given.obstacle:
+        return None if at.permission == Permission.BLOCKED else Event.OBSTACLE
+    if at.permission == Permission.BLOCKED:
+        return Event.GONE
+    if given.permit is False:
+        return Event.DENIED if at.permission == Permission.GO else None
+    return Event.GRANTED if at.permission == Permission.WAIT else None
+
+
+def _ways(layout: Layout, at: Status, given: MissionInput) -> Moment | None:
+    """Return an edge that has been closed or opened since."""
+    if not given.closed and not at.closed:
+        return None
+    for k, edge in enumerate(layout.edges):
+        shut, wanted = bool(at.closed >> k & 1), edge.kind in CLOSABLE and edge.node in given.closed
+        if shut != wanted:
+            return Moment(Event.CLOSED if wanted else Event.OPENED, k)
+    return None
+
+
+def _begins(
+    machine: HaulageMachine, at: Status, given: MissionInput, where: Whereabouts, *, ordered: bool
+) -> Moment | None:
+    if not ordered or given.abort:
+        return None
+    if at.state == State.IDLE:
+        return Moment(Event.DISPATCH)
+    if at.state == State.ABORTED:
+        return Moment(Event.DISPATCH, where.edge_now(machine, at._replace(left=1)))
+    return None
+
+
+def _service(at: Status, given: MissionInput) -> Moment | None:
+    if given.service_due and not at.service and at.state in WORKS:
+        return Moment(Event.SERVICE_DUE)
+    return Moment(Event.SERVICED) if at.state == State.REFUEL and at.service and not given.service_due else None
+
+
+def _of_state(machine: HaulageMachine, at: Status, given: MissionInput, where: Whereabouts, task: int) -> Moment | None:
+    if at.state in MOVING:
+        return _moving(machine, at, given, where)
+    if at.state == State.QUEUE:
+        free = given.point_free is not False and at.permission == Permission.GO
+        return Moment(Event.POINT_FREE) if free and machine.next_edge(at) is not None else None
+    if at.state == State.LOAD and machine.working(at):
+        return _task(given.loading, task, Event.LOADED, Event.LOAD_FAILED)
+    if at.state == State.DUMP and machine.working(at):
+        return _task(given.dumping, task, Event.DUMPED, Event.DUMP_STUCK)
+    return _assisted(machine, at, given, where) if at.state == State.ASSIST else None
+
+
+def _moving(machine: HaulageMachine, at: Status, given: MissionInput, where: Whereabouts) -> Moment | None:
+    said = given.navigation
+    if said.state == "assistance":
+        return Moment(Event.LOST if "place" in said.reason else Event.OBSTACLE_STAYS)
+    if at.ended:
+        return None
+    there = said.state == "arrived" and said.goal in (machine.goal(at), machine.layout.edges[at.edge].end)
+    if there and said.goal != machine.goal(at):  # as far as it was permitted
+        return Moment(Event.REACH)
+    return Moment(Event.REACH) if there or where.crossed(machine, at) else None
+
+
+def _task(report: Report, task: int, done: Event, failed: Event) -> Moment | None:
+    """Return the event of a report, if it is about the task of now."""
+    if report.task != task:
+        return None
+    return {"done": Moment(done), "failed": Moment(failed)}.get(report.state)
+
+
+def _assisted(machine: HaulageMachine, at: Status, given: MissionInput, where: Whereabouts) -> Moment | None:
+    if given.answer == "abort":
+        return Moment(Event.ABORT)
+    if given.answer == "done":
+        return Moment(Event.COMPLETED)
+    on = given.answer == "go_on" and given.navigation.state != "assistance"
+    return Moment(Event.ASSISTED, where.edge_now(machine, at)) if on else None
