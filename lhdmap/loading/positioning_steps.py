@@ -40,11 +40,12 @@ class Positioning:
         self._path: FloatArray | None = None
         self._planned: Target | None = None
         self._aim, self._aimed_ns, self._rolled_ns = Aim(None), 0, 0
+        self._hit_ns: int | None = None
 
     def begin(self, moment: Moment) -> None:
         """Begin with the approach."""
         self.phase, self._path, self._planned = APPROACH, None, None
-        self._rolled_ns = moment.now_ns
+        self._rolled_ns, self._hit_ns = moment.now_ns, None
 
     def step(self, moment: Moment) -> Step:
         """Return what is to be done now."""
@@ -107,7 +108,8 @@ class Positioning:
         settings, motion, bend = self._settings, moment.motion, moment.motion.articulation_rad
         limits = target.limits_in(motion)
         if not self._aligner.boxes_free(bend, limits, moment.walls_m):
-            return Step(ALIGN, Event.BLOCKED, "a wall point is inside a body's box")
+            return self._hit(moment)
+        self._hit_ns = None
         if moment.now_ns - self._aimed_ns >= _LOOK_NS:
             self._aim, self._aimed_ns = self._aligner.aim(bend, limits, moment.walls_m), moment.now_ns
         if self._aim.bend_rad is None:
@@ -126,6 +128,13 @@ class Positioning:
         room = landed.way_m > settings.run_up_m
         pedals = Pedals(settings.creep if room else 0.0, brake=not room, steering_rate_rps=rate)
         return Step(ALIGN, pedals=pedals)
+
+    def _hit(self, moment: Moment) -> Step:
+        """Stand still for a look: a wall that is still in a box then is one, a point that is gone was noise."""
+        self._hit_ns = moment.now_ns if self._hit_ns is None else self._hit_ns
+        if moment.now_ns - self._hit_ns >= _LOOK_NS:
+            return Step(ALIGN, Event.BLOCKED, "a wall point is inside a body's box")
+        return Step(ALIGN, pedals=Pedals(brake=True))
 
     def _cannot(self, moment: Moment) -> Step:
         """Say so once it stands: what is seen while it rolls may look otherwise from where it stops."""

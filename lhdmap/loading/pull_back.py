@@ -45,6 +45,11 @@ class Trail:
                 return found[k:]
         return found
 
+    def back_m(self, motion: Motion) -> float:
+        """Return how far a motion is from the trail's end: so much of a pull back is done already."""
+        last = self.motions[-1] if self.motions else motion
+        return float(np.hypot(motion.x_m - last.x_m, motion.y_m - last.y_m))
+
     def cut(self, motion: Motion) -> None:
         """Forget what lies ahead of a motion, to which the machine has gone back."""
         self.motions = self.behind(motion)
@@ -104,7 +109,7 @@ class PullBack:
         if self._path is None:
             trail = self._trail.behind(motion)
             self._path = back_path(motion, trail, self._rear, settings.pull_back_m, settings.back_kmh / 3.6)
-            self._stop_m = self._along_m(motion) + settings.pull_back_m
+            self._stop_m = self._along_m(motion) + max(settings.pull_back_m - self._trail.back_m(motion), 0.0)
         left_m = self._stop_m - self._along_m(motion)
         if left_m < _ARRIVED_M and abs(motion.speed_mps) < settings.standing_mps:
             self.phase = SHAKE

@@ -186,6 +186,8 @@ class LoadingTask:
         memory.state, memory.since_ns, memory.valid_ns = after, told.now_ns, None
         if before not in RESTING and before not in ASSISTANCE:
             memory.note(f"{before.value}: {cause}")
+        if before in (State.CHARGING, State.EXCAVATION):
+            memory.seen_ns = told.now_ns  # from now on the pile is another one
         if before in ASSISTANCE:
             self._help.close()
             memory.loaded |= answer is not None and answer.kind == LOADED
@@ -204,7 +206,7 @@ class LoadingTask:
             self._trail.forget()
             self._weighing.fills.clear()
         if event in (Event.AGAIN, Event.ENOUGH):
-            memory.touched, memory.marked, memory.seen_ns = False, None, told.now_ns
+            memory.touched, memory.marked = False, None
         if memory.state == State.CHARGING:
             memory.touched = True
             memory.face_m = self._face_m(told)

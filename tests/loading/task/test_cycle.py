@@ -241,6 +241,34 @@ def test_an_approach_that_stands_is_one_for_an_operator_before_its_limit() -> No
     assert one.now_ns < 10e9
 
 
+def test_a_pull_back_that_was_interrupted_goes_on_and_is_no_longer() -> None:
+    """Disarmed for two seconds in its middle: together it is as far as without."""
+
+    def change(told: LoadingInput) -> LoadingInput:
+        return told._replace(armed=not 0 < told.now_ns - broke_ns < 2e9)
+
+    ends = []
+    for stops in (False, True):
+        one, broke_ns = bench(start=(16.0, 0.0, 0.0)), 10**12
+        one.run(120.0, lambda out, one=one: out.phase == "back" and one.truth.state[0] < 26.0)  # type: ignore[misc]
+        broke_ns = one.now_ns if stops else 10**12
+        one.change = change
+        assert one.run(60.0, over).state == State.DONE
+        ends.append(one.truth.state[0])
+    assert abs(ends[0] - ends[1]) < 0.5
+
+
+def test_a_single_wrong_point_in_a_box_is_waited_out() -> None:
+    def change(told: LoadingInput) -> LoadingInput:
+        at.append(told.now_ns)
+        assert told.walls_m is not None
+        return told._replace(walls_m=np.vstack([told.walls_m, [[2.0, 1.0]]])) if len(at) % 7 == 0 else told
+
+    at: list[int] = []
+    one = bench(start=(22.0, 0.3, 0.1), bend_rad=0.1, change=change)
+    assert one.run(40.0, lambda out: out.state == State.CHARGING or out.request is not None).state == State.CHARGING
+
+
 def test_the_same_run_says_the_same() -> None:
     runs = [bench(start=(12.0, 0.2, 0.05)) for _ in range(2)]
     for one in runs:
