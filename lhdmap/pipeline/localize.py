@@ -42,6 +42,7 @@ from lhdmap.odometry.planar import PlanarOdometry
 from lhdmap.odometry.rear_view import behind
 from lhdmap.odometry.steps import OdometryStep
 from lhdmap.pipeline.mapping import MappingPipeline
+from lhdmap.pipeline.pile import PileSink
 from lhdmap.topology.files import read_topology
 from lhdmap.topology.model import TopologicalMap
 from lhdmap.topology.sheet import Sheet, read_sheets
@@ -111,7 +112,7 @@ class Localizer:
     `start` (4,): x, y, yaw (rad) and height about where the machine begins, or several (K, 4) of which the first scan chooses;
     None: it is searched for. `live`: a running machine, where nothing waits for a search; of a log each is waited for, so that
     the rows are the same each time. With `smoother` a row's pose is that of the fixed-lag smoother once the machine is some metres
-    farther. A context manager.
+    farther. `pile`: what looks for piles on the way, if anything does. A context manager.
     """
 
     def __init__(
@@ -124,12 +125,13 @@ class Localizer:
         *,
         live: bool = False,
         smoother: bool = False,
+        pile: PileSink | None = None,
     ) -> None:
         self._lag = FixedLag() if smoother else None
-        # What lies beyond the map does not count: no loop is closed, no pile looked for.
-        settings = replace(settings, pile=replace(settings.pile, method="off"))
+        if pile is None:  # what lies beyond the map does not count: no loop is closed, no pile looked for
+            settings = replace(settings, pile=replace(settings.pile, method="off"))
         self._settings, self._floor_m = settings.localization, settings.odometry.min_height_m
-        self.pipeline = MappingPipeline(settings, machine, cloud=False, on_step=self.take)
+        self.pipeline = MappingPipeline(settings, machine, cloud=False, pile=pile, on_step=self.take)
         self._walls, self._placer = MapWalls(known.topology, known.landmarks), Placer(known.topology)
         search = known.search(self._walls, settings)
         self.world = WorldChanges(known.topology, known.sheets, self._walls)
