@@ -87,10 +87,15 @@ class Guidance:
     def __init__(
         self, model: DriveModel, bodies: Bodies, eyes_m: dict[int, float], settings: GuidanceSettings, method: Method
     ) -> None:
-        self.model, self.settings = model, settings
-        self._leads = {gear: lead_of(gear, model, bodies) for gear in (1, -1)}
-        self._outlines = {gear: outline_of(lead) for gear, lead in self._leads.items()}
+        self.model, self.settings, self._bodies = model, settings, bodies
         self._eyes_m, self._method = eyes_m, method
+        self.loaded(model)
+
+    def loaded(self, model: DriveModel) -> None:
+        """Take the model for another load, and begin anew."""
+        self.model = model
+        self._leads = {gear: lead_of(gear, model, self._bodies) for gear in (1, -1)}
+        self._outlines = {gear: outline_of(lead) for gear, lead in self._leads.items()}
         self._last: Plan | None = None
 
     def eyes_in_base(self, bend_rad: float) -> tuple[FloatArray, FloatArray]:

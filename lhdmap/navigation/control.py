@@ -18,7 +18,7 @@ from lhdmap.driving.bodies import Bodies
 from lhdmap.driving.lead import lead_of
 from lhdmap.driving.model import DriveModel
 from lhdmap.driving.motion import Motion
-from lhdmap.guidance.directive import Directive, moved
+from lhdmap.guidance.directive import WAY, Directive, moved
 from lhdmap.messages import FloatArray
 from lhdmap.movement.routes import RoutePlanner
 from lhdmap.navigation.along import Located, along_m, on_map, part_of
@@ -123,6 +123,14 @@ class NavigationControl:
         if self.state == BACKING:
             return self._back(now_ns, motion, located, standing)
         return self._drive(now_ns, motion, located, standing)
+
+    @property
+    def left_m(self) -> float:
+        """Way to the end of the last leg; infinite where there is none."""
+        if self.state not in (DRIVING, RESTING, BACKING, HALTED) or not self.legs:
+            return math.inf
+        rest_m = sum(leg.stop_m - float(leg.path[0, WAY]) for leg in self.legs[self.leg + 1 :])
+        return self.legs[self.leg].stop_m - self._at_m + rest_m
 
     def knows(self, located: Located) -> bool:
         """Return whether a place is good enough to drive by."""

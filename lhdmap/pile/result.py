@@ -112,9 +112,9 @@ class PileReport:
         return PileEstimate.unknown(self.reason) if self.reason else PileEstimate()
 
     def middles_m(self) -> list[FloatArray]:
-        """Return the middles (3,) of all piles that were decided on the drive."""
+        """Return the middles (3,) of all piles that were decided on the drive; a bare wall is none."""
         estimates = [self.estimate, *(one.last.estimate for one in self.piles)]
-        middles = [one.center_m for one in estimates if one.status not in (None, "none")]
+        middles = [one.center_m for one in estimates if one.status not in (None, "none", "wall")]
         return [middle for middle in middles if np.isfinite(middle).all()]
 
     def to_json(self) -> dict[str, Any]:

@@ -14,6 +14,7 @@ from lhdmap.executor.control import Control
 from lhdmap.movement.routes import RoutePlanner
 from lhdmap.navigation.control import NavigationControl
 from lhdmap.replay.assemble_loading import guidance_of, loading_processes
+from lhdmap.replay.assemble_mission import mission_processes
 from lhdmap.replay.engine import Engine, overrun_targets
 from lhdmap.replay.faults import Faults
 from lhdmap.replay.journal import Journal
@@ -44,9 +45,10 @@ def parts_of(scenario: Scenario, folder: Path, settings: Settings | None = None)
         UsageError: there is no such place or route, or this version does not replay the kind.
         ConfigError: there is no such mine.
     """
-    if scenario.kind not in _REPLAYED or scenario.mission:
-        what = f"kind = '{scenario.kind}'" + (" with a mission" if scenario.mission else "")
-        raise UsageError(f"{what}: this version replays kind = 'tram' and 'loading'")
+    if scenario.kind not in _REPLAYED:
+        raise UsageError(f"kind = '{scenario.kind}': this version replays {', '.join(map(repr, _REPLAYED))}")
+    if bool(scenario.mission) != (scenario.kind == "mission"):
+        raise UsageError(f"kind = '{scenario.kind}': kind = 'mission' wants a mission, and no other does")
     from lhdmap.replay.loading_parts import loading_parts  # what a mine needs takes a second to load
     from lhdmap.replay.mine_parts import mine_parts
 
@@ -55,7 +57,7 @@ def parts_of(scenario: Scenario, folder: Path, settings: Settings | None = None)
     return mine_parts(scenario, folder, settings or Settings())
 
 
-_REPLAYED = ("tram", "loading")
+_REPLAYED = ("tram", "loading", "mission")
 
 
 class Watchers(NamedTuple):
@@ -85,11 +87,13 @@ def assemble(
     """
     faults = Faults(scenario.faults, journal, parts.places)
     link = Link(scenario.link, faults, scenario.seed)
-    load = None if parts.loading is None else LoadTally(parts.machine.drive.payload_kg)
+    load = LoadTally(parts.machine.drive.payload_kg) if parts.loading is not None or scenario.mission else None
     monitor = Monitor(Tally(scenario.kind, scenario.limits, parts.goal_m), journal.of(Monitor.name), load)
     processes: list[Process] = [Plant(parts, faults, link, journal.of(Plant.name), scenario.seed)]
     if parts.loading is not None:
         processes += loading_processes(scenario, parts, parts.loading, journal)
+    elif parts.autonomous is not None and scenario.mission:
+        processes += mission_processes(scenario, parts, parts.autonomous, journal)
     elif parts.autonomous is not None:
         processes += _autonomous(scenario, parts, parts.autonomous, journal)
     elif scenario.perception:

@@ -22,6 +22,9 @@ from lhdmap.replay.faults import Position
 from lhdmap.replay.parts import Autonomous, Parts, Touch
 from lhdmap.replay.scenario import AUTONOMOUS, OPERATOR, TELEOPERATOR, Scenario
 from lhdmap.replay.teaching import autonomous_of
+from lhdmap.simulation.ground.mine import mine_piles
+from lhdmap.simulation.ground.sections import load_ground
+from lhdmap.simulation.ground.vehicle import LoadingVehicle
 from lhdmap.simulation.history import START_NS
 from lhdmap.simulation.mine_drive import node_of, planned
 from lhdmap.simulation.mine_world.bumper import Bumper
@@ -73,7 +76,7 @@ def mine_parts(scenario: Scenario, folder: Path, settings: Settings) -> Parts:
     autonomous = autonomous_of(scenario, network, machine, folder, settings) if drives_itself else None
     told = mode_of(TOLD[scenario.who]) if autonomous is None else autonomous.mode
     world = MineWorld(network, machine)
-    vehicle = Vehicle(machine, world, seed=scenario.seed)
+    vehicle = _vehicle(scenario, machine, world)
     places = places_of(network, machine)
     way_m = sum(leg.length_m for leg in legs)
     return Parts(
@@ -93,6 +96,14 @@ def mine_parts(scenario: Scenario, folder: Path, settings: Settings) -> Parts:
         settings=settings,
         autonomous=autonomous,
     )
+
+
+def _vehicle(scenario: Scenario, machine: Machine, world: MineWorld) -> Vehicle | LoadingVehicle:
+    """Return the machine; one with a mission digs in the mine's piles."""
+    if scenario.kind != "mission":
+        return Vehicle(machine, world, seed=scenario.seed)
+    piles = mine_piles(world, load_ground(scenario.loading.ground), seed=scenario.seed)
+    return LoadingVehicle(machine, world, piles, seed=scenario.seed)
 
 
 def _legs(
@@ -116,7 +127,7 @@ def _goal_m(autonomous: Autonomous | None, goal: str, network: Network, machine:
     return x, y, z0 + float(found.pose[2])
 
 
-def _state(vehicle: Vehicle, pose: FloatArray, scenario: Scenario) -> VehicleState:
+def _state(vehicle: Vehicle | LoadingVehicle, pose: FloatArray, scenario: Scenario) -> VehicleState:
     x, y, z, yaw = pose.tolist()
     return vehicle.at_rest(x, y, yaw, near_z_m=z, time_ns=START_NS, load_kg=_KG * scenario.load)
 

@@ -40,8 +40,10 @@ def autonomous_of(
         teach(scenario, network, machine, path, settings)
     known = KnownMap.read(path)
     start, pose = _start(known.topology, scenario.start)
-    for goal in (scenario.goal, *(one.goal for one in scenario.modes if one.goal)):
-        _known(known.topology, goal, "goal")
+    places = [place for one in scenario.mission for place in (one.source, one.to)]
+    for goal in (scenario.goal, *places, *(one.goal for one in scenario.modes)):
+        if goal:
+            _known(known.topology, goal, "mission" if goal in places else "goal")
     return Autonomous(known, pose, Errand(start, scenario.goal, scenario.load > 0.0), ModeNow("idle"))
 
 

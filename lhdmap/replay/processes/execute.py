@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from typing import Any
 
 import numpy as np
 
+from lhdmap.driving.model import DriveModel
 from lhdmap.driving.motion import Motion
 from lhdmap.executor.control import Control
 from lhdmap.executor.notes import Stop
 from lhdmap.executor.watchdog import GUIDANCE, LINK, MOTION, OPERATOR, SCAN_FRONT, SCAN_REAR
+from lhdmap.guidance.planner import Plan
 from lhdmap.integration.beams import scan_points
 from lhdmap.kinematics import T_base_rear
 from lhdmap.machine import Machine
@@ -20,6 +23,7 @@ from lhdmap.replay.process import (
     DIRECTIVE,
     MACHINE_SAYS,
     MILLISECOND_NS,
+    ORDERS,
     PEDALS,
     PLAN,
     POSE,
@@ -30,7 +34,7 @@ from lhdmap.replay.process import (
     Received,
 )
 from lhdmap.replay.processes.feed import MOTION_TOPICS, MotionFeed
-from lhdmap.replay.processes.told import Asked, Health, Idle, ModeNow, Seen, Word
+from lhdmap.replay.processes.told import Asked, Digs, Health, Idle, ModeNow, Seen, Word
 from lhdmap.roles import ROLES
 
 EXECUTOR = "executor"
@@ -43,18 +47,37 @@ _GUARD_RANGE_M = 20.0
 
 
 class Execute(Process):
-    """A command each 20 ms."""
+    """A command each 20 ms. `models`: of the empty and the loaded machine, where a mission says which it is."""
 
     name, period_ns, priority = EXECUTOR, 20 * MILLISECOND_NS, 40
-    reads = (*MOTION_TOPICS, _FRONT, _REAR, SEEN, PLAN, PEDALS, DIRECTIVE, STATION_SAYS)
+    reads = (*MOTION_TOPICS, _FRONT, _REAR, SEEN, PLAN, PEDALS, DIRECTIVE, STATION_SAYS, ORDERS)
 
-    def __init__(self, control: Control, machine: Machine, mode: ModeNow, scribe: Scribe) -> None:
+    def __init__(
+        self,
+        control: Control,
+        machine: Machine,
+        mode: ModeNow,
+        scribe: Scribe,
+        *,
+        models: tuple[DriveModel, DriveModel] | None = None,
+    ) -> None:
+        self._models, self._loaded = models, False
         self.control, self._machine, self._mode, self._scribe = control, machine, mode, scribe
         self._feed = MotionFeed()
         self._wanted = Stop.GO
         self._asks, self._gear = "", 1
         self._told_ns = 0
         self._pull_mps2 = 0.0
+        self._takes: dict[str, Callable[[Any, int], None]] = {
+            _FRONT: lambda scan, now_ns: self._scan(scan, now_ns, front=True),
+            _REAR: lambda scan, now_ns: self._scan(scan, now_ns, front=False),
+            PLAN: self._plan,
+            SEEN: self._compare,
+            PEDALS: self._dig,
+            DIRECTIVE: self._ask,
+            STATION_SAYS: self._obey,
+            ORDERS: self._carry,
+        }
 
     def step(self, now_ns: int, inbox: Sequence[Received]) -> Iterator[Outgoing]:
         """Take what has come; give the command of now."""
@@ -75,30 +98,30 @@ class Execute(Process):
             yield Outgoing(MACHINE_SAYS, self._health(now_ns))
 
     def _take(self, received: Received, now_ns: int) -> None:
-        topic, _, message = received
-        watchdog = self.control.watchdog
-        if topic in (_FRONT, _REAR):
-            self._scan(message, now_ns, front=topic == _FRONT)
-        elif topic == PLAN:
-            watchdog.saw(GUIDANCE, message.stamp_ns, now_ns)
-            if not isinstance(message, Idle):
-                self._gear = message.gear
-                self.control.plan("guidance", message.setpoints, message.stamp_ns, now_ns)
-        elif topic == SEEN:
-            self._compare(message, now_ns)
-        elif topic == PEDALS:
-            self.control.touches(message.touched_m)
-            self.control.dig(message.pedals, now_ns)
-        elif topic == DIRECTIVE:
-            self._ask(message)
-        elif topic == STATION_SAYS:
-            self._obey(message, now_ns)
-        else:
-            self._feed.take(received)
-            if self._feed.heard_ns is not None:
-                watchdog.saw(MOTION, self._feed.heard_ns, now_ns)
-            if topic == POSE:
-                self._pull_mps2 = 9.81 * float(-message.T_odom_base[2, 0])
+        take = self._takes.get(received.topic)
+        if take is not None:
+            take(received.message, now_ns)
+            return
+        self._feed.take(received)
+        if self._feed.heard_ns is not None:
+            self.control.watchdog.saw(MOTION, self._feed.heard_ns, now_ns)
+        if received.topic == POSE:
+            self._pull_mps2 = 9.81 * float(-received.message.T_odom_base[2, 0])
+
+    def _plan(self, plan: Plan | Idle, now_ns: int) -> None:
+        self.control.watchdog.saw(GUIDANCE, plan.stamp_ns, now_ns)
+        if not isinstance(plan, Idle):
+            self._gear = plan.gear
+            self.control.plan("guidance", plan.setpoints, plan.stamp_ns, now_ns)
+
+    def _dig(self, digs: Digs, now_ns: int) -> None:
+        self.control.touches(digs.touched_m)
+        self.control.dig(digs.pedals, now_ns)
+
+    def _carry(self, orders: Orders, now_ns: int) -> None:
+        if self._models is not None and orders.loaded != self._loaded:
+            self._loaded = orders.loaded
+            self.control.loaded(self._models[self._loaded])
 
     def _compare(self, seen: Seen, now_ns: int) -> None:
         """Tell the watchdog by how much pose and scan disagree; wheels that dig slip, and say nothing of the scan."""
@@ -106,7 +129,7 @@ class Execute(Process):
         apart = (seen.apart_m, seen.apart_rad) if lost or not self.control.digs(now_ns) else (0.0, 0.0)
         self.control.watchdog.disagreement(seen.stamp_ns, now_ns, *apart)
 
-    def _ask(self, asked: Asked) -> None:
+    def _ask(self, asked: Asked, now_ns: int) -> None:
         self._wanted = Stop.SERVICE if asked.directive is None else Stop.GO
         self.control.touches(asked.touched_m)
         self._asks = asked.cause if asked.cause.startswith("assistance") else ""

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 
+from lhdmap.driving.model import DriveModel
 from lhdmap.driving.motion import Setpoint
 from lhdmap.geometry.polygon import inside
 from lhdmap.guidance.ghosts import Eye
@@ -12,7 +13,7 @@ from lhdmap.guidance.local_walls import LocalWalls
 from lhdmap.guidance.planner import Guidance
 from lhdmap.messages import Command
 from lhdmap.replay.journal import Scribe
-from lhdmap.replay.process import DIRECTIVE, MILLISECOND_NS, PLAN, SEEN, Outgoing, Process, Received
+from lhdmap.replay.process import DIRECTIVE, MILLISECOND_NS, ORDERS, PLAN, SEEN, Outgoing, Process, Received
 from lhdmap.replay.processes.feed import MOTION_TOPICS, MotionFeed
 from lhdmap.replay.processes.told import Asked, Idle, Seen
 from lhdmap.roles import ROLES
@@ -29,9 +30,18 @@ class Guide(Process):
     """
 
     name, period_ns, latency_ns, priority = GUIDANCE, 50 * MILLISECOND_NS, 10 * MILLISECOND_NS, 30
-    reads = (*MOTION_TOPICS, SEEN, DIRECTIVE, _COMMAND)
+    reads = (*MOTION_TOPICS, SEEN, DIRECTIVE, ORDERS, _COMMAND)
 
-    def __init__(self, guidance: Guidance, jumps: Callable[[float, float], bool], scribe: Scribe) -> None:
+    def __init__(
+        self,
+        guidance: Guidance,
+        jumps: Callable[[float, float], bool],
+        scribe: Scribe,
+        *,
+        models: tuple[DriveModel, DriveModel] | None = None,
+    ) -> None:
+        """`models`: of the empty and the loaded machine, where a mission says which it is."""
+        self._models, self._loaded = models, False
         self._guidance, self._jumps, self._scribe = guidance, jumps, scribe
         self._feed, self._walls = MotionFeed(), LocalWalls(guidance.settings.memory_m)
         self._sent: deque[Setpoint] = deque(maxlen=100)
@@ -69,6 +79,10 @@ class Guide(Process):
             self._seen_ns = message.stamp_ns
         elif topic == DIRECTIVE:
             self._asked = message
+        elif topic == ORDERS:
+            if self._models is not None and message.loaded != self._loaded:
+                self._loaded = message.loaded
+                self._guidance.loaded(self._models[self._loaded])
         elif topic == _COMMAND:
             self._sent.append(self._as_setpoint(message, received.sent_ns))
         else:

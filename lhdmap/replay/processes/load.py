@@ -8,7 +8,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from lhdmap.guidance.directive import HEADING, Directive, X, Y
-from lhdmap.loading.assistance import Answer
+from lhdmap.loading.assistance import GO_ON, Answer
 from lhdmap.loading.moment import LoadingInput, LoadingOutput, Mission, Target
 from lhdmap.loading.states import ASSISTANCE, Event, State
 from lhdmap.loading.task import LoadingTask
@@ -16,11 +16,13 @@ from lhdmap.messages import Command, FloatArray, Text
 from lhdmap.pile.result import Snapshot
 from lhdmap.replay.journal import Scribe
 from lhdmap.replay.process import (
+    APPROACH,
     DIRECTIVE,
     LOADING,
     MACHINE_SAYS,
     MILLISECOND_NS,
     MISSION,
+    ORDERS,
     PEDALS,
     PILE,
     STATION_SAYS,
@@ -30,7 +32,7 @@ from lhdmap.replay.process import (
 )
 from lhdmap.replay.processes.feed import MOTION_TOPICS, MotionFeed
 from lhdmap.replay.processes.load_feed import SIGNAL_TOPICS, SignalFeed
-from lhdmap.replay.processes.told import Asked, Digs, Health, LoadingNow
+from lhdmap.replay.processes.told import Asked, Digs, Health, LoadingNow, Orders, Word
 
 LOADS = "loading"
 _ASKS_NS = 100 * MILLISECOND_NS
@@ -43,22 +45,26 @@ _BEFORE_M, _BEHIND_M, _BESIDE_M = 1.2, 8.0, 0.1
 class Loads(Process):
     """Pedals each 20 ms or a directive each 100 ms; begins once the machine is armed and its pose has held for a second.
 
-    `way`: path of the approach in `odom`, as it was taught; None: the machine is where it looks from.
+    `way`: path of the approach in `odom`, as it was taught; None: the executive of a mission says when to begin, and navigation
+    drives until the pile is found.
     """
 
     name, period_ns, latency_ns, priority = LOADS, 20 * MILLISECOND_NS, 2 * MILLISECOND_NS, 20
-    reads = tuple(dict.fromkeys((*MOTION_TOPICS, *SIGNAL_TOPICS, PILE, MACHINE_SAYS, STATION_SAYS)))
+    reads = tuple(dict.fromkeys((*MOTION_TOPICS, *SIGNAL_TOPICS, PILE, MACHINE_SAYS, STATION_SAYS, ORDERS, APPROACH)))
 
     def __init__(self, task: LoadingTask, way: Directive | None, scribe: Scribe) -> None:
         self.task, self._way, self._scribe = task, way, scribe
         self._feed, self._signals = MotionFeed(), SignalFeed()
-        self._wanted = Mission(1, None if way is None else draw_point_of(way))
+        self._wanted = None if way is None else Mission(1, draw_point_of(way))
+        self._orders: Orders | None = None
+        self._approach: Directive | None = None
         self._pile: Snapshot | None = None
         self._health: Health | None = None
         self._answer: Answer | None = None
+        self._request = 0
         self._emergency = False
         self._since_ns: int | None = None
-        self._asked_ns, self._mission, self._fill_std = 0, "", math.nan
+        self._asked_ns, self._mission, self._fill_std, self._number = 0, "", math.nan, 1
 
     def step(self, now_ns: int, inbox: Sequence[Received]) -> Iterator[Outgoing]:
         """Take what has come; say what is to be driven, or what the pedals are to do."""
@@ -66,12 +72,13 @@ class Loads(Process):
             self._take(received)
         out = self.task.update(self._told(now_ns))
         self._note(out)
+        self._request = 0 if out.request is None else out.request.number
         around = np.zeros((0, 2)) if out.target is None else mouth_of(out.target)
         if out.pedals is not None:
             p = out.pedals
             pedals = Command(now_ns, p.propel, p.steering_rate_rps, p.tilt, p.lift, p.full_rpm, p.brake)
             yield Outgoing(PEDALS, Digs(pedals, around))
-        if now_ns - self._asked_ns >= _ASKS_NS:
+        if self._has_orders and now_ns - self._asked_ns >= _ASKS_NS:
             self._asked_ns = now_ns
             cause = f"assistance: {out.request.why}" if out.request is not None else out.state.value
             directive = None if out.directive is None else out.directive._replace(stamp_ns=now_ns)
@@ -79,7 +86,7 @@ class Loads(Process):
             yield Outgoing(DIRECTIVE, Asked(now_ns, directive, cause, touched))
         mission = self._told_of(out)
         yield Outgoing(LOADING, self._now(now_ns, out))
-        if mission != self._mission:
+        if mission != self._mission and self._way is not None:
             self._mission = mission
             self._scribe.event("mission", mission)
             yield Outgoing(MISSION, Text(now_ns, mission))
@@ -90,18 +97,26 @@ class Loads(Process):
             self._feed.take(received)
         if topic in SIGNAL_TOPICS:
             self._signals.take(received)
+        elif topic == ORDERS:
+            self._orders = message
+        elif topic == APPROACH:
+            self._approach = message.directive
         elif topic == PILE:
             self._pile = message
         elif topic == MACHINE_SAYS:
             self._health = message
         elif topic == STATION_SAYS:
-            self._answer = message.answer or self._answer
+            self._answer = message.answer or self._said_go_on(message) or self._answer
             self._emergency = bool(message.emergency) or (self._emergency and not message.release)
+
+    def _said_go_on(self, word: Word) -> Answer | None:
+        """Return the station's `go on` as an answer to the open request."""
+        return Answer(self._request, GO_ON, by="station") if word.go_on and self._request else None
 
     def _told(self, now_ns: int) -> LoadingInput:
         motion, health = self._feed.motion, self._health
         answer, self._answer = self._answer, None
-        way = None if self._way is None else self._way._replace(stamp_ns=now_ns)
+        way = self._approach if self._way is None else self._way._replace(stamp_ns=now_ns)
         return LoadingInput(
             now_ns,
             self._signals.signals(),
@@ -112,10 +127,20 @@ class Loads(Process):
             health is not None and health.armed,
             answer,
             self._emergency,
-            self._wanted if self._settled(now_ns) else None,
+            self._mission_now(now_ns),
             way,
             evidence=(("log", f"run.mcap@{now_ns}"),),
         )
+
+    @property
+    def _has_orders(self) -> bool:
+        """Whether the machine is this task's."""
+        return self._way is not None or (self._orders is not None and self._orders.loading > 0)
+
+    def _mission_now(self, now_ns: int) -> Mission | None:
+        if self._way is not None:
+            return self._wanted if self._settled(now_ns) else None
+        return Mission(self._orders.loading) if self._orders is not None and self._orders.loading else None
 
     def _settled(self, now_ns: int) -> bool:
         """Return whether the machine has been there for a while, with a pose: the mission begins."""
@@ -125,7 +150,11 @@ class Loads(Process):
         return now_ns - self._since_ns >= _SETTLED_NS
 
     def _now(self, now_ns: int, out: LoadingOutput) -> LoadingNow:
-        return LoadingNow(now_ns, out.state, out.phase, out.attempts, out.fill, self._fill_std, out.request)
+        if self._orders is not None and self._orders.loading:
+            self._number = self._orders.loading
+        return LoadingNow(
+            now_ns, self._number, out.state, out.phase, out.attempts, out.fill, self._fill_std, out.request
+        )
 
     def _note(self, out: LoadingOutput) -> None:
         for note in out.notes:

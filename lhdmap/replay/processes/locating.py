@@ -17,9 +17,9 @@ from lhdmap.odometry.planar import PlanarOdometry
 from lhdmap.odometry.steps import OdometryStep
 from lhdmap.pipeline.localize import KnownMap, Localizer
 from lhdmap.replay.journal import Scribe
-from lhdmap.replay.process import LOCATED, MILLISECOND_NS, POSE, SEEN, Outgoing, Process, Received
+from lhdmap.replay.process import LOCATED, MILLISECOND_NS, PILE, POSE, SEEN, Outgoing, Process, Received
 from lhdmap.replay.processes.perception import PERCEPTION
-from lhdmap.replay.processes.scouting import live
+from lhdmap.replay.processes.scouting import PileAhead, live
 from lhdmap.replay.processes.told import Seen
 from lhdmap.roles import BUILD_MAP, ROLES, read_by
 
@@ -33,11 +33,19 @@ class Locating(Process):
     reads = tuple(_ROLE_OF)
 
     def __init__(
-        self, known: KnownMap, settings: Settings, machine: Machine, start: FloatArray | None, scribe: Scribe
+        self,
+        known: KnownMap,
+        settings: Settings,
+        machine: Machine,
+        start: FloatArray | None,
+        scribe: Scribe,
+        *,
+        pile: PileAhead | None = None,
     ) -> None:
-        self._scribe = scribe
+        """`pile`: looks for piles on the way; each new estimate is told."""
+        self._scribe, self._pile, self._told_ns = scribe, pile, 0
         self._seen: list[Seen] = []
-        self.localizer = Localizer(known, live(settings), machine, start, listener=self._listen)
+        self.localizer = Localizer(known, live(settings), machine, start, listener=self._listen, pile=pile)
         self._agreement = Agreement(self.localizer.pipeline.front_end.wheels.motion_between)
         scribe.goes("waiting", "no scan yet")
 
@@ -51,6 +59,10 @@ class Locating(Process):
         seen, self._seen = self._seen, []
         for one in seen:
             yield Outgoing(SEEN, one)
+        newest = None if self._pile is None else self._pile.newest
+        if newest is not None and newest.stamp_ns != self._told_ns:
+            self._told_ns = newest.stamp_ns
+            yield Outgoing(PILE, newest)
         fix = self.localizer.fix
         if seen and fix is not None:
             row = self.localizer.rows[-1]

@@ -44,7 +44,10 @@ class Errand(NamedTuple):
 
 
 class Navigator(Process):
-    """Plans once the place is known and the machine is armed; then a directive each 100 ms."""
+    """Plans once the place is known and the machine is armed; then a directive each 100 ms.
+
+    `errand`: where to; None: what the executive of a mission orders.
+    """
 
     name, period_ns, latency_ns, priority = NAVIGATION, 100 * MILLISECOND_NS, 5 * MILLISECOND_NS, 20
     reads = (*MOTION_TOPICS, LOCATED, MACHINE_SAYS, PLAN, STATION_SAYS)

@@ -42,10 +42,46 @@ class Digs(NamedTuple):
     touched_m: FloatArray
 
 
-class LoadingNow(NamedTuple):
-    """What the loading task does: state, phase, attempts, the last fill and its deviation (NaN: none), the open request."""
+class Orders(NamedTuple):
+    """What the executive of a mission asks for.
+
+    `number` counts what is asked of navigation: another one is another drive; no goal: stand. `loading`, `dumping`: number of the
+    task that is to run, 0: none; while one of loading runs, what navigation drives goes through the loading task.
+    """
 
     stamp_ns: int
+    number: int
+    goal: str
+    loaded: bool
+    loading: int = 0
+    dumping: int = 0
+
+
+class Navigating(NamedTuple):
+    """What navigation does: state, number of the order and goal that it is at, why, way to the goal (m, infinite: not known)."""
+
+    stamp_ns: int
+    state: str
+    number: int
+    goal: str
+    reason: str
+    left_m: float
+
+
+class DumpingNow(NamedTuple):
+    """What the dumping does: number of the task, and `busy`, `done` or `failed`, why."""
+
+    stamp_ns: int
+    task: int
+    state: str
+    reason: str = ""
+
+
+class LoadingNow(NamedTuple):
+    """What the loading task does: number of its mission, state, phase, attempts, the last fill (NaN: none), the open request."""
+
+    stamp_ns: int
+    number: int
     state: str
     phase: str
     attempts: int

@@ -1,0 +1,55 @@
+"""A mission as processes: the executive, and what a drive and a loading are made of."""
+
+from __future__ import annotations
+
+from lhdmap.driving.bodies import bodies_of
+from lhdmap.driving.model import drive_model
+from lhdmap.executor.control import Control
+from lhdmap.haulage.layout import checked
+from lhdmap.haulage.mission import MissionTask
+from lhdmap.haulage.mission_io import Buckets
+from lhdmap.haulage.of_map import layout_of_map
+from lhdmap.movement.routes import RoutePlanner
+from lhdmap.navigation.control import NavigationControl
+from lhdmap.replay.assemble_loading import guidance_of, task_of
+from lhdmap.replay.journal import Journal
+from lhdmap.replay.parts import Autonomous, Parts
+from lhdmap.replay.process import Process
+from lhdmap.replay.processes.dumps import DUMPS, Dumps
+from lhdmap.replay.processes.execute import EXECUTOR, PERIODS_S, Execute
+from lhdmap.replay.processes.executive import EXECUTIVE, Executive
+from lhdmap.replay.processes.guide import GUIDANCE, Guide
+from lhdmap.replay.processes.load import LOADS, Loads
+from lhdmap.replay.processes.locating import Locating
+from lhdmap.replay.processes.navigator import NAVIGATION
+from lhdmap.replay.processes.ordered import OrderedNavigation
+from lhdmap.replay.processes.perception import PERCEPTION
+from lhdmap.replay.processes.scouting import PileAhead
+from lhdmap.replay.processes.station import Station
+from lhdmap.replay.scenario import Scenario
+
+
+def mission_processes(scenario: Scenario, parts: Parts, given: Autonomous, journal: Journal) -> list[Process]:
+    """Return what runs a mission: perception on the map and of piles, executive, navigation, loading, dumping, and what drives."""
+    machine, settings = parts.machine, parts.settings
+    full_kg = machine.drive.payload_kg
+    models = drive_model(machine, 0.0), drive_model(machine, full_kg)
+    bodies, topology = bodies_of(machine), given.known.topology
+    navigation = NavigationControl(
+        RoutePlanner(topology, settings.movement), models[0], bodies, settings.navigation, journal.of(NAVIGATION).goes
+    )
+    orders = [Buckets(one.source, one.to, one.buckets) for one in scenario.mission]
+    layout = checked(layout_of_map(topology, scenario.mine))
+    executive = MissionTask(layout, park=scenario.start if scenario.start in layout.of("park") else "")
+    control = Control(models[0], bodies, settings.executor, PERIODS_S)
+    guidance = guidance_of(machine, models[0], bodies, settings)
+    return [
+        Locating(given.known, settings, machine, given.start, journal.of(PERCEPTION), pile=PileAhead(settings)),
+        Executive(executive, orders, topology, 1e-3 * full_kg, journal.of(EXECUTIVE)),
+        OrderedNavigation(navigation, journal.of(NAVIGATION)),
+        Loads(task_of(scenario.loading, settings, machine), None, journal.of(LOADS)),
+        Dumps(journal.of(DUMPS)),
+        Guide(guidance, settings.executor.jumps, journal.of(GUIDANCE), models=models),
+        Execute(control, machine, given.mode, journal.of(EXECUTOR), models=models),
+        Station(scenario.wanted_modes, scenario.rearm_s, scenario.assist_s, journal.of(Station.name)),
+    ]
