@@ -34,7 +34,7 @@ from lhdmap.replay.process import (
     Received,
 )
 from lhdmap.replay.processes.feed import MOTION_TOPICS, MotionFeed
-from lhdmap.replay.processes.told import Asked, Digs, Health, Idle, ModeNow, Seen, Word
+from lhdmap.replay.processes.told import Asked, Digs, Health, Idle, ModeNow, Orders, Seen, Word
 from lhdmap.roles import ROLES
 
 EXECUTOR = "executor"
