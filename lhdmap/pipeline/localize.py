@@ -150,6 +150,7 @@ class Localizer:
         self._near: tuple[FloatArray, FloatArray] | None = None
         self._listener = listener
         self._time_ns = 0
+        self.digs = False  # what is seen is known to differ from the map then: a place is not given up for that
         self.start: Start | None = None  # which of several it was
         self._travelled_m = 0.0
         self._probability = 0.0 if start is None else 1.0
@@ -338,7 +339,7 @@ class Localizer:
 
     def _judge(self) -> None:
         """Decide by the support whether the place still holds."""
-        if self._tracker is None or self._status == LOST or not self._supports:
+        if self._tracker is None or self._status == LOST or not self._supports or self.digs:
             return
         holds = float(np.mean(self._supports)) >= self._wanted_support()
         if not holds and len(self._supports) == self._supports.maxlen:
@@ -421,7 +422,7 @@ class Localizer:
             self.withheld += bool(said.candidates)
         elif said.purpose == CONFIRM and said.confirms:
             self._status, self._trial = TRACKING, None
-        elif said.purpose == CONFIRM or self._denied_again(said):
+        elif said.purpose == CONFIRM or (self._denied_again(said) and not self.digs):
             self._drop(said.denied or said.refused or "a search finds another place")
 
     def _denied_again(self, said: Search) -> bool:

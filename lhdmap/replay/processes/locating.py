@@ -8,6 +8,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from lhdmap.config import Settings
+from lhdmap.loading.states import ASSISTANCE, State
 from lhdmap.localization.agreement import Agreement
 from lhdmap.localization.rows import TRACKING
 from lhdmap.machine import Machine
@@ -17,7 +18,7 @@ from lhdmap.odometry.planar import PlanarOdometry
 from lhdmap.odometry.steps import OdometryStep
 from lhdmap.pipeline.localize import KnownMap, Localizer
 from lhdmap.replay.journal import Scribe
-from lhdmap.replay.process import LOCATED, MILLISECOND_NS, PILE, POSE, SEEN, Outgoing, Process, Received
+from lhdmap.replay.process import LOADING, LOCATED, MILLISECOND_NS, PILE, POSE, SEEN, Outgoing, Process, Received
 from lhdmap.replay.processes.perception import PERCEPTION
 from lhdmap.replay.processes.scouting import PileAhead, live
 from lhdmap.replay.processes.told import Seen
@@ -26,11 +27,14 @@ from lhdmap.roles import BUILD_MAP, ROLES, read_by
 _ROLE_OF = {ROLES[name].topic: name for name in read_by(BUILD_MAP)}
 
 
+_DIGS = (State.CHARGING, State.EXCAVATION, State.PULL_BACK, State.HELD, *ASSISTANCE)
+
+
 class Locating(Process):
     """Gives the pose of now in `odom`, the hits of each processed scan, and the place on the map."""
 
     name, period_ns, priority = PERCEPTION, 20 * MILLISECOND_NS, 10
-    reads = tuple(_ROLE_OF)
+    reads = (*_ROLE_OF, LOADING)
 
     def __init__(
         self,
@@ -80,7 +84,10 @@ class Locating(Process):
 
     def _feed(self, inbox: Sequence[Received]) -> None:
         for received in inbox:
-            self.localizer.update(_ROLE_OF[received.topic], received.message)
+            if received.topic == LOADING:
+                self.localizer.digs = received.message.state in _DIGS
+            else:
+                self.localizer.update(_ROLE_OF[received.topic], received.message)
 
     def _listen(self, stamp_ns: int, step: OdometryStep, odometry: PlanarOdometry) -> None:
         if not step.processed:
