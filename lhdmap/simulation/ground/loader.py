@@ -28,9 +28,10 @@ from lhdmap.simulation.ground.sections import Grounds
 from lhdmap.simulation.ground.truth import Truth, toe_of, truth_of
 
 SUB_STEP_S = 0.002
+_PRESSED_RAD = -0.04  # floor of a bucket that is pressed down: what it holds stays while it charges
 BOULDER_WAY_M = 0.6
 """Way of the lip in rock after which the boulder of an attempt has fallen into the bucket."""
-_ORIGIN_M, _CELLS = -4.0, 340  # of the pile's cells; the toe begins at x = 0
+_ORIGIN_M, _CELLS = -16.0, 580  # of the pile's cells; the toe begins at x = 0
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,7 +79,7 @@ class Loader:
         self._digs += dug * float(rig["width_m"]) > DUG_M3  # a charge that ended early loosens nothing
         beside = dug * float(rock["lateral_share"])
         state["lateral_m3"] += beside * rig["width_m"]
-        lost = max(float(state["content_m3"][0]) - capacity(rock, rig, 0.0), 0.0)
+        lost = max(float(state["content_m3"][0]) - capacity(rock, rig, _PRESSED_RAD), 0.0)
         state["content_m3"] -= lost
         state["spilled_m3"] += lost
         toe = round((toe_of(scene.heights, _ORIGIN_M) - _ORIGIN_M) / CELL_M)

@@ -24,7 +24,7 @@ from lhdmap.simulation.ground.sections import Grounds
 from lhdmap.simulation.ground.truth import toe_of
 
 TURN_NS, SHOW_NS = 100_000_000, 500_000_000
-_REACH_M = 8.0  # a pile so far ahead of a lowered lip is the one that it will dig
+_REACH_M = 7.0  # a pile so far ahead of a lowered lip is the one that it will dig
 _LEFT_M = 9.0  # a lip so far before the toe has left it
 _PILE_M = 0.15
 _ASKEW_RAD = 0.15
