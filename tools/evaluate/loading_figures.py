@@ -18,12 +18,21 @@ from lhdmap.simulation.ground.sections import load_ground
 
 from tools.evaluate.loading_charges import MIX, Charges, charge_all
 from tools.evaluate.loading_loads import Dug, Plan, run_load, with_common, with_paper
-from tools.evaluate.loading_weighing import weigh_all
+from tools.evaluate.loading_weighed import weigh_in_loop
+from tools.evaluate.loading_weighing import Found, weigh_all
 
 METHODS = ("paper", "paper-tuned", "adaptive")
 HAULS_S = (60.0, 180.0, 600.0)
 OVERHEAD_S = 20.0
-_TABLES, _METHODS, _OTHERS, _ERRATA, _CHARGES, _REATTEMPT = 1000, 2000, 3000, 4000, 5000, 6000  # first seeds
+_TABLES, _METHODS, _OTHERS, _ERRATA, _CHARGES, _REATTEMPT, _WEIGHED = (
+    1000,
+    2000,
+    3000,
+    4000,
+    5000,
+    6000,
+    7000,
+)  # first seeds
 Digs = list[list[Dug]]
 
 
@@ -191,12 +200,19 @@ def weighing(count: int = 0) -> dict[str, Any]:
         ("mean", "mean", True, False),
         ("mean, noise and swings alone", "mean", False, False),
     ):
-        one = weigh_all(replace(settings, method=method), count or 600, 7, static=static, tare=tare)
-        found[name] = {
-            "n": len(one.error), "bias": float(one.error.mean()), "std": float(one.error.std()), "told": float(one.told.mean()),
-            "settling_s": [float(np.quantile(one.settling_s, q)) for q in (0.5, 0.95)], "unsettled": one.unsettled,
-        }  # fmt: skip
+        found[name] = _weighed(weigh_all(replace(settings, method=method), count or 600, 7, static=static, tare=tare))
+    plan = Plan("adaptive", "fused")
+    for name, tare in (("in the loop, with a tare", True), ("in the loop, without", False)):
+        found[name] = _weighed(weigh_in_loop(plan, _WEIGHED, count or 200, tare=tare))
     return found
+
+
+def _weighed(one: Found) -> dict[str, Any]:
+    return {
+        "n": len(one.error), "bias": float(one.error.mean()), "std": float(one.error.std()), "told": float(one.told.mean()),
+        "rms": float(np.sqrt((one.error**2).mean())), "unsettled": one.unsettled,
+        "settling_s": [float(np.quantile(one.settling_s, q)) for q in (0.5, 0.95)],
+    }  # fmt: skip
 
 
 def attempts(count: int = 0) -> dict[str, Any]:
