@@ -46,7 +46,7 @@ class At(NamedTuple):
 
     def row(self) -> FloatArray:
         """Return nothing: no sensor looks."""
-        return np.zeros(17)
+        return np.zeros(20)
 
 
 class Pose(NamedTuple):

@@ -14,6 +14,8 @@ from lhdmap.simulation.ground.records import Record, Rock, record
 from lhdmap.simulation.ground.sections import Grounds
 
 CELL_M = 0.05
+DUG_M3 = 0.1
+"""Taken from a pile in an attempt: less was no dig, and loosens nothing."""
 _NOISE = 400
 _WAY_M = 8.0  # of the lip in rock that has boulders
 
@@ -101,6 +103,6 @@ def draw_attempt(ground: Grounds, seed: int, attempt: int, begin_m: float, way_m
 
 
 def hardness_factor(ground: Grounds, seed: int, attempt: int) -> float:
-    """Return the hardness of an attempt (1 is the first) over the load's: looser each time, and by chance."""
+    """Return the hardness of an attempt that digs (1 is the first) over the load's: looser each time, and by chance."""
     by_chance = ground.rock.attempt_sigma * float(generator(seed, 3, attempt).standard_normal())
     return float(ground.rock.loosened ** (attempt - 1) * math.exp(by_chance))

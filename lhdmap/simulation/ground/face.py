@@ -28,11 +28,11 @@ def capacity(rock: Record, rig: Record, psi_rad: float) -> float:
 
 @nb.njit(cache=True, nogil=True)
 def height_at(heights: FloatArray, rock: Record, x_m: float) -> float:
-    """Return the pile's height at x, linear between the middles of cells."""
+    """Return the pile's height at x, linear between the middles of cells; before the first cell there is none."""
     place = (x_m - rock.origin_m) / rock.step_m
     i = math.floor(place)
     if i < 0:
-        return heights[0]
+        return 0.0
     if i + 1 >= len(heights):
         return heights[-1]
     return heights[i] + (place - i) * (heights[i + 1] - heights[i])

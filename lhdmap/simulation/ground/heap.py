@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from typing import NamedTuple
 
 import numpy as np
 from scipy.ndimage import gaussian_filter, map_coordinates
@@ -29,6 +30,22 @@ FloorAt = Callable[[FloatArray], FloatArray]
 """Floor's height (...,) at points (..., 2) of `map`."""
 
 
+class _Around(NamedTuple):
+    """Which cells are in the drift, the floor's height in them, and which are the far end; all (N, M)."""
+
+    open_cells: Bools
+    floor_m: FloatArray
+    far_end: Bools
+
+
+class _Layers(NamedTuple):
+    """What goes with the cells, (N, M): stones over the smooth surface, heights that are fed, heights before any digging."""
+
+    stones_m: FloatArray
+    fed_m: FloatArray
+    was_m: FloatArray
+
+
 class Heap:
     """A pile that changes. `heights_m` (N, M) are over the floor in the cells of `grid`; `came_m3` has come from behind."""
 
@@ -41,13 +58,12 @@ class Heap:
         far_m = (grid.shape[0] - 1) * ALONG_M - _FED_M if fed else math.inf
         self._behind = (grid.x_m, grid.y_m, grid.heading_rad, far_m)
         self.heights_m: FloatArray = np.maximum(heights_m, 0.0)
-        self._open, self._floor_m, self._back = self._surroundings(grid)
+        self._around = self._surroundings(grid)
         smooth = gaussian_filter(self.heights_m, (0.3 / ALONG_M, 0.3 / ACROSS_M), mode="nearest")
-        self.texture_m = np.where(self.heights_m > _SHOWN_M, self.heights_m - smooth, 0.0)
-        self.heights_m = np.where(self._open, np.maximum(smooth, 0.0), 0.0)
+        stones = np.where(self.heights_m > _SHOWN_M, self.heights_m - smooth, 0.0)
+        self.heights_m = np.where(self._around.open_cells, np.maximum(smooth, 0.0), 0.0)
         self.settle()
-        self._fed_m = self.heights_m.copy()
-        self._was_m = self.heights_m.copy()
+        self._layers = _Layers(stones, self.heights_m.copy(), self.heights_m.copy())
 
     @property
     def volume_m3(self) -> float:
@@ -60,20 +76,22 @@ class Heap:
         height: FloatArray = map_coordinates(self.heights_m, at, order=1, mode="constant")
         return height
 
+    @property
+    def stones_m(self) -> FloatArray:
+        """Height of stones over the smooth surface, shape (N, M)."""
+        return self._layers.stones_m
+
     def turn_to(self, through_m: FloatArray, heading_rad: float) -> int:
         """Turn the grid to a heading (rad) through a point (x, y); returns the first column on its left. Volume is kept."""
         grid = turned(self._home, through_m, heading_rad)
         at = np.moveaxis(self.grid.places(grid.points()), 2, 0)
         old, volume = self.heights_m, self.volume_m3
-        fields = [
-            map_coordinates(one, at, order=1, mode="constant")
-            for one in (old, self.texture_m, self._fed_m, self._was_m)
-        ]
+        fields = [map_coordinates(one, at, order=1, mode="constant") for one in (old, *self._layers)]
         self.grid = grid
-        self._open, self._floor_m, self._back = self._surroundings(grid)
-        self.heights_m = np.where(self._open, fields[0], 0.0)
+        self._around = self._surroundings(grid)
+        self.heights_m = np.where(self._around.open_cells, fields[0], 0.0)
         self.heights_m *= volume / max(self.volume_m3, 1e-9)
-        self.texture_m, self._fed_m, self._was_m = fields[1:]
+        self._layers = _Layers(*fields[1:])
         return round(grid.places(through_m)[1] + 0.5)
 
     def slice_m(self, first: int, last: int) -> FloatArray:
@@ -83,14 +101,14 @@ class Heap:
     def give_back(self, first: int, last: int, slice_m: FloatArray) -> None:
         """Take the heights (N,) that the side view made of `slice_m`."""
         change = slice_m - self.slice_m(first, last)
-        spread_back(self.heights_m, self._open, first, last, change)
+        spread_back(self.heights_m, self._around.open_cells, first, last, change)
         self.version += bool(np.abs(change).max() > _SEEN_M)
 
     def slide(self, dt_s: float, per_s: float, bucket: tuple[int, int, int, int] = _NO_BUCKET) -> None:
         """Let it slide for a while, at a rate per second, around a bucket (`field.slide_field`)."""
         worst, most = 0.0, max(1, round(dt_s * per_s * _SWEEPS))
         for k in range(most):
-            worst = slide_field(self.heights_m, self._open, self.slope, 0.8, bucket, down=k % 2 == 0)
+            worst = slide_field(self.heights_m, self._around.open_cells, self.slope, 0.8, bucket, down=k % 2 == 0)
             if worst < _STANDS_M:
                 break
         self._feed()
@@ -100,7 +118,10 @@ class Heap:
     def settle(self) -> None:
         """Let it slide until it stands."""
         for k in range(_MOST_SWEEPS):
-            if slide_field(self.heights_m, self._open, self.slope, 1.0, _NO_BUCKET, down=k % 2 == 0) < _STANDS_M:
+            if (
+                slide_field(self.heights_m, self._around.open_cells, self.slope, 1.0, _NO_BUCKET, down=k % 2 == 0)
+                < _STANDS_M
+            ):
                 break
         self.calm = True
         self.version += 1
@@ -108,25 +129,25 @@ class Heap:
     def mesh(self) -> Mesh:
         """Return its surface in `map`: cells of 0.1 m; where there is no ore it is under the floor."""
         height = self.heights_m
-        kept = np.exp(-np.abs(height - self._was_m) / 0.05)  # what was not dug has its stones still
-        shown = np.maximum(height + kept * self.texture_m, 0.0)
-        z = self._floor_m + np.where(self._open & (shown > _SHOWN_M), shown, -_BURIED_M)
+        kept = np.exp(-np.abs(height - self._layers.was_m) / 0.05)  # what was not dug has its stones still
+        shown = np.maximum(height + kept * self._layers.stones_m, 0.0)
+        z = self._around.floor_m + np.where(self._around.open_cells & (shown > _SHOWN_M), shown, -_BURIED_M)
         points = np.concatenate([self.grid.points(), z[:, :, None]], axis=2)[::_EVERY]
         rows, columns = points.shape[:2]
         faces = sheet(rows, columns)
         ore = (height[::_EVERY] > _SHOWN_M).ravel()[faces].any(axis=1)
         return Mesh(points.reshape(-1, 3), faces[ore] if ore.any() else faces[:1])
 
-    def _surroundings(self, grid: Grid) -> tuple[Bools, FloatArray, Bools]:
-        """Return which cells of a grid are in the drift, the floor's height in them, and which of them are the far end."""
+    def _surroundings(self, grid: Grid) -> _Around:
+        """Return what is around the cells of a grid."""
         points = grid.points()
         inside = self._inside(points)
         x, y, heading, from_m = self._behind
         along = (points - np.array([x, y])) @ np.array([math.cos(heading), math.sin(heading)])
-        return inside, self._floor(points), (along >= from_m) & inside
+        return _Around(inside, self._floor(points), (along >= from_m) & inside)
 
     def _feed(self) -> None:
         """Fill the far end up to what it was."""
-        missing = np.where(self._back, np.maximum(self._fed_m - self.heights_m, 0.0), 0.0)
+        missing = np.where(self._around.far_end, np.maximum(self._layers.fed_m - self.heights_m, 0.0), 0.0)
         self.heights_m += missing
         self.came_m3 += float(missing.sum()) * CELL_M2

@@ -17,7 +17,7 @@ import numpy as np
 from lhdmap.loading.signals import Pedals, Signals
 from lhdmap.machine import Machine
 from lhdmap.messages import FloatArray
-from lhdmap.simulation.ground.draws import CELL_M, Attempt, Load, draw_attempt, draw_load, hardness_factor
+from lhdmap.simulation.ground.draws import CELL_M, DUG_M3, Attempt, Load, draw_attempt, draw_load, hardness_factor
 from lhdmap.simulation.ground.face import capacity, put_ahead, settle, take_boulder
 from lhdmap.simulation.ground.hearing import Hearing
 from lhdmap.simulation.ground.kernel import World, advance
@@ -28,9 +28,10 @@ from lhdmap.simulation.ground.sections import Grounds
 from lhdmap.simulation.ground.truth import Truth, toe_of, truth_of
 
 SUB_STEP_S = 0.002
+_PRESSED_RAD = -0.04  # floor of a bucket that is pressed down: what it holds stays while it charges
 BOULDER_WAY_M = 0.6
 """Way of the lip in rock after which the boulder of an attempt has fallen into the bucket."""
-_ORIGIN_M, _CELLS = -4.0, 340  # of the pile's cells; the toe begins at x = 0
+_ORIGIN_M, _CELLS = -16.0, 580  # of the pile's cells; the toe begins at x = 0
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,7 +67,7 @@ class Loader:
         heights = np.clip(x * rock["slope"], 0.0, load.crest_m)
         kg_m3 = float(rock["density"][0] / rock["swell"][0])
         self._scene = _Scene(seed, load, rig_of(self.machine, load.tilt_factor), rock, heights, record(State()), kg_m3)
-        self._number, self._now_ns = 0, time_ns
+        self._number, self._digs, self._now_ns = 0, 0, time_ns
         return self._attempt(approach_m)
 
     def retry(self, *, approach_m: float = 7.0) -> Signals:
@@ -75,9 +76,10 @@ class Loader:
         rig, rock = scene.rig[0], scene.rock[0]
         settle(state[0], rig, rock, scene.heights)
         dug = max(self._begun_m2 - float(scene.heights.sum()) * CELL_M, 0.0)
+        self._digs += dug * float(rig["width_m"]) > DUG_M3  # a charge that ended early loosens nothing
         beside = dug * float(rock["lateral_share"])
         state["lateral_m3"] += beside * rig["width_m"]
-        lost = max(float(state["content_m3"][0]) - capacity(rock, rig, 0.0), 0.0)
+        lost = max(float(state["content_m3"][0]) - capacity(rock, rig, _PRESSED_RAD), 0.0)
         state["content_m3"] -= lost
         state["spilled_m3"] += lost
         toe = round((toe_of(scene.heights, _ORIGIN_M) - _ORIGIN_M) / CELL_M)
@@ -133,7 +135,7 @@ class Loader:
         self._begun_m2 = float(scene.heights.sum()) * CELL_M
         chance = self._chance
         self._world = World(scene.heights, scene.load.table, chance.noise, chance.strikes, chance.bumps)
-        scene.rock["hardness"] = scene.load.rock["hardness"] * hardness_factor(self.ground, scene.seed, self._number)
+        scene.rock["hardness"] = scene.load.rock["hardness"] * hardness_factor(self.ground, scene.seed, self._digs + 1)
         press_m = press_force_n(self.machine, self.ground.floor.press_bar) / float(scene.rig["floor_stiffness"][0])
         bucket = bucket_for(self.machine, chance.lip_high_m if chance.lip_high_m > 0.0 else -press_m)
         boom = self.machine.linkage.boom_min_rad

@@ -19,7 +19,7 @@ from lhdmap.simulation.ground.sections import Grounds
 from lhdmap.simulation.mine_world.world import MineWorld
 from lhdmap.simulation.raycast import Surface
 
-_BEFORE_M = 6.0  # of the grid before the toe
+_BEFORE_M = 8.0  # of the grid before the toe
 _STATION_M = 0.1
 _BESIDE_M = 0.2  # how far ore reaches into a rough wall
 _NOT_ORE = ("wall", "hang_up")  # nothing to dig at the floor

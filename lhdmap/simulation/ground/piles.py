@@ -14,7 +14,7 @@ import numpy as np
 
 from lhdmap.messages import FloatArray
 from lhdmap.simulation.drift import Mesh
-from lhdmap.simulation.ground.draws import Attempt, draw_attempt, draw_load, hardness_factor
+from lhdmap.simulation.ground.draws import DUG_M3, Attempt, draw_attempt, draw_load, hardness_factor
 from lhdmap.simulation.ground.face import BUCKET_LENGTH_M
 from lhdmap.simulation.ground.field import ACROSS_M, ALONG_M
 from lhdmap.simulation.ground.heap import Heap
@@ -24,7 +24,7 @@ from lhdmap.simulation.ground.sections import Grounds
 from lhdmap.simulation.ground.truth import toe_of
 
 TURN_NS, SHOW_NS = 100_000_000, 500_000_000
-_REACH_M = 8.0  # a pile so far ahead of a lowered lip is the one that it will dig
+_REACH_M = 7.0  # a pile so far ahead of a lowered lip is the one that it will dig
 _LEFT_M = 9.0  # a lip so far before the toe has left it
 _PILE_M = 0.15
 _ASKEW_RAD = 0.15
@@ -44,6 +44,7 @@ class Cut:
     world: World
     chance: Attempt
     number: int
+    begun_m3: float
 
     def place_m(self, x_m: float, y_m: float) -> float:
         """Return where a point of `map` is along the heading."""
@@ -76,7 +77,7 @@ class Piles:
     cut: Cut | None = None
     attempts: int = 0
     _loads: int = 0
-    _of_load: int = 0
+    _digs: int = 0
     _turned_ns: int = -1
     _shown_ns: int = -1
     _shown: dict[str, int] = field(default_factory=dict)
@@ -115,8 +116,8 @@ class Piles:
                 return
 
     def _cut(self, name: str, heap: Heap, lip_m: FloatArray, heading_rad: float, load_kg: float) -> Cut:
-        self._of_load = 1 if load_kg < _EMPTY_KG else self._of_load + 1
-        self._loads += load_kg < _EMPTY_KG
+        if load_kg < _EMPTY_KG and self._digs > 0:  # what was dug has been dumped: a new load
+            self._loads, self._digs = self._loads + 1, 0
         self.attempts += 1
         heap.settle()
         left, half = heap.turn_to(lip_m, heading_rad), round(0.5 * self.width_m / ACROSS_M)
@@ -124,18 +125,20 @@ class Piles:
         load = draw_load(self.ground, seed)
         rock = load.rock.copy()
         rock["origin_m"], rock["step_m"], rock["slope"], rock["lateral_share"] = 0.0, ALONG_M, heap.slope, 0.0
-        rock["hardness"] *= hardness_factor(self.ground, seed, self._of_load)
+        rock["hardness"] *= hardness_factor(self.ground, seed, self._digs + 1)
         columns = (left - half, left + half - 1)
         heights = heap.slice_m(*columns)
         toe, along = toe_of(heights, 0.0), float(heap.grid.places(lip_m)[0]) * ALONG_M
-        chance = draw_attempt(self.ground, seed, self._of_load, along, max(toe - along, 0.0))
+        chance = draw_attempt(self.ground, seed, self.attempts, along, max(toe - along, 0.0))
         world = World(heights, load.table, chance.noise, chance.strikes, chance.bumps)
-        return Cut(name, heap, columns, rock, world, chance, self.attempts)
+        return Cut(name, heap, columns, rock, world, chance, self.attempts, heap.volume_m3 - heap.came_m3)
 
     def _end(self) -> None:
         if self.cut is not None:
-            self.cut.heap.give_back(*self.cut.columns, self.cut.world.heights)
-            self.cut.heap.calm = False
+            heap = self.cut.heap
+            heap.give_back(*self.cut.columns, self.cut.world.heights)
+            heap.calm = False
+            self._digs += self.cut.begun_m3 - (heap.volume_m3 - heap.came_m3) > DUG_M3
         self.cut = None
 
     def _exchange(self, now_ns: int) -> None:

@@ -35,8 +35,6 @@ from lhdmap.simulation.vehicle.vehicle import ROW, SUB_STEP_S, Vehicle, in_force
 _SIDE_STEP_S = 0.002
 _LOWERED_RAD, _RACKED_RAD = 0.15, 0.05  # from the upper stop: lowered from the first on, until the second
 
-_NO_WORLD = World(np.zeros(40), np.zeros((15, 3)), np.ones(1), np.zeros((0, 3)), np.zeros((0, 3)))
-
 
 class LoadingVehicle:
     """A drop-in for `Vehicle` that digs in piles, weighs and dumps; `seed` decides how far it is from its file.
@@ -53,7 +51,7 @@ class LoadingVehicle:
         self._rig = rig_of(machine, hydraulic.tilt_factor * max(1.0 + hydraulic.tilt_spread * spread, 0.4))
         self._kg_m3 = 1e3 * self.piles.ground.rock.density_t_m3 / filling.swell
         self._gauges = Gauges(machine, seed)
-        self._loose = _loose_rock(self.piles.ground)
+        self._loose, self._nothing = _loose_rock(self.piles.ground), _no_pile()
 
     def at_rest(
         self,
@@ -104,11 +102,11 @@ class LoadingVehicle:
         rock["friction"] = self._ground.friction(np.array(state[1:4]))
         propel, _, tilt, lift, full_rpm, brake = within(command)
         pedals = np.array([propel, tilt, lift, full_rpm, brake])
-        world = _NO_WORLD if cut is None else cut.world
+        world = self._nothing if cut is None else cut.world
         steps = max(1, round(dt_s / _SIDE_STEP_S))
         advance(side, self._rig, rock, world, pedals, steps, dt_s / steps)
         if cut is None:
-            _NO_WORLD.heights[:] = 0.0  # what fell is gone: over a dump, or too little to drive over
+            self._nothing.heights[:] = 0.0  # what fell is gone: over a dump, or too little to drive over
         elif cut.chance.boulder_m3 > 0.0 and side["way_m"][0] > BOULDER_WAY_M:
             take_boulder(side[0], self._rig[0], rock[0], world.heights, cut.chance.boulder_m3)
             cut.chance = cut.chance._replace(boulder_m3=0.0)
@@ -172,3 +170,7 @@ def _loose_rock(ground: Grounds) -> Record:
     rock["origin_m"], rock["step_m"] = 0.0, CELL_M
     rock["density"] = 1e3 * ground.rock.density_t_m3
     return rock
+
+
+def _no_pile() -> World:
+    return World(np.zeros(40), np.zeros((15, 3)), np.ones(1), np.zeros((0, 3)), np.zeros((0, 3)))

@@ -34,11 +34,12 @@ _SCENES = 2  # that are kept: a machine may go to and fro between two
 
 
 class Thing(NamedTuple):
-    """Something that stands in the mine: its mesh, the box around it (2, 3), and which of its kind it is."""
+    """Something that stands in the mine: its mesh, the box around it (2, 3), which of its kind it is, whether bodies touch it."""
 
     mesh: Mesh
     box_m: FloatArray
     version: int = 0
+    touched: bool = True
 
 
 class Skins(Protocol):
@@ -72,7 +73,6 @@ class MineWorld:
         self._here: tuple[tuple[float, ...], Surface] | None = None
         self._things: dict[str, Thing] = {}
         self._passing: dict[str, tuple[Thing, Surface]] = {}
-        self._dug: set[str] = set()
         self._version = 0
         self._taken_m: dict[str, float] = {}
         self._pits = _pits(network)
@@ -113,7 +113,7 @@ class MineWorld:
         return pieces + [
             f"{name}#{thing.version}"
             for name, thing in things.items()
-            if name not in self._dug and _overlap(thing.box_m[None], box_m)[0]
+            if thing.touched and _overlap(thing.box_m[None], box_m)[0]
         ]
 
     def solid(self, key: int | str) -> tuple[Mesh, npt.NDArray[np.bool_] | None]:
@@ -156,8 +156,7 @@ class MineWorld:
         if self._things.pop(name, None) is not None:
             self._scenes.clear()
             self._here = None
-        self._passing[name] = (_thing(mesh, self._version), Surface(mesh))
-        self._dug.add(name)
+        self._passing[name] = (_thing(mesh, self._version)._replace(touched=False), Surface(mesh))
 
     @property
     def things(self) -> Mapping[str, Thing]:
@@ -173,7 +172,8 @@ class MineWorld:
         """Yield the whole surface, piece by piece, and all things."""
         for index in range(len(self._boxes)):
             yield self.piece(index).mesh
-        for thing in [*self._things.values(), *(self._passing[name][0] for name in sorted(self._dug))]:
+        dug = [thing for _, (thing, _) in sorted(self._passing.items()) if not thing.touched]
+        for thing in [*self._things.values(), *dug]:
             yield thing.mesh
 
     # How it is made.

@@ -107,9 +107,11 @@ def test_a_bucket_that_is_dumped_gives_its_ore_back() -> None:
     assert loader.balance_m3() == pytest.approx(before, abs=5e-4)
 
 
-def test_loosened_rock_is_easier() -> None:
+def test_digging_loosens_the_rock_and_an_early_end_does_not() -> None:
     loader = Loader(MACHINE, quiet(rock={"attempt_sigma": 0.0, "loosened": 0.8}))
-    loader.begin(0)
-    first = loader.hardness
+    signals, first = loader.begin(0), loader.hardness
+    loader.retry()
+    assert loader.hardness == first
+    dug(loader, signals)
     loader.retry()
     assert loader.hardness == pytest.approx(0.8 * first)

@@ -92,5 +92,5 @@ def test_scanners_see_the_heights() -> None:
 
 def test_stones_are_seen_where_nothing_was_dug() -> None:
     one = heap(rough_m=0.1)
-    assert np.std(one.texture_m[one.heights_m > 0.5]) == pytest.approx(0.1, rel=0.2)
+    assert np.std(one.stones_m[one.heights_m > 0.5]) == pytest.approx(0.1, rel=0.2)
     assert math.isclose(one.volume_m3, heap().volume_m3, rel_tol=0.02)
