@@ -60,7 +60,7 @@ def tables(count: int = 0) -> dict[str, Any]:
     """Return Tables 3, 4 and 5 of the paper's method in each mine."""
     found = {}
     for number, ground in enumerate(mines()):
-        loads = loads_of(operator_plan(ground), _TABLES, count or (200 if number == 0 else 100))
+        loads = loads_of(operator_plan(ground), _TABLES, count or (200 if number == 0 else 60))
         found[ground] = tables_of([as_load(load) for load in loads]).to_json()
     return found
 
@@ -136,7 +136,7 @@ def paired(loads: Digs, base: Digs) -> dict[str, list[float]]:
 
 def errata(count: int = 0) -> dict[str, Any]:
     """Return the paper's law with each step as printed, or as another reading has it, on the default mine."""
-    base, many = operator_plan("default"), count or 60
+    base, many = operator_plan("default", approach_m=5.0), count or 30
     late = replace(base, charging=replace(base.charging, launch_s=0.0))
     variants = {
         "base: with the errata, Table 1": base,
@@ -147,13 +147,11 @@ def errata(count: int = 0) -> dict[str, Any]:
         "E4 hysteresis 0.05, lifts of 0.3 s": with_paper(base, hysteresis=0.05, lift_least_s=0.3),
         "E5 zero at the level floor": with_common(base, racked_rad=-0.83),
         "E6 no tolerance, the stop read as -0.02": with_common(base, alpha_tolerance_rad=0.0, racked_rad=0.02),
-        "E7 d_max 1.0 m": with_paper(base, advance_max_m=1.0),
         "E7 d_max 3.0 m": with_paper(base, advance_max_m=3.0),
         "E8 S_tilt with a lower bound": with_paper(base, tilt_ends_early=True),
         "E9 S_push ends by pressure alone": with_paper(base, pressure_needed=True),
         "no lift at all": with_paper(base, skid_max=5.0),
         "Δt_max 0.6 s": with_paper(base, phase_max_s=0.6),
-        "Δt_max 2.0 s": with_paper(base, phase_max_s=2.0),
     }
     found = {}
     for name, plan in variants.items():
@@ -164,18 +162,18 @@ def errata(count: int = 0) -> dict[str, Any]:
 
 
 def detection(count: int = 0) -> dict[str, Any]:
-    """Return what detectors make of the same 500 mixed charges."""
+    """Return what detectors make of the same 500 mixed charges; the lesser ones of each fourth."""
     many, settings = count or 500, ChargingSettings()
     seeds = range(_CHARGES, _CHARGES + many)
     found = {}
-    for name, detector, chosen in (
-        ("paper as printed, no launch guard", "paper", replace(settings, launch_s=0.0)),
-        ("paper, guard of 1.5 s", "paper", settings),
-        ("fused", "fused", settings),
-        ("fused without press relief", "fused", replace(settings, relief_s=0.0)),
-        ("fused without the range", "fused", replace(settings, gate_std=10.0, gate_m=5.0, relief_s=0.0)),
+    for name, detector, chosen, step in (
+        ("fused", "fused", settings, 1),
+        ("paper, guard of 1.5 s", "paper", settings, 1),
+        ("paper as printed, no launch guard", "paper", replace(settings, launch_s=0.0), 4),
+        ("fused without press relief", "fused", replace(settings, relief_s=0.0), 4),
+        ("fused without the range", "fused", replace(settings, gate_std=10.0, gate_m=5.0, relief_s=0.0), 4),
     ):
-        found[name] = _detected(charge_all(name, detector, chosen, seeds))
+        found[name] = _detected(charge_all(name, detector, chosen, seeds[::step]))
     return found
 
 
@@ -203,7 +201,7 @@ def weighing(count: int = 0) -> dict[str, Any]:
         found[name] = _weighed(weigh_all(replace(settings, method=method), count or 600, 7, static=static, tare=tare))
     plan = Plan("adaptive", "fused")
     for name, tare in (("in the loop, with a tare", True), ("in the loop, without", False)):
-        found[name] = _weighed(weigh_in_loop(plan, _WEIGHED, count or 200, tare=tare))
+        found[name] = _weighed(weigh_in_loop(plan, _WEIGHED, count or 60, tare=tare))
     return found
 
 
@@ -217,9 +215,9 @@ def _weighed(one: Found) -> dict[str, Any]:
 
 def attempts(count: int = 0) -> dict[str, Any]:
     """Return fills per hour by the rule and by all thresholds: half of the loads to fit the gains, half to judge."""
-    many, found = count or 200, {}
+    many, found = count or 120, {}
     for method in ("paper", "adaptive"):
-        plan = Plan(method, _detector(method), most=5, forced=True)
+        plan = Plan(method, _detector(method), most=5, forced=True, approach_m=3.0)
         loads = loads_of(plan, _REATTEMPT, many)
         fit, test = loads[: many // 2], loads[many // 2 :]
         found[method] = {f"{haul_s:.0f}": _hauled(fit, test, haul_s) for haul_s in HAULS_S}

@@ -198,17 +198,19 @@ def _detection(found: Found) -> str:
     ]
     lines += [
         (
-            f"| detector | right % | early % | none % | {' / '.join(MIX)}, right % | from the first "
+            f"| detector | charges | right % | early % | none % | {' / '.join(MIX)}, right % | from the first "
             f"touch, s | from 40 kN, s |"
         )
     ]
-    lines += ["| --- | --- | --- | --- | --- | --- | --- |"]
+    lines += ["| --- | --- | --- | --- | --- | --- | --- | --- |"]
     for name, row in found.items():
         delays = [
             " / ".join(f"{value:.2f}" for value in row[key]) if key in row else "-" for key in ("touch_s", "force_s")
         ]
         shares = [f"{100.0 * row[what]:.1f}" for what in ("right", "early", "none")]
-        lines.append(_cells([name, *shares, _slashes(100.0 * value for value in row["by"].values()), *delays]))
+        lines.append(
+            _cells([name, str(row["n"]), *shares, _slashes(100.0 * value for value in row["by"].values()), *delays])
+        )
     lines += [
         "",
         (
@@ -224,9 +226,9 @@ def _weighing(found: Found) -> str:
     lines = [
         "## Weighing",
         "",
-        "Fills 0.3 to 1.1: rocking at 1 to 2 Hz and a boom at 3 to 5 Hz, noise of 1.5 bar; zero 0.6 bar, friction 1.2 bar, load centre",
-        "2 %, boom's angle 1 % of a fill (1 σ, all assumed). In the loop: after the first dig of `adaptive` on the default mine, whose",
-        "friction always adds 1.2 bar after a lift from below: that is a bias, and a tare with the empty bucket takes it out.",
+        "Fills 0.3 to 1.1: rocking at 1 to 2 Hz and a boom at 3 to 5 Hz, noise of 1.5 bar; zero 0.6 bar, friction 1.2 bar,",
+        "load centre 2 %, boom's angle 1 % of a fill (1 σ, all assumed). In the loop: after the first dig of `adaptive` on the",
+        "default mine, whose friction always adds 1.2 bar after a lift from below: a bias, which a tare takes out.",
         "",
         "| | buckets | bias % | 1 σ % | rms % | σ as told % | settled s, median / 95 % | not settled % |",
         "| --- | --- | --- | --- | --- | --- | --- | --- |",
