@@ -180,7 +180,11 @@ class Digging:
         18.5, unit="bar", source="46 bar of free rolling, loading prototype", minimum=0.0, doc="Lost in the drive line."
     )
     leakage: float = setting(
-        0.02, source=_LOADING, minimum=0.0, maximum=0.5, doc="Speed lost by leakage at 300 bar, of first gear's."
+        0.1,
+        source="launch peaks of the loading prototype",
+        minimum=0.0,
+        maximum=0.5,
+        doc="Speed lost by leakage at 300 bar, of first gear's.",
     )
     stiffness_gpa_m3: float = setting(
         100.0, unit="GPa/m3", source=_LOADING, minimum=1.0, doc="Bulk modulus of the oil over the volume of its lines."
@@ -189,7 +193,7 @@ class Digging:
         2500.0, unit="kg m2", source=_LOADING, minimum=10.0, doc="Wheels and what turns with them."
     )
     idle: float = setting(
-        0.35,
+        0.4,
         source="0.87 m/s at pedal 0.5",
         minimum=0.05,
         maximum=1.0,

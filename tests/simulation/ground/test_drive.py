@@ -40,7 +40,7 @@ def test_free_rolling_at_half_pedal() -> None:
 
 def test_first_gear_at_full_pedal() -> None:
     state = run(State(engine=0.35), Pedals(1.0, full_rpm=True), 15.0)
-    assert state.speed_mps == pytest.approx(2.6, rel=0.02)
+    assert state.speed_mps == pytest.approx(2.6, rel=0.03)
 
 
 def test_a_wall_stalls_it_above_300_bar() -> None:
@@ -96,7 +96,8 @@ def test_power_limits_the_speed_uphill() -> None:
     state = run(
         State(engine=1.0, speed_mps=2.0, wheel_mps=2.0, pull_n=-100e3), Pedals(1.0, full_rpm=True), 15.0, friction=0.9
     )
-    assert state.pressure_pa * RIG["displacement_m3"][0] * state.wheel_mps / 0.8 == pytest.approx(150e3, rel=0.05)
+    flow = RIG["displacement_m3"][0] * state.wheel_mps / 0.8 + RIG["leakage_m3"][0] * state.pressure_pa
+    assert state.pressure_pa * flow == pytest.approx(150e3, rel=0.02)
 
 
 def test_brakes_hold_on_a_slope_without_creeping() -> None:
