@@ -117,6 +117,7 @@ def columns(loads: Digs) -> dict[str, np.ndarray]:
         "attempts": np.array([float(len(load)) for load in loads]),
         "first_dig_s": np.array([load[0].duration_s for load in loads]),
         "dig_s": np.array([sum(dig.duration_s for dig in load) for load in loads]),
+        "racked_s": np.array([sum(dig.duration_s + dig.rack_s for dig in load) for load in loads]),
         "slip_s": np.array([sum(dig.slip_s for dig in load) for load in loads]),
         "final": np.array([load[-1].fill for load in loads]),
     }
