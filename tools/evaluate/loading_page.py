@@ -20,10 +20,10 @@ tuned on; ± and brackets: 95 % of a mean. The mines beside the default one were
 """
 _TUNING = """\
 `paper` has the printed Table 1 and the printed detector; it is not tuned. `paper-tuned` and `adaptive` had the same search with
-the same budget (120 candidates on 10 loads, 16 on 30, 4 on 80; `tools.evaluate.loading_tune`), both on the default mine, with the
-fused detector; the mines were calibrated once more after the search. Same piles for all three; a load ends at 90 % as seen (σ 5 %),
-after six attempts at most. A dig lasts from the touch to its stop, as in the paper; `adaptive` ends with the bucket less far
-back, and the pull back racks it: "until racked" has that time in it, for all.
+the same budget (120 candidates on 10 loads, 16 on 30, 4 on 80; `tools.evaluate.loading_tune`), both on an earlier calibration of
+the default mine, with the fused detector. Same piles for all three; a load ends at 90 % as seen (σ 5 %), after six attempts at
+most. A dig lasts from the touch to its stop, as in the paper; `adaptive` ends with the bucket less far back, and the pull back
+racks it: "until racked" has that time in it, for all.
 """
 
 
