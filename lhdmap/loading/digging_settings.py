@@ -12,6 +12,7 @@ _TABLE_1 = "autonomous_loading, Table 1"
 _TABLE_2 = "autonomous_loading, Table 2"
 _PAPER = "autonomous_loading, section 3.3"
 _FINDINGS = "loading findings, sections 3 and 6"
+_SEARCHED = "searched for on a model: evaluation/loading.md"
 _NOT_PRINTED = "the paper prints none; loading findings, section 1"
 
 
@@ -152,17 +153,29 @@ class PaperDigSettings:
 class TunedDigSettings(PaperDigSettings):
     """The same law with numbers that were searched for with the same budget as those of `adaptive`: evaluation/loading.md."""
 
-    pedal: float = setting(0.74, minimum=0.0, maximum=1.0, source=_FINDINGS, doc="P_0.")
+    pedal: float = setting(0.698, minimum=0.0, maximum=1.0, source=_SEARCHED, doc="P_0.")
     ramp_per_s: float = setting(
-        0.6, unit="1/s", minimum=0.05, maximum=50.0, source=_FINDINGS, doc="R_0: slope of the tilt command."
+        3.73, unit="1/s", minimum=0.05, maximum=50.0, source=_SEARCHED, doc="R_0: slope of the tilt command."
     )
-    skid_max: float = setting(0.1, minimum=0.0, maximum=5.0, source=_FINDINGS, doc="The boom is lifted above it.")
-    boom_max_rad: float = setting(0.57, unit="rad", minimum=-1.0, maximum=2.0, source=_FINDINGS, doc="Stop: β_max.")
-    advance_max_m: float = setting(3.4, unit="m", minimum=0.1, maximum=10.0, source=_FINDINGS, doc="Stop: d_max.")
-    phase_max_s: float = setting(0.4, unit="s", minimum=0.02, maximum=10.0, source=_FINDINGS, doc="Δt_max of a state.")
-    phase_min_s: float = setting(0.2, unit="s", minimum=0.0, maximum=10.0, source=_FINDINGS, doc="Δt_min of a state.")
+    skid_max: float = setting(0.082, minimum=0.0, maximum=5.0, source=_SEARCHED, doc="The boom is lifted above it.")
+    boom_max_rad: float = setting(0.721, unit="rad", minimum=-1.0, maximum=2.0, source=_SEARCHED, doc="Stop: β_max.")
+    advance_max_m: float = setting(3.2, unit="m", minimum=0.1, maximum=10.0, source=_SEARCHED, doc="Stop: d_max.")
+    phase_max_s: float = setting(
+        0.566, unit="s", minimum=0.02, maximum=10.0, source=_SEARCHED, doc="Δt_max of a state."
+    )
+    phase_min_s: float = setting(0.585, unit="s", minimum=0.0, maximum=10.0, source=_SEARCHED, doc="Δt_min of a state.")
     pressure_max_bar: float = setting(
-        396.0, unit="bar", minimum=10.0, maximum=1000.0, source=_FINDINGS, doc="EP_max: S_push ends above it."
+        401.0, unit="bar", minimum=10.0, maximum=1000.0, source=_SEARCHED, doc="EP_max: S_push ends above it."
+    )
+    hysteresis: float = setting(
+        0.015,
+        minimum=0.0,
+        maximum=2.0,
+        source=_SEARCHED,
+        doc="Skid falls by so much below skid_max before the lift ends.",
+    )
+    lift_least_s: float = setting(
+        0.389, unit="s", minimum=0.0, maximum=5.0, source=_SEARCHED, doc="A lift once begun lasts so long at least."
     )
 
 
@@ -210,44 +223,44 @@ class ExcavationSettings:
     slope_s: float = setting(
         0.2, unit="s", minimum=0.06, maximum=2.0, doc="adaptive: window of the acceleration, a line through the speed."
     )
-    pedal: float = setting(0.8, minimum=0.05, maximum=1.0, source=_FINDINGS, doc="adaptive: pedal.")
+    pedal: float = setting(0.891, minimum=0.05, maximum=1.0, source=_SEARCHED, doc="adaptive: pedal.")
     pedal_slipping: float = setting(
-        0.65, minimum=0.0, maximum=1.0, source=_FINDINGS, doc="adaptive: share of the pedal while the wheels slip."
+        0.785, minimum=0.0, maximum=1.0, source=_SEARCHED, doc="adaptive: share of the pedal while the wheels slip."
     )
     force_kn: float = setting(
-        170.0, unit="kN", minimum=0.0, maximum=1000.0, source=_FINDINGS, doc="adaptive: tilt begins at this force."
+        146.0, unit="kN", minimum=0.0, maximum=1000.0, source=_SEARCHED, doc="adaptive: tilt begins at this force."
     )
     force_range_kn: float = setting(
-        143.0, unit="kN", minimum=1.0, maximum=2000.0, source=_FINDINGS, doc="adaptive: ... full so much above it."
+        92.2, unit="kN", minimum=1.0, maximum=2000.0, source=_SEARCHED, doc="adaptive: ... full so much above it."
     )
     advance_mps: float = setting(
-        0.01, unit="m/s", minimum=-1.0, maximum=2.0, source=_FINDINGS, doc="adaptive: tilt begins below this advance."
+        0.153, unit="m/s", minimum=-1.0, maximum=2.0, source=_SEARCHED, doc="adaptive: tilt begins below this advance."
     )
     advance_range_mps: float = setting(
-        0.1, unit="m/s", minimum=0.001, maximum=5.0, source=_FINDINGS, doc="adaptive: ... full so much below it."
+        0.928, unit="m/s", minimum=0.001, maximum=5.0, source=_SEARCHED, doc="adaptive: ... full so much below it."
     )
     skid_max: float = setting(
-        0.22, minimum=0.0, maximum=5.0, source=_FINDINGS, doc="adaptive: the boom is lifted above this skid."
+        0.082, minimum=0.0, maximum=5.0, source=_SEARCHED, doc="adaptive: the boom is lifted above this skid."
     )
     lag_matched: bool = setting(
         True, source="finding E3", doc="adaptive: Eq. (7) with the wheels of the scan's moment."
     )
     skid_smooth_s: float = setting(
-        0.2,
+        0.365,
         unit="s",
         minimum=0.0,
         maximum=5.0,
         doc="adaptive: time constant of the skid, whose noise is that of the scans.",
     )
     hysteresis: float = setting(
-        0.05, minimum=0.0, maximum=2.0, doc="adaptive: skid falls by so much before the lift ends."
+        0.016, minimum=0.0, maximum=2.0, doc="adaptive: skid falls by so much before the lift ends."
     )
-    lift_least_s: float = setting(0.1, unit="s", minimum=0.0, maximum=5.0, doc="adaptive: least time of a lift.")
+    lift_least_s: float = setting(0.389, unit="s", minimum=0.0, maximum=5.0, doc="adaptive: least time of a lift.")
     boom_max_rad: float = setting(
-        0.62, unit="rad", minimum=-1.0, maximum=2.0, source=_FINDINGS, doc="adaptive: stop β_max."
+        0.728, unit="rad", minimum=-1.0, maximum=2.0, source=_SEARCHED, doc="adaptive: stop β_max."
     )
     advance_max_m: float = setting(
-        3.4, unit="m", minimum=0.1, maximum=10.0, source=_FINDINGS, doc="adaptive: stop d_max."
+        2.71, unit="m", minimum=0.1, maximum=10.0, source=_SEARCHED, doc="adaptive: stop d_max."
     )
     resists_kn: float = setting(
         100.0,
@@ -257,7 +270,7 @@ class ExcavationSettings:
         doc="adaptive: the way of d_max begins at this force, or after 2 m.",
     )
     stuck_s: float = setting(
-        0.8,
+        0.647,
         unit="s",
         minimum=0.1,
         maximum=30.0,
@@ -268,11 +281,11 @@ class ExcavationSettings:
         0.02, unit="rad/s", minimum=0.0, maximum=1.0, doc="adaptive: slower is no tilt, no lift."
     )
     back_off_s: float = setting(
-        0.9,
+        1.18,
         unit="s",
         minimum=0.0,
         maximum=10.0,
-        source=_FINDINGS,
+        source=_SEARCHED,
         doc="adaptive: reverse pulse of a stuck machine; 0: none.",
     )
     back_off_pedal: float = setting(

@@ -89,15 +89,20 @@ def _figure9(section: str, found: Mapping[str, Any]) -> dict[str, Case]:
     return {f"{section}.{key}": case for key, case in values.items()}
 
 
-def _dig_case(section: str, probe: str) -> dict[str, Case]:
-    """Return the cases of the paper's law that begin at nought."""
+def _dig_case(section: str, probe: str, least_s: float) -> dict[str, Case]:
+    """Return the cases of the paper's law where half as much again does not show; pressure ends S_push before its time."""
+    pressed = {f"{section}.phase_max_s": 2.0, f"{section}.phase_min_s": 0.2, f"{section}.pressure_max_bar": 300.0}
     return {
         f"{section}.hysteresis": Case(probe, 0.2),
-        f"{section}.lift_least_s": Case(probe, 0.4),
+        f"{section}.lift_least_s": Case(probe, least_s),
         f"{section}.boom_max_rad": Case(probe, -0.3),
+        f"{section}.phase_min_s": Case(probe, 0.6, pressed),
+        f"{section}.pressure_max_bar": Case(probe, 150.0, pressed),
+        f"{section}.tilt_ends_early": Case(probe, True, pressed),
     }
 
 
+_NOISY_SKID = {"excavation.skid_smooth_s": 0.0, "excavation.skid_max": 0.1, "excavation.lift_least_s": 0.0}
 _WAITS = {"cloud_odometry.step_m": 5.0, "cloud_odometry.step_deg": 50.0, "cloud_odometry.step_s": 60.0}
 _PRINTED = {"guidance.method": "paper", "guidance.samples": 16, "guidance.rounds": 2}
 _LOADING_CYCLE = (
@@ -212,9 +217,11 @@ _SETTINGS = {
     "excavation.alpha_max_rad": Case("dug_as_printed", -0.6),
     "excavation.alpha_tolerance_rad": Case("dug_as_printed", 0.5),
     "excavation.boom_max_rad": Case("dug", -0.3),
+    "excavation.hysteresis": Case("dug", 0.5, _NOISY_SKID),
+    "excavation.lift_least_s": Case("dug", 3.0, _NOISY_SKID),
     "excavation.stuck_rps": Case("dug", 1.0),
-    **_dig_case("excavation_paper", "dug_as_printed"),
-    **_dig_case("excavation_tuned", "dug_tuned"),
+    **_dig_case("excavation_paper", "dug_as_printed", 0.4),
+    **_dig_case("excavation_tuned", "dug_tuned", 0.0),
     "attempts.full": Case("decided", base={"attempts.rule": "threshold"}),
     "pile.reach_m": Case("pile", 15.0),
     "pile.deadline_m": Case("pile", 20.0),

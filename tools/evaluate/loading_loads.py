@@ -67,6 +67,7 @@ class Dug(NamedTuple):
     lifts: int
     advance_m: float
     back_offs: float = 0.0
+    rack_s: float = 0.0
 
 
 @functools.cache
@@ -133,19 +134,21 @@ def dug(loader: Loader, plan: Plan, signals: Signals, charge: Charged) -> Dug:
             break
         signals = loader.step(turn.pedals, TICK_S)
     after = loader.truth
-    racked(loader)
+    rack_s = racked(loader)
     return Dug(
         charge, length_s, ended, loader.truth.fill, after.slip_s - before.slip_s, after.rear_up_s - before.rear_up_s,
-        lifts, values["advance_m"], values.get("back_offs", 0.0),
+        lifts, values["advance_m"], values.get("back_offs", 0.0), rack_s,
     )  # fmt: skip
 
 
-def racked(loader: Loader) -> None:
-    """Tilt back, then reverse: the bucket leaves the pile racked."""
-    for _ in range(15):
-        loader.step(Pedals(tilt=1.0, full_rpm=True), 0.1)
-    for _ in range(30):
-        loader.step(Pedals(propel=-0.5, tilt=1.0, full_rpm=True), 0.1)
+def racked(loader: Loader) -> float:
+    """Tilt back, then reverse: the bucket leaves the pile racked. Return the time until it was, s."""
+    needed_s = math.nan
+    for step in range(45):
+        signals = loader.step(Pedals(propel=0.0 if step < 15 else -0.5, tilt=1.0, full_rpm=True), 0.1)
+        if math.isnan(needed_s) and signals.bucket_rad > -0.03:
+            needed_s = 0.1 * step
+    return 4.5 if math.isnan(needed_s) else needed_s
 
 
 def with_paper(plan: Plan, **changes: object) -> Plan:

@@ -16,7 +16,15 @@ from lhdmap.loading.signals import Pedals
 
 from tests.loading.digging.test_paper_dig import QUIET
 
-LAW = ExcavationSettings(force_kn=100.0, force_range_kn=80.0, advance_mps=0.05, advance_range_mps=0.2, back_off_s=0.0)
+LAW = ExcavationSettings(
+    force_kn=100.0,
+    force_range_kn=80.0,
+    advance_mps=0.05,
+    advance_range_mps=0.2,
+    back_off_s=0.0,
+    skid_max=0.2,
+    skid_smooth_s=0.0,
+)
 
 
 def asked(settings: ExcavationSettings = LAW, **heard: Any) -> Pedals:
