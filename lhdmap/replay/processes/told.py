@@ -37,7 +37,10 @@ class Idle(NamedTuple):
 
 
 class Word(NamedTuple):
-    """What the station says: always a sign of life; a mode, arming, a stop, the joystick where they are wanted."""
+    """What the station says: always a sign of life; a mode, arming, a stop, the joystick where they are wanted.
+
+    `gave_up`: it helps no more, and why.
+    """
 
     stamp_ns: int
     mode: str = ""
@@ -48,6 +51,7 @@ class Word(NamedTuple):
     steering_rate_rps: float = 0.0
     go_on: bool = False
     goal: str = ""
+    gave_up: str = ""
 
 
 class Health(NamedTuple):
