@@ -26,9 +26,7 @@ from scipy.ndimage import gaussian_filter1d, median_filter
 from scipy.spatial import KDTree
 from scipy.spatial.transform import Rotation
 
-CLEAR = (
-    "what a cloud has nearer than so to the drawn lines, above the floor and below the roof, is taken out: surveyors and passers-by"
-)
+CLEAR = "what a cloud has nearer than so to the drawn lines, above the floor and below the roof, is taken out: surveyors and passers-by"
 _STEP_M = 2.0
 _CAMBER_M = 1.0
 _AROUND_M = 1.2
@@ -49,18 +47,23 @@ def main() -> int:
     parser.add_argument("--triangles", type=int, default=0, help="at most; 0: as many as there are")
     parser.add_argument("--clear", type=float, default=0.0, metavar="M", help=CLEAR)
     asked = parser.parse_args()
-    plan = load_plan(asked.rough)
-    mesh, turn = made(plan, asked.clear, asked.triangles), np.eye(3)
+    make_plan(asked.rough, asked.out, asked.clear, asked.triangles)
+    return 0
+
+
+def make_plan(rough: Path, out: Path, clear_m: float = 0.0, triangles: int = 0) -> None:
+    """Write the plan `out` and its mesh beside it."""
+    plan = load_plan(rough)
+    mesh, turn = made(plan, clear_m, triangles), np.eye(3)
     plan = replace(plan, drifts=_centred(plan, mesh))
-    if asked.clear:  # the middle of the drifts is known better now than it was drawn, and by how much the survey leans
+    if clear_m:  # the middle of the drifts is known better now than it was drawn, and by how much the survey leans
         turn = upright(plan, mesh)
         plan = replace(plan, drifts=tuple(_turned(one, turn) for one in plan.drifts))
-        mesh = made(plan, asked.clear, asked.triangles, turn)
+        mesh = made(plan, clear_m, triangles, turn)
         plan = replace(plan, drifts=_centred(plan, mesh))
         print("turned by", np.degrees(Rotation.from_matrix(turn).as_rotvec()).round(2), "degrees")
-    write_small_ply(asked.out.with_suffix(".ply"), mesh)
-    asked.out.write_text(plan_toml(plan, asked.out.with_suffix(".ply").name), encoding="utf-8")
-    return 0
+    write_small_ply(out.with_suffix(".ply"), mesh)
+    out.write_text(plan_toml(plan, out.with_suffix(".ply").name), encoding="utf-8")
 
 
 def made(plan: MinePlan, clear_m: float, triangles: int, turn: FloatArray | None = None) -> Mesh:

@@ -53,7 +53,9 @@ class Bumper:
             triangles = mesh.triangles
             if floor is not None and self._world.surveyed:  # its floor has noise: there steep sides of it are no walls
                 triangles = triangles[~floor]
-            piece = self._pieces[key] = ContactPiece(mesh.vertices_m, triangles, None if self._world.surveyed else floor)
+            piece = self._pieces[key] = ContactPiece(
+                mesh.vertices_m, triangles, None if self._world.surveyed else floor
+            )
             if len(self._pieces) > _KEPT:
                 self._pieces.popitem(last=False)
         self._pieces.move_to_end(key)
