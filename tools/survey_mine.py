@@ -1,8 +1,8 @@
 """A mine plan of a surveyed mine: `python -m tools.survey_mine ROUGH.toml OUT.toml --triangles 90000`.
 
-The rough plan names a survey (cloud or mesh) as its surface and has drifts whose lines are drawn by hand. Out comes the same plan with
-the surface as a mesh beside it (`OUT.ply`: what is near the drifts, z up, metres), lines that are in the middle between the
-walls and on the floor, and widths as they are there.
+The rough plan names a survey (cloud or mesh) as its surface and has drifts whose lines are drawn by hand. Out comes the same plan
+with the surface as a mesh beside it (`OUT.ply`: what is near the drifts, z up, metres), lines that are in the middle between
+the walls and on the floor, and widths as they are there.
 """
 
 from __future__ import annotations
@@ -26,7 +26,9 @@ from scipy.ndimage import gaussian_filter1d, median_filter
 from scipy.spatial import KDTree
 from scipy.spatial.transform import Rotation
 
-CLEAR = "what a cloud has nearer than so to the drawn lines, above the floor and below the roof, is taken out: surveyors and passers-by"
+CLEAR = (
+    "what a cloud has nearer than so to the drawn lines, between floor and roof, is taken out: surveyors, passers-by"
+)
 _STEP_M = 2.0
 _CAMBER_M = 1.0
 _AROUND_M = 1.2
