@@ -77,10 +77,11 @@ def test_the_machine_is_stopped_and_disarmed() -> None:
     rig.run(0.5)
     assert rig.control.rearm(rig.now_ns, "autonomous") == ()
     assert rig.control.mode("autonomous", rig.now_ns)
-    rig.run(4.0)
-    assert rig.control.watchdog.armed
-    rig.rate_wanted = math.radians(8.0)
-    rig.run(1.2)
-    assert not rig.control.watchdog.armed
+    armed = []
+    for rate_dps, seconds in ((0.0, 4.0), (8.0, 1.2)):
+        rig.rate_wanted = math.radians(rate_dps)
+        rig.run(seconds)
+        armed.append(rig.control.watchdog.armed)
+    assert armed == [True, False]
     assert "deg off its commands" in rig.control.watchdog.causes[0]
     assert rig.command.brake
