@@ -24,6 +24,7 @@ from tests.guidance.tunnels import BODIES, MACHINE, MODEL
 
 ROOM_M, RULE_M = 0.10, 0.35
 _STEP_M, _ENDS_M, _STARTS = 0.1, 16.0, 4
+_TOO_WIDE_M = 20.0
 _MOST_RAD = math.radians(38.0)  # of the joint, as in the findings
 
 
@@ -129,9 +130,9 @@ def _needed(
 @nb.njit(cache=True)
 def _off(x: float, y: float, radius: float, turn: float) -> float:
     """Return how far a point is from the centre line: along x to the origin, an arc to the left, straight on."""
-    if x <= 0.0:
+    if x <= 0.0 and y < radius:  # beyond is the second straight, where the bend turns by more than 90 degrees
         return abs(y)
-    angle = math.atan2(x, radius - y)
+    angle = math.atan2(x, radius - y) % (2.0 * math.pi)
     if angle <= turn:
         return abs(math.hypot(x, y - radius) - radius)
     ex, ey = radius * math.sin(turn), radius * (1.0 - math.cos(turn))
@@ -170,8 +171,13 @@ def searched_m(radius_m: float, turn: float, rng: np.random.Generator) -> float:
         return 1e4 if made is None else float(_needed(made[0], made[1], lengths, boxes, radius_m, turn))
 
     best = math.inf
-    for k in range(_STARTS):
-        begin = np.array([max(radius_m, 5.5) + 0.5 * k, 3.0 + k, -0.2 * k, -0.2 * k]) + 0.1 * rng.standard_normal(4)
+    for k in range(2 * _STARTS):
+        if k >= _STARTS and best < _TOO_WIDE_M:
+            break
+        wider = 0.5 * k if k < _STARTS else 1.5 * (k - _STARTS + 1)  # the joint cannot: wider ones
+        begin = np.array(
+            [max(radius_m, 5.5) + wider, 3.0 + k % _STARTS, -0.2 * k, -0.2 * k]
+        ) + 0.1 * rng.standard_normal(4)
         steps = {"maxfev": 250, "xatol": 0.01, "fatol": 0.002}
         best = min(best, float(minimize(cost, begin, method="Nelder-Mead", options=steps).fun))
     return best + 2.0 * ROOM_M

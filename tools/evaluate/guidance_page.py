@@ -33,8 +33,8 @@ Winding tunnels of 70 m (180 m in the class R 12-40), bends of 20 to 90 degrees,
 turns forward and in reverse, empty and loaded; pose noise 1 cm and 0.1 degrees, joint offset 0.5 degrees, steering gain
 within 5 %, lags within 10 %, the route off by 0.15 m (1 sigma). Walls are known as points, there is no guard and no backing up:
 a touch ends the run. In the opening and 4 m about it the route counts 30 times as much, as navigation has it in intersections;
-"opening not known": it does not (the touch of c 0.15 turned into it, the worst of c 0.25 came nearest there). E at 10 Hz, commands as shares of 24 km/h and 15 deg/s,
-km/h and degrees. Limit
+"opening not known": it does not (the touch of c 0.15 turned into it, the worst of c 0.25 came nearest there). E at 10 Hz, commands
+as shares of 24 km/h and 15 deg/s, km/h and degrees. Limit
 {limit}.
 
 {columns}
