@@ -12,6 +12,7 @@ from lhdmap.driving.model import DriveModel
 from lhdmap.driving.motion import Motion, Setpoints
 from lhdmap.executor.executor import Executor
 from lhdmap.executor.guard import Guard, Swept
+from lhdmap.executor.joint import JointWatch
 from lhdmap.executor.modes import IDLE, MODES, Modes, operator_setpoints
 from lhdmap.executor.notes import Note, Notes, Stop
 from lhdmap.executor.settings import ExecutorSettings
@@ -38,6 +39,7 @@ class Control:
         self.watchdog, self.modes = Watchdog(inputs, settings), Modes()
         self.guard = Guard(model, bodies, settings, period_s=_LOOKS * _GUARD_NS * 1e-9)
         self.swept: Swept | None = None
+        self._joint = JointWatch(model)
         self._settings = settings
         self._notes, self._blocked, self._near = Notes(), False, 0
         self._points: dict[str, tuple[Motion, FloatArray]] = {}
@@ -48,7 +50,7 @@ class Control:
     def loaded(self, model: DriveModel) -> None:
         """Take the model for another load."""
         self.executor.loaded(model)
-        self.guard.model = model
+        self.guard.model = self._joint.model = model
 
     def saw(
         self, name: str, stamp_ns: int, now_ns: int, values: Sequence[float] = (), content: int | None = None
@@ -126,6 +128,7 @@ class Control:
         self, now_ns: int, motion: Motion | None, asked: Stop = Stop.GO, cause: str = "", pull_mps2: float = 0.0
     ) -> Command:
         """Return the command of now; the hardest stop of all layers wins, and of `asked`, what navigation wants."""
+        self._watch_joint(motion)
         told, why = self.watchdog.check(now_ns, self.modes.mode.needs, standing=self.executor.standing)
         if not self.watchdog.armed:
             self.executor.clear()
@@ -136,6 +139,9 @@ class Control:
         if self._pedals is not None and self.digs(now_ns):
             return self.executor.dig(now_ns, motion, self._pedals, asked, cause)
         return self.executor.step(now_ns, motion, asked, cause, pull_mps2)
+        command = self.executor.step(now_ns, motion, asked, cause, pull_mps2)
+        self._joint.gave(now_ns, command.steering_rate_rps)
+        return command
 
     def take_notes(self) -> list[tuple[str, Note]]:
         """Return what happened since the last call, each with who says so."""
@@ -155,6 +161,12 @@ class Control:
             return ("not armed",)
         needs = MODES[name].needs
         return tuple(one for one in self.watchdog.refusals(now_ns, needs) if one != "the machine moves")
+
+    def _watch_joint(self, motion: Motion | None) -> None:
+        """Disarm where the joint does not do what it is told: what is predicted of the machine is wrong then."""
+        apart_rad = 0.0 if motion is None else self._joint.sees(motion)
+        if abs(apart_rad) > math.radians(self._settings.joint_deg) and not self.executor.standing:
+            self.watchdog.trip((f"the joint is {math.degrees(apart_rad):.1f} deg off its commands",))
 
     def _guarded(self, now_ns: int, motion: Motion, pull_mps2: float) -> bool:
         """Return whether the guard holds the machine; one that it has stopped goes on from standstill alone."""

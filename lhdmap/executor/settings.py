@@ -65,6 +65,14 @@ class ExecutorSettings:
     jump_deg: float = setting(
         1.0, unit="deg", minimum=0.05, maximum=45.0, source=_FAULTS, doc="The same of the heading."
     )
+    joint_deg: float = setting(
+        4.0,
+        unit="deg",
+        minimum=0.5,
+        maximum=45.0,
+        source="steering 15 % off at 15 deg/s misses 1.8 deg in 0.8 s",
+        doc="A joint that misses its commands by more within 0.8 s stops the machine.",
+    )
     valid_reports: int = setting(
         3,
         minimum=1,

@@ -126,7 +126,7 @@ def _autonomous(scenario: Scenario, parts: Parts, given: Autonomous, journal: Jo
         Navigator(navigation, given.errand, journal.of(NAVIGATION)),
         Guide(guidance, settings.executor.jumps, journal.of(GUIDANCE)),
         Execute(control, machine, given.mode, journal.of(EXECUTOR)),
-        Station(scenario.wanted_modes, scenario.rearm_s, scenario.assist_s, journal.of(Station.name)),
+        Station(scenario.wanted_modes, scenario.rearm_s, scenario.assist_s, journal.of(Station.name), scenario.assists),
     ]
 
 

@@ -124,6 +124,9 @@ class Scenario:
     assist_s: float = setting(
         10.0, unit="s", minimum=0.0, maximum=3600.0, doc="How long the station takes to answer a request for help."
     )
+    assists: int = setting(
+        5, minimum=0, maximum=1000, doc="How many requests for help the station answers; at one more it gives up."
+    )
     modes: tuple[ModeAt, ...] = part(tuple, key="mode")
     loading: LoadingPlan = part(LoadingPlan)
     limits: Limits = part(Limits)

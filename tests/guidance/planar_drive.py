@@ -89,13 +89,14 @@ def drive(
     begin_m: float = 12.0,
     short_m: float = 5.0,
     until_m: float = math.inf,
+    route: FloatArray | float = 1.0,
 ) -> Drive:
-    """Drive a line from near its start to a stop before its end; in reverse the rear axle goes first."""
+    """Drive a line from near its start to a stop before its end; in reverse the rear axle goes first. `route`: its weights."""
     used, model = settings or GuidanceSettings(), drive_model(MACHINE, load_kg)
     guidance = Guidance(model, BODIES, EYES_M, used, method_of(used))
     lead = lead_of(gear, model, BODIES)
     told = line + errors.route_m * np.column_stack([-np.sin(headings(line)), np.cos(headings(line))])
-    path = path_of(told, limit_mps)
+    path = path_of(told, limit_mps, route)
     directive = Directive(0, gear, path, float(path[-1, 5]) - short_m)
     at, heading = line[round(begin_m / 0.1)], headings(line)[round(begin_m / 0.1)]
     base = lead.base((float(at[0]), float(at[1]), float(heading), 0.0, 0.0))

@@ -159,12 +159,22 @@ def tunnel(
 ) -> tuple[FloatArray, FloatArray]:
     """A winding line and rough walls with an opening, the least room along the line as measured."""
     line = winding_line(seed, radii_m, length_m)
-    opening_m = float(np.random.default_rng([seed, 5]).uniform(25.0, len(line) * STEP_M - 25.0))
-    c = c_m
+    c, opening_m = c_m, opening_of(seed, line)
     for _ in range(3):
         walls = walls_beside(line, c, seed, rms_m, opening_m)
         c += c_m - least_room_m(line, walls)
     return line, walls
+
+
+def opening_of(seed: int, line: FloatArray) -> float:
+    """Where the opening of a tunnel is along its line."""
+    return float(np.random.default_rng([seed, 5]).uniform(25.0, len(line) * STEP_M - 25.0))
+
+
+def route_of(seed: int, line: FloatArray, weight: float, about_m: float) -> FloatArray:
+    """The route's weights (N,) along a tunnel's line: navigation knows the opening, and gives more in it and about it."""
+    off = np.abs(np.arange(len(line)) * STEP_M - opening_of(seed, line))
+    return np.where(off < 2.5 + about_m, weight, 1.0)
 
 
 def _dense(wall: FloatArray) -> FloatArray:

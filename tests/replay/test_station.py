@@ -70,6 +70,18 @@ def test_who_is_stuck_is_backed_up_by_hand_then_told_to_go_on() -> None:
     assert not words(one, HEALTHY, 12.5, 13.0)[-1][1].go_on
 
 
+def test_after_so_many_requests_it_gives_up() -> None:
+    one = Station((ModeAt(),), 5.0, 1.0, Journal().of("station"), assists=2)
+    asks = HEALTHY._replace(asks=UNKNOWN)
+    for k in range(2):
+        assert words(one, asks, 10.0 * k, 10.0 * k + 2.0)[-1][1].go_on
+        words(one, HEALTHY, 10.0 * k + 2.0, 10.0 * k + 3.0)
+    said = words(one, asks, 20.0, 24.0)
+    assert not any(word.go_on for _, word in said)
+    assert all(word.gave_up == f"the station gave up: {UNKNOWN}" and word.mode == "idle" for _, word in said)
+    assert words(one, HEALTHY._replace(mode="idle"), 24.0, 24.5)[-1][1].gave_up
+
+
 def test_who_does_not_know_the_place_is_not_driven_by_hand() -> None:
     said = words(station(), HEALTHY._replace(asks=UNKNOWN), 0.0, 5.0)
     assert not any(word.mode for _, word in said)

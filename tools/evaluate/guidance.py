@@ -17,8 +17,9 @@ import numpy as np
 from lhdmap.config import settings_from
 from lhdmap.evaluation.navigation.drive import squared_steps
 from lhdmap.guidance.settings import GuidanceSettings
+from lhdmap.navigation.settings import NavigationSettings
 from tests.guidance.planar_drive import Drive, Errors, drive
-from tests.guidance.tunnels import MACHINE, tunnel
+from tests.guidance.tunnels import MACHINE, route_of, tunnel
 
 
 @dataclass(frozen=True)
@@ -83,9 +84,11 @@ def row_of(kind: Class, seed: int, settings: GuidanceSettings) -> tuple[Row, Dri
     c = float(np.random.default_rng([seed, 3]).uniform(*kind.room_m))
     line, walls = tunnel(seed // 2, c, kind.radii_m, kind.length_m, kind.rms_m)
     limit = (kind.limit_loaded_kmh if load else kind.limit_kmh) / 3.6
+    given = NavigationSettings()
+    route = route_of(seed // 2, line, given.crossing_weight, given.crossing_margin_m)
     out = drive(
-        line, walls, gear, limit_mps=limit, settings=settings, errors=errors_of(seed), load_kg=load, seconds=240.0
-    )
+        line, walls, gear, limit_mps=limit, settings=settings, errors=errors_of(seed), load_kg=load, seconds=240.0, route=route
+    )  # fmt: skip
     speeds, bends = np.array(out.speeds_mps), np.degrees([one[3] for one in out.states])
     row = Row(
         seed, gear, load, c, out.arrived, out.contact, min(out.rooms_m), float(np.abs(speeds).mean() * 3.6),
@@ -126,6 +129,7 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--runs", type=int, default=20)
     parser.add_argument("--first", type=int, default=0)
+    parser.add_argument("--seeds", type=int, nargs="+", help="these instead")
     parser.add_argument("--only", default="")
     parser.add_argument("--set", action="append", default=[], metavar="NAME=VALUE", dest="changed")
     parser.add_argument("--json", type=Path)
@@ -137,14 +141,14 @@ def main() -> int:
         if asked.only and name not in asked.only.split(";"):
             continue
         rows = every[name] = []
-        for seed in range(asked.first, asked.first + asked.runs):
+        for seed in asked.seeds or range(asked.first, asked.first + asked.runs):
             row, _ = row_of(kind, seed, settings)
             rows.append(row)
             if row.contact or not row.arrived:
                 print("  ", row, file=sys.stderr, flush=True)
+            if asked.json:
+                asked.json.write_text(json.dumps({key: [asdict(row) for row in done] for key, done in every.items()}))
         print(summary(name, rows), flush=True)
-        if asked.json:
-            asked.json.write_text(json.dumps({key: [asdict(row) for row in rows] for key, rows in every.items()}))
     return 0
 
 

@@ -14,12 +14,16 @@ _WAITS = "place not known"
 
 
 class Help:
-    """Answers requests one after the other; `done`: what is left is to say that the machine is to go on."""
+    """Answers requests one after the other; `done`: what is left is to say that the machine is to go on.
 
-    def __init__(self, assist_s: float, scribe: Scribe) -> None:
+    Of more than `most` requests none is answered any more: `gave_up` says so.
+    """
+
+    def __init__(self, assist_s: float, scribe: Scribe, most: int) -> None:
         self._assist_ns, self._scribe = round(assist_s * SECOND_NS), scribe
         self._asked_ns: int | None = None
         self._backs_until_ns: int | None = None
+        self._left, self.gave_up = most, ""
         self.done = False
 
     def wanted(self, now_ns: int, health: Health, script: ModeAt) -> ModeAt:
@@ -27,7 +31,10 @@ class Help:
         if not health.asks:
             self._asked_ns, self._backs_until_ns, self.done = None, None, False
             return script
-        self._asked_ns = now_ns if self._asked_ns is None else self._asked_ns
+        if self._asked_ns is None:
+            self._asked_ns, self._left = now_ns, self._left - 1
+        if self._left < 0:
+            return self._give_up(health.asks)
         if now_ns - self._asked_ns < self._assist_ns:
             return script
         if _WAITS in health.asks or (self._backs_until_ns is not None and now_ns > self._backs_until_ns):
@@ -39,6 +46,12 @@ class Help:
             self._backs_until_ns = now_ns + _BACK_NS
             self._scribe.event("helps", health.asks, by="backing up")
         return by_hand
+
+    def _give_up(self, asks: str) -> ModeAt:
+        if not self.gave_up:
+            self.gave_up = f"the station gave up: {asks}"
+            self._scribe.event("gives up", asks)
+        return ModeAt(mode="idle")
 
     def _say(self, what: str, why: str) -> None:
         if not self.done:

@@ -56,7 +56,7 @@ class Navigator(Process):
         self.control, self._errand, self._scribe = control, errand, scribe
         self._feed = MotionFeed()
         self._located: Located | None = None
-        self._mission = ""
+        self._mission = self._gave_up = ""
         self._asked_on = self._away = False
         self._goal, self._mode, self._speed_mps = "", "", 0.0
         self._since_ns: int | None = None
@@ -104,7 +104,7 @@ class Navigator(Process):
         elif topic == PLAN:
             self.control.sight_m = math.inf if isinstance(message, Idle) else message.speeds.sight_m
         elif topic == STATION_SAYS:
-            self._asked_on = message.go_on
+            self._asked_on, self._gave_up = message.go_on, message.gave_up
             self._goal = message.goal or self._goal
             self._speed_mps = abs(message.speed_mps or 0.0)
         else:
@@ -122,6 +122,8 @@ class Navigator(Process):
 
     def _told(self) -> str:
         state = self.control.state
+        if self._gave_up:
+            return f"aborted: {self._gave_up}"
         if state == ARRIVED:
             return "done"
         return f"assistance: {self.control.reason}" if state == ASSISTANCE else "driving"

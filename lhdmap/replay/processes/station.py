@@ -18,16 +18,18 @@ _FIRST_NS = SECOND_NS
 class Station(Process):
     """Sees no truth. `modes`: what is wanted from when on, the first one from the start; `rearm_s`: how long it looks at a stop.
 
-    `assist_s`: how long it takes to answer a request for help.
+    `assist_s`: how long it takes to answer a request for help; `assists`: how many it answers.
     """
 
     name, period_ns, priority, site = "station", 100 * MILLISECOND_NS, 50, STATION
     reads = (MACHINE_SAYS,)
 
-    def __init__(self, modes: Sequence[ModeAt], rearm_s: float, assist_s: float, scribe: Scribe) -> None:
+    def __init__(
+        self, modes: Sequence[ModeAt], rearm_s: float, assist_s: float, scribe: Scribe, assists: int = 5
+    ) -> None:
         self._modes, self._rearm_ns, self._scribe = list(modes), round(rearm_s * SECOND_NS), scribe
         self._wanted = self._modes.pop(0)
-        self._help = Help(assist_s, scribe)
+        self._help = Help(assist_s, scribe, assists)
         self._health: Health | None = None
         self._since_ns: int | None = None
         self._asked_ns = 0
@@ -40,7 +42,7 @@ class Station(Process):
         while self._modes and now_ns - START_NS >= self._modes[0].at_s * SECOND_NS:
             self._wanted = self._modes.pop(0)
             self._scribe.event("wants", "scenario", mode=self._wanted.mode, goal=self._wanted.goal)
-        yield Outgoing(STATION_SAYS, self._word(now_ns))
+        yield Outgoing(STATION_SAYS, self._word(now_ns)._replace(gave_up=self._help.gave_up))
 
     def _word(self, now_ns: int) -> Word:
         health = self._health

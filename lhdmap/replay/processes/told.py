@@ -97,7 +97,10 @@ class Idle(NamedTuple):
 
 
 class Word(NamedTuple):
-    """What the station says: always a sign of life; a mode, arming, a stop, the joystick where they are wanted."""
+    """What the station says: always a sign of life; a mode, arming, a stop, the joystick where they are wanted.
+
+    `gave_up`: it helps no more, and why.
+    """
 
     stamp_ns: int
     mode: str = ""
@@ -109,6 +112,7 @@ class Word(NamedTuple):
     go_on: bool = False
     goal: str = ""
     answer: Answer | None = None
+    gave_up: str = ""
 
 
 class Health(NamedTuple):

@@ -50,7 +50,12 @@ class Bumper:
         piece = self._pieces.get(key)
         if piece is None:
             mesh, floor = self._world.solid(key)
-            piece = self._pieces[key] = ContactPiece(mesh.vertices_m, mesh.triangles, floor)
+            triangles = mesh.triangles
+            if floor is not None and self._world.surveyed:  # its floor has noise: there steep sides of it are no walls
+                triangles = triangles[~floor]
+            piece = self._pieces[key] = ContactPiece(
+                mesh.vertices_m, triangles, None if self._world.surveyed else floor
+            )
             if len(self._pieces) > _KEPT:
                 self._pieces.popitem(last=False)
         self._pieces.move_to_end(key)

@@ -24,6 +24,7 @@ _STATION_M = 0.5
 _EYE_M = 1.2  # floors are looked for from this far above where they are expected
 _FLOOR_UP = 0.7  # least share of a floor triangle's normal that points up or down
 _FLOOR_M = 1.0  # floor is not higher above the centre line
+_AROUND, _STEP_M = 24, 0.25  # triangles of the floor about a place; what is lower above them a wheel climbs
 _SAMPLES_MAX = 2_000_000
 
 
@@ -32,7 +33,7 @@ class SurveyedSkins:
 
     def __init__(self, network: Network) -> None:
         plan = network.plan.surface
-        mesh = _placed(read_surface(plan), plan)
+        mesh = placed(read_surface(plan), plan)
         self._stations = np.concatenate([_stations(network, k) for k in range(len(network.tubes))])
         self._tree = KDTree(self._stations[:, :2])
         self._surface = Surface(mesh)
@@ -61,13 +62,18 @@ class SurveyedSkins:
         return height
 
     def _is_floor(self, mesh: Mesh) -> npt.NDArray[np.bool_]:
-        """Return which triangles are floor: nearly level, and not above the centre lines."""
+        """Return which triangles are floor: nearly level and not above the centre lines, or on such and lower than a step."""
         a, b, c = (mesh.vertices_m[mesh.triangles[:, k]] for k in range(3))
         normal = np.cross(b - a, c - a)
         up = np.abs(normal[:, 2]) > _FLOOR_UP * np.linalg.norm(normal, axis=1)
         middle = (a + b + c) / 3.0
-        line_z = self._stations[self._tree.query(middle[:, :2])[1], 2]
-        floor: npt.NDArray[np.bool_] = up & (middle[:, 2] < line_z + _FLOOR_M)
+        low = middle[:, 2] < self._stations[self._tree.query(middle[:, :2])[1], 2] + _FLOOR_M
+        floor: npt.NDArray[np.bool_] = up & low
+        if floor.sum() >= _AROUND:  # a survey has noise and stones: their sides are no walls
+            rest = np.flatnonzero(low & ~up)
+            around = KDTree(middle[floor, :2]).query(middle[rest, :2], k=_AROUND)[1]
+            ground_m = np.median(middle[floor, 2][around], axis=1)
+            floor[rest] = np.max([one[rest, 2] for one in (a, b, c)], axis=0) < ground_m + _STEP_M
         return floor
 
 
@@ -124,7 +130,8 @@ def meshed(points_m: FloatArray, cell_m: float) -> Mesh:
     return without_unused(Mesh(vertices, triangles[kept].astype(np.uint32)))
 
 
-def _placed(mesh: Mesh, plan: SurfacePlan) -> Mesh:
+def placed(mesh: Mesh, plan: SurfacePlan) -> Mesh:
+    """Return a mesh in metres, z up, where the plan has it."""
     points = mesh.vertices_m * plan.scale
     if plan.up == "y":
         points = np.stack([points[:, 0], -points[:, 2], points[:, 1]], axis=1)

@@ -126,6 +126,11 @@ class MineWorld:
         return thing.mesh, None
 
     @property
+    def surveyed(self) -> bool:
+        """Whether the surface is that of a survey."""
+        return self._pieces is None
+
+    @property
     def version(self) -> int:
         """Goes up whenever something appears, goes or changes."""
         return self._version

@@ -11,11 +11,14 @@ from lhdmap.integration.cloud import Cloud
 from lhdmap.integration.cloud_io import write_cloud
 from lhdmap.machine import Machine
 from lhdmap.mine.network import make_network
-from lhdmap.mine.plan import load_plan
+from lhdmap.mine.plan import find_plan, load_plan
 from lhdmap.simulation.drift import Mesh
 from lhdmap.simulation.mesh_file import write_ply
+from lhdmap.simulation.mine_world.bumper import Bumper
 from lhdmap.simulation.mine_world.collada import read_dae
 from lhdmap.simulation.mine_world.world import MineWorld
+from lhdmap.simulation.vehicle.vehicle import Vehicle
+from tools.survey_mine import make_plan
 
 HALF_M, HEIGHT_M, LENGTH_M = 2.0, 3.5, 40.0
 
@@ -58,7 +61,7 @@ def world_of(folder: Path, file: str, more: str = "") -> MineWorld:
     return MineWorld(make_network(load_plan(plan)), Machine())
 
 
-def check(world: MineWorld, within_m: float) -> None:
+def check(world: MineWorld, within_m: float, step_m: float = 0.0) -> None:
     points = np.array([[x, y, 0.3] for x in (8.0, 20.0, 32.0) for y in (-1.0, 0.0, 1.0)])
     assert world.floor_height(points) == pytest.approx(0.0, abs=within_m)
     scene = world.near(points[4])
@@ -72,7 +75,7 @@ def check(world: MineWorld, within_m: float) -> None:
         mesh, floor = world.solid(key)
         middles = mesh.vertices_m[mesh.triangles].mean(axis=1)
         assert floor is not None
-        assert np.abs(middles[floor, 2]).max(initial=0.0) < within_m
+        assert np.abs(middles[floor, 2]).max(initial=0.0) < max(within_m, step_m)
         assert middles[~floor, 2].min(initial=1.0) > -within_m
 
 
@@ -97,7 +100,9 @@ def test_a_survey_cloud_is_meshed(tmp_path: Path) -> None:
     u, v = np.sort(rng.random((2, 60_000)), axis=0)
     points = u[:, None] * a[pick] + (v - u)[:, None] * b[pick] + (1 - v)[:, None] * c[pick]
     write_cloud(tmp_path / "drift.ply", Cloud((points + 0.01 * rng.standard_normal(points.shape)).astype(np.float32)))
-    check(world_of(tmp_path, "drift.ply"), 0.08)
+    check(
+        world_of(tmp_path, "drift.ply"), 0.08, step_m=0.25
+    )  # the rounded foot of the walls is a step that wheels climb
 
 
 @pytest.mark.parametrize("kind", FACES)
@@ -122,3 +127,58 @@ def test_damaged_collada_is_refused(tmp_path: Path, text: str) -> None:
 def test_a_surface_that_is_missing_is_refused(tmp_path: Path) -> None:
     with pytest.raises(InputError, match=r"none\.ply: no such file; the surface of the mine was wanted"):
         world_of(tmp_path, "none.ply")
+
+
+def stone(x_m: float, y_m: float, size_m: float, height_m: float) -> Mesh:
+    """Return a box on the floor."""
+    h = size_m / 2.0
+    low = np.array([[x_m - h, y_m - h], [x_m + h, y_m - h], [x_m + h, y_m + h], [x_m - h, y_m + h]])
+    vertices = np.concatenate([np.column_stack([low, np.full(4, z)]) for z in (0.0, height_m)])
+    sides = [[k, (k + 1) % 4, k + 4] for k in range(4)] + [[(k + 1) % 4, (k + 1) % 4 + 4, k + 4] for k in range(4)]
+    return Mesh(vertices, np.array([*sides, [4, 5, 6], [4, 6, 7]], dtype=np.uint32))
+
+
+@pytest.mark.parametrize(("height_m", "touches"), [(0.15, False), (0.6, True)])
+def test_a_stone_is_floor_and_a_block_is_not(tmp_path: Path, height_m: float, touches: bool) -> None:
+    write_ply(tmp_path / "drift.ply", [tunnel(), stone(20.0, 0.0, 0.5, height_m)])
+    world = world_of(tmp_path, "drift.ply")
+    machine = Machine()
+    bumper, vehicle = Bumper(machine, world), Vehicle(machine, world)
+    state = vehicle.at_rest(19.0, 0.0, 0.0, near_z_m=0.0, time_ns=0, load_kg=0.0)
+    assert bool(bumper.touching(state._replace(z_m=0.05, pitch_rad=0.0, roll_rad=0.0))) == touches
+
+
+@pytest.mark.parametrize("name", ["jinchuan", "edgar"])
+def test_the_lines_of_surveyed_plans_are_between_their_walls(name: str) -> None:
+    network = make_network(load_plan(find_plan(name)))
+    world = MineWorld(network, Machine())
+    line = network.tubes[0].line
+    poses = line.at(np.arange(4.0, line.length_m - 4.0, 2.0))
+    assert np.abs(world.floor_height(poses[:, :3]) - poses[:, 2]).max() < 0.2
+    sides = []
+    for side in (1.0, -1.0):
+        scene = world.near(poses[0, :3])
+        rays = np.zeros((len(poses), 6), dtype=np.float32)
+        rays[:, :3] = poses[:, :3] + [0.0, 0.0, 1.2] - scene.origin_m
+        rays[:, 3], rays[:, 4] = -side * np.sin(poses[:, 3]), side * np.cos(poses[:, 3])
+        sides.append(scene.cast(rays).astype(float))
+    assert min(one.min() for one in sides) > 1.6
+    beside = np.abs(sides[0] - sides[1])[np.maximum(*sides) < 3.0]
+    assert len(beside) > 10
+    assert np.median(beside) < 0.35
+
+
+def test_a_rough_line_is_put_in_the_middle(tmp_path: Path) -> None:
+    write_ply(tmp_path / "drift.ply", [tunnel()])
+    rough, out = tmp_path / "rough.toml", tmp_path / "out.toml"
+    rough.write_text(
+        '[surface]\nfile = "drift.ply"\nkind = "mesh"\n'
+        '[[drift]]\nname = "A"\nline_m = [[3, 0, 0.3], [20, 0.9, 0.4], [37, 0, 0.3]]\n',
+        encoding="utf-8",
+    )
+    make_plan(rough, out)
+    line = np.array(load_plan(out).drifts[0].line_m)
+    assert np.abs(line[:, 1]).max() < 0.12  # it was off by 0.9 m
+    assert np.abs(line[:, 2]).max() < 0.02
+    widths = np.array(load_plan(out).drifts[0].width_m)[:, 1]
+    assert np.abs(widths - 2.0 * HALF_M).max() < 0.2
