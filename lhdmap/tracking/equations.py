@@ -42,7 +42,13 @@ def printed(p: FloatArray, curvature: float, lengths: Lengths2) -> tuple[FloatAr
     bent0 = curvature * math.cos(t0) / (1.0 - curvature * z0)
     bent1 = curvature * math.cos(t1) / (1.0 - curvature * z1)
     drift = [e / d * math.sin(t0), math.sin(t0), math.sin(b) / d - e * bent0 / d, math.sin(b) / d - bent1, 0.0]
-    across = [-both * math.sin(t0) / d, 0.0, rear_m * math.cos(b) / d + both * bent0 / d, front_m * math.cos(b) / d, 1.0]
+    across = [
+        -both * math.sin(t0) / d,
+        0.0,
+        rear_m * math.cos(b) / d + both * bent0 / d,
+        front_m * math.cos(b) / d,
+        1.0,
+    ]
     return np.array(drift), np.array(across)
 
 

@@ -32,18 +32,22 @@ class Filter:
         self.lengths: Lengths = (model.front_m, model.rear_m, model.steering_lag_s)
         self._dead_ns = round(model.dead_time_s * 1e9)
         self.stamp_ns, self.rear_mps, self.front_mps = 0, 0.0, 0.0
-        self.state: FloatArray | None = None
+        self.known, self.state = False, np.zeros(7)
         self.covariance = np.zeros((7, 7))
         self._refused = 0
         one = settings
-        self._noise = np.diag([one.pose_std_m**2] * 2 + [math.radians(v) ** 2 for v in (one.pose_std_deg, one.joint_std_deg)])
+        self._noise = np.diag(
+            [one.pose_std_m**2] * 2 + [math.radians(v) ** 2 for v in (one.pose_std_deg, one.joint_std_deg)]
+        )
 
     def take(self, motion: Motion, sent: Sequence[Setpoint]) -> None:
         """Take a motion that is newer than the last one; `sent`: commands in the order of time."""
-        if not all(math.isfinite(value) for value in motion) or (self.state is not None and motion.stamp_ns <= self.stamp_ns):
+        if not all(math.isfinite(value) for value in motion) or (
+            self.state is not None and motion.stamp_ns <= self.stamp_ns
+        ):
             return
         self.front_mps = motion.speed_mps
-        if self.state is None or motion.stamp_ns - self.stamp_ns > 2_000_000_000 or self._refused >= _REFUSED:
+        if not self.known or motion.stamp_ns - self.stamp_ns > 2_000_000_000 or self._refused >= _REFUSED:
             self._restart(motion)
             return
         rear = rear_speed(motion.speed_mps, self.state[3], self.state[4], self.lengths)
@@ -53,7 +57,6 @@ class Filter:
 
     def ahead(self, at_ns: int, sent: Sequence[Setpoint]) -> tuple[State, float]:
         """Return the state of the five first values at a time, of commands that have been given, and the way of the rear axle."""
-        assert self.state is not None
         state = _five(self.state)
         way, slip = 0.0, float(self.state[5])
         for rate, speed, step_s in _in_force(sent, self.stamp_ns, at_ns, self._dead_ns, self.front_mps):
@@ -63,7 +66,7 @@ class Filter:
         return state, way
 
     def _restart(self, motion: Motion) -> None:
-        kept = (0.0, 0.0) if self.state is None else (0.0, float(self.state[6]))
+        kept = (0.0, float(self.state[6]))
         front_m, rear_m, _ = self.lengths
         bend = motion.articulation_rad - kept[1]
         back = motion.heading_rad - bend
@@ -72,15 +75,22 @@ class Filter:
         self.state = np.array([x, y, back, bend, motion.articulation_rate_rps, *kept])
         one = self._settings
         offset = math.radians(one.joint_offset_deg)
-        spread = [one.pose_std_m, one.pose_std_m, math.radians(1.0), math.radians(one.joint_std_deg), 0.05, 0.005, offset]
+        spread = [
+            one.pose_std_m,
+            one.pose_std_m,
+            math.radians(1.0),
+            math.radians(one.joint_std_deg),
+            0.05,
+            0.005,
+            offset,
+        ]
         self.covariance = np.diag(np.square(spread))
         self.covariance[3, 3] += offset**2
         self.covariance[3, 6] = self.covariance[6, 3] = -(offset**2)
-        self.stamp_ns, self._refused = motion.stamp_ns, 0
+        self.known, self.stamp_ns, self._refused = True, motion.stamp_ns, 0
         self.rear_mps = rear_speed(motion.speed_mps, bend, motion.articulation_rate_rps, self.lengths)
 
     def _predict(self, until_ns: int, rear_mps: float, sent: Sequence[Setpoint]) -> None:
-        assert self.state is not None
         one = self._settings
         share = min(1.0, (abs(rear_mps) / one.slip_full_mps) ** 4)
         walk = np.square(_WALK)
@@ -97,7 +107,6 @@ class Filter:
         self.stamp_ns = until_ns
 
     def _correct(self, motion: Motion) -> None:
-        assert self.state is not None
         x0, y0, ahead = front_axle(_five(self.state), self.lengths)
         front_m, rear_m, _ = self.lengths
         back = float(self.state[2])
@@ -133,7 +142,9 @@ def _jacobian(state: FloatArray, rear_mps: float, step_s: float, lengths: Length
     f = np.eye(7)
     f[0, 2] = f[0, 5] = -way * math.sin(course)
     f[1, 2] = f[1, 5] = way * math.cos(course)
-    f[2, 3] = (way * (math.cos(bend) * d + rear_m * math.sin(bend) ** 2) - front_m * rear_m * math.sin(bend) * rate * step_s) / d**2
+    f[2, 3] = (
+        way * (math.cos(bend) * d + rear_m * math.sin(bend) ** 2) - front_m * rear_m * math.sin(bend) * rate * step_s
+    ) / d**2
     gone = -math.expm1(-step_s / lag_s)
     f[2, 4] = -front_m * lag_s * gone / d
     f[3, 4] = lag_s * gone

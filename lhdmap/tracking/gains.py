@@ -3,21 +3,21 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.linalg import solve_continuous_are
 
 from lhdmap.driving.model import DriveModel
 from lhdmap.messages import FloatArray
 from lhdmap.tracking.equations import outputs, reduced
 from lhdmap.tracking.settings import TrackingSettings
 
-_FASTEST_MPS, _COUNT = 14.0, 12
+PERIOD_S = 0.05
+_FASTEST_MPS, _COUNT = 14.0, 9
 
 
 class Gains:
     """LQR gains on x = (z1, θ̃1, β, ω) for both signs of v1, interpolated over the logarithm of its size."""
 
     def __init__(self, model: DriveModel, settings: TrackingSettings) -> None:
-        """Solve the Riccati equation for a dozen speeds of each sign."""
+        """Solve the Riccati equation for some speeds of each sign."""
         self._slow = settings.slow_mps
         self._log = np.linspace(np.log(self._slow), np.log(_FASTEST_MPS), _COUNT)
         self._table = {
@@ -33,12 +33,36 @@ class Gains:
 
 
 def gain_of(rear_mps: float, model: DriveModel, settings: TrackingSettings) -> FloatArray:
-    """Return K (4,) of the LQR at one signed speed (m/s, not 0): ω = -K x makes the cost of the settings least."""
+    """Return K (4,) of the LQR at one signed speed (m/s, not 0): ω = -K x, held for 50 ms, makes the settings' cost least."""
     lengths = (model.front_m, model.rear_m)
-    a, b = reduced(rear_mps, model.steering_lag_s, lengths)
+    a, b = held(*reduced(rear_mps, model.steering_lag_s, lengths), PERIOD_S)
     c = outputs(lengths)
     weights = np.array([settings.sum_weight, settings.axle_weight, settings.axle_weight])
     q = c.T @ (weights[:, None] * c) + np.diag([0.0, settings.heading_weight, settings.joint_weight, 0.0])
-    r = np.array([[settings.rate_weight]])
-    found: FloatArray = np.linalg.solve(r, b.T @ solve_continuous_are(a, b, q, r))[0]
+    p = riccati(a, b @ b.T / settings.rate_weight, q)
+    found: FloatArray = (b.T @ p @ a)[0] / (settings.rate_weight + float((b.T @ p @ b)[0, 0]))
     return found
+
+
+def held(a: FloatArray, b: FloatArray, step_s: float) -> tuple[FloatArray, FloatArray]:
+    """Return the matrices of a step with a held input: the exponential, as a series."""
+    size = len(a)
+    whole = np.zeros((size + b.shape[1], size + b.shape[1]))
+    whole[:size, :size], whole[:size, size:] = a * step_s, b * step_s
+    total, term = np.eye(len(whole)), np.eye(len(whole))
+    for k in range(1, 25):
+        term = term @ whole / k
+        total = total + term
+    return total[:size, :size], total[:size, size:]
+
+
+def riccati(a: FloatArray, g: FloatArray, h: FloatArray) -> FloatArray:
+    """Return P = A'P (I + G P)^-1 A + H, by doubling: each round covers twice as many periods as the one before."""
+    one = np.eye(len(a))
+    for _ in range(40):
+        inner = np.linalg.inv(one + g @ h)
+        a, g, after = a @ inner @ a, g + a @ inner @ g @ a.T, h + a.T @ h @ inner @ a
+        if np.abs(after - h).max() <= 1e-12 * np.abs(after).max():
+            break
+        h = after
+    return after

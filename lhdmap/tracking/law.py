@@ -24,7 +24,9 @@ class Errors(NamedTuple):
     along_m: float
 
 
-def errors_of_curve(curve: Curve, state: State, slip: float, near_m: float, rear_mps: float, lengths: Lengths2) -> Errors:
+def errors_of_curve(
+    curve: Curve, state: State, slip: float, near_m: float, rear_mps: float, lengths: Lengths2
+) -> Errors:
     """Return the errors against a reference curve; a machine that slips goes crabwise, so that its course is along the curve.
 
     Turned by -slip, its axles would be aside by half a wheelbase times it, one to each side: z0 + z1 stays 0.
@@ -37,7 +39,9 @@ def errors_of_curve(curve: Curve, state: State, slip: float, near_m: float, rear
     return Errors(np.array(off), along)
 
 
-def errors_of_circle(path: Path, state: State, slip: float, near_m: float, look_m: float, lengths: Lengths2) -> FloatArray:
+def errors_of_circle(
+    path: Path, state: State, slip: float, near_m: float, look_m: float, lengths: Lengths2
+) -> FloatArray:
     """Return the errors (4,) against Eq. (10) on the circle at the rear axle (Section 2.4.3)."""
     x, y, heading, bend, rate = state
     points = path.points
@@ -46,11 +50,6 @@ def errors_of_circle(path: Path, state: State, slip: float, near_m: float, look_
     rest = equilibrium(found.curvature_pm, lengths)
     turned = (heading - found.heading_rad + math.pi) % (2.0 * math.pi) - math.pi
     return np.array([found.offset_m - rest[1] - 0.5 * sum(lengths) * slip, turned + slip, bend - rest[4], rate])
-
-
-def clipped(x: FloatArray, clip_m: float) -> FloatArray:
-    """Return the errors with z1 within a bound: the linear law would ask for more than the joint has."""
-    return np.array([min(max(x[0], -clip_m), clip_m), x[1], x[2], x[3]])
 
 
 def both_offsets(path: Path, state: State, near_m: float, lengths: Lengths2) -> tuple[float, float]:
@@ -62,5 +61,3 @@ def both_offsets(path: Path, state: State, near_m: float, lengths: Lengths2) -> 
     front = beside(path.points, x0, y0, near_m + sum(lengths), 8.0, 8.0)
     rear = beside(path.points, x1, y1, near_m, 8.0, 8.0)
     return front[1], rear[1]
-
-

@@ -78,7 +78,9 @@ def _smoothed(line: FloatArray, waypoints: FloatArray, smoothing_m: float) -> Fl
     count = max(math.ceil(length / _KNOT_M) + 1, 8)
     at = (along - along[0]) / length * (count - 1)
     step = length / (count - 1)
-    weight = np.gradient(along) if len(along) > 1 else np.ones(1)  # uneven waypoints: each stands for its part of the path
+    weight = (
+        np.gradient(along) if len(along) > 1 else np.ones(1)
+    )  # uneven waypoints: each stands for its part of the path
     weight = np.clip(weight, 0.05 * step, None)
     matrix = np.zeros((4, count))  # lower band
     right = np.zeros((count, 2))
@@ -135,7 +137,9 @@ def _ahead(row: FloatArray, way: FloatArray) -> FloatArray:
 
 
 @nb.njit(cache=True, nogil=True)
-def beside(points: FloatArray, x: float, y: float, near: float, back: float, ahead: float) -> tuple[float, float, float, float]:
+def beside(
+    points: FloatArray, x: float, y: float, near: float, back: float, ahead: float
+) -> tuple[float, float, float, float]:
     """Return the projection of a place on a path: length along (m), offset z (m, positive left), heading, curvature there.
 
     Looked for from `near - back` to `near + ahead` m; `points` as in `Path`.

@@ -5,16 +5,15 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from scipy.linalg import solve_continuous_are
 
 from lhdmap.driving.model import DriveModel
 from lhdmap.driving.motion import Motion
 from lhdmap.messages import FloatArray
 from lhdmap.tracking.circles import circle_beside, three_points
 from lhdmap.tracking.equations import printed
+from lhdmap.tracking.gains import PERIOD_S, held, riccati
 from lhdmap.tracking.settings import TrackingSettings
 
-PERIOD_S = 0.05
 _DISCOUNT, _DESIGN_MPS = 0.05, 1.4
 
 
@@ -34,9 +33,10 @@ class PrintedLaw:
         both = np.array([1.0, 1.0, 0.0, 0.0, 0.0])
         q = np.diag([one.axle_weight, one.axle_weight, 0.0, one.heading_weight, one.joint_weight])
         q += one.sum_weight * np.outer(both, both)
-        a = _DESIGN_MPS * jacobian - _DISCOUNT * np.eye(5)
-        r = np.array([[one.rate_weight]])
-        self.gain: FloatArray = (across.T @ solve_continuous_are(a, across, q, r))[0] / (one.rate_weight * _DESIGN_MPS)
+        a, b = held(_DESIGN_MPS * jacobian - _DISCOUNT * np.eye(5), across, PERIOD_S)
+        p = riccati(a, b @ b.T / (one.rate_weight), q)
+        self.gain: FloatArray = (b.T @ p @ a)[0] / (one.rate_weight + float((b.T @ p @ b)[0, 0]))
+        self.gain /= _DESIGN_MPS
 
     def restart(self) -> None:
         """Look for the closest waypoint on the whole path again."""

@@ -59,7 +59,9 @@ def offsets(
 
 
 @nb.njit(cache=True, nogil=True)
-def merit(points: FloatArray, q: FloatArray, u: FloatArray, near: FloatArray, lengths: tuple[float, float]) -> FloatArray:
+def merit(
+    points: FloatArray, q: FloatArray, u: FloatArray, near: FloatArray, lengths: tuple[float, float]
+) -> FloatArray:
     """Return cost, largest defect, largest |z0 + z1| of a curve; `near` (N, 2) is brought up to date."""
     after, jac, rows = np.zeros(4), np.zeros((3, 3)), np.zeros((2, 4))
     out = np.zeros(3)

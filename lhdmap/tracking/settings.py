@@ -46,10 +46,16 @@ class TrackingSettings:
     heading_weight: float = setting(
         20.0, unit="1/rad2", minimum=0.0, source=_MEASURED, doc="What a heading off the path costs."
     )
-    joint_weight: float = setting(5.0, unit="1/rad2", minimum=0.0, source=_MEASURED, doc="What the joint's angle costs.")
+    joint_weight: float = setting(
+        5.0, unit="1/rad2", minimum=0.0, source=_MEASURED, doc="What the joint's angle costs."
+    )
     rate_weight: float = setting(400.0, unit="s2/rad2", minimum=1.0, source=_MEASURED, doc="What its rate costs.")
     rate_share: float = setting(
-        0.8, minimum=0.1, maximum=1.0, source=_MEASURED, doc="Share of the joint's largest rate that a curve may ask for."
+        0.8,
+        minimum=0.1,
+        maximum=1.0,
+        source=_MEASURED,
+        doc="Share of the joint's largest rate that a curve may ask for.",
     )
     slow_mps: float = setting(
         0.3,
@@ -66,8 +72,12 @@ class TrackingSettings:
         0.35, unit="m/s2", minimum=0.05, maximum=3.0, source="haulage findings, section 3", doc="Slowing down."
     )
     pose_std_m: float = setting(0.05, unit="m", minimum=0.001, maximum=1.0, source=_NOISE, doc="Deviation of a pose.")
-    pose_std_deg: float = setting(0.3, unit="deg", minimum=0.01, maximum=10.0, source=_NOISE, doc="The same of its heading.")
-    joint_std_deg: float = setting(0.3, unit="deg", minimum=0.01, maximum=10.0, source=_NOISE, doc="The same of the joint.")
+    pose_std_deg: float = setting(
+        0.3, unit="deg", minimum=0.01, maximum=10.0, source=_NOISE, doc="The same of its heading."
+    )
+    joint_std_deg: float = setting(
+        0.3, unit="deg", minimum=0.01, maximum=10.0, source=_NOISE, doc="The same of the joint."
+    )
     joint_offset_deg: float = setting(
         0.7, unit="deg", minimum=0.0, maximum=10.0, source=_NOISE, doc="Offset of the joint's sensor that is expected."
     )

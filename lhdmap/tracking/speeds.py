@@ -14,7 +14,6 @@ from lhdmap.tracking.reference import Curve
 from lhdmap.tracking.settings import TrackingSettings
 
 _CREEP_MPS = 0.3
-_END_S = 0.7  # the last way is gone with this time constant
 
 
 class Speeds(NamedTuple):
@@ -22,12 +21,6 @@ class Speeds(NamedTuple):
 
     caps_mps: FloatArray
     brake_mps2: float
-
-    def at(self, along_m: float, left_m: float) -> float:
-        """Return the speed at a length, `left_m` before the stop."""
-        cap = float(np.interp(along_m / STEP_M, np.arange(len(self.caps_mps)), self.caps_mps))
-        left = max(left_m, 0.0)
-        return min(cap, math.sqrt(2.0 * self.brake_mps2 * left), left / _END_S)
 
 
 def speeds_of(curve: Curve, asked_mps: FloatArray, model: DriveModel, settings: TrackingSettings) -> Speeds:
@@ -45,7 +38,9 @@ def speeds_of(curve: Curve, asked_mps: FloatArray, model: DriveModel, settings: 
     return Speeds(caps, settings.brake_mps2)
 
 
-def most_change(asked_mps: FloatArray, curvature: FloatArray, model: DriveModel, settings: TrackingSettings) -> FloatArray:
+def most_change(
+    asked_mps: FloatArray, curvature: FloatArray, model: DriveModel, settings: TrackingSettings
+) -> FloatArray:
     """Return the largest |dβ/ds| (N,), rad/m, that the joint's rate allows at the speed that is asked for, or that bends allow."""
     bend = np.sqrt(settings.lateral_mps2 / np.maximum(np.abs(curvature), 1e-6))
     speed = np.maximum(np.minimum(np.minimum(np.abs(asked_mps), bend), model.top_speed_mps), 0.5)

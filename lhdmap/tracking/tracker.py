@@ -15,15 +15,15 @@ from lhdmap.messages import FloatArray
 from lhdmap.tracking.equations import reduced
 from lhdmap.tracking.filter import Filter
 from lhdmap.tracking.gains import Gains
-from lhdmap.tracking.kernel import State, front_axle, front_speed
-from lhdmap.tracking.law import clipped, errors_of_circle, errors_of_curve
+from lhdmap.tracking.kernel import State, front_axle
+from lhdmap.tracking.law import errors_of_circle, errors_of_curve
 from lhdmap.tracking.path import STEP_M, Path, nearest, path_of
 from lhdmap.tracking.printed import PrintedLaw
 from lhdmap.tracking.reference import Curve, reference_of
+from lhdmap.tracking.rollout import STAGE_S, STAGES, Bounds, Loop, Start, rolled, speed_at
 from lhdmap.tracking.settings import TrackingSettings
 from lhdmap.tracking.speeds import Speeds, most_change, speeds_of
 
-_STAGE_S, _STAGES = 0.1, 45
 _BEYOND_M = 4.0  # the path goes on so far beyond its ends, and by the machine's length
 _ARRIVED_M, _STANDING_MPS = 0.05, 0.05
 _KEPT = 120
@@ -86,7 +86,9 @@ class Tracker:
         curve = reference_of(laid, gear, most, lengths)
         ahead = round((0.0 if gear < 0 else sum(lengths)) / STEP_M)  # the speed is that of the leading axle's place
         at_rows = speed[np.minimum(np.arange(len(curve.rows)) + ahead, len(speed) - 1)]
-        self._begin(Leg(curve, speeds_of(curve, at_rows, self.model, self.settings), laid, np.asarray(waypoints)[:, :2]))
+        self._begin(
+            Leg(curve, speeds_of(curve, at_rows, self.model, self.settings), laid, np.asarray(waypoints)[:, :2])
+        )
         return curve
 
     def follow_curve(self, curve: Curve, speed_mps: float) -> None:
@@ -104,7 +106,7 @@ class Tracker:
         if motion is not None:
             self.filter.take(motion, given)
         leg = self.leg
-        if leg is None or self.filter.state is None:
+        if leg is None or not self.filter.known:
             return self._stop(now_ns, "no path" if leg is None else "no motion")
         if now_ns - self.filter.stamp_ns > self.settings.age_s * 1e9:
             return self._stop(now_ns, "the last motion is too old")
@@ -136,11 +138,11 @@ class Tracker:
         if self.settings.method == "paper":
             raw = self._last_motion(motion, state)
             rate = self._printed.rate(raw, self.filter.rear_mps, leg.waypoints)
-            fade = np.exp(-np.arange(_STAGES + 1) * _STAGE_S / 0.2)
+            fade = np.exp(-np.arange(STAGES + 1) * STAGE_S / 0.2)
             rolled[:, 1] = _within(rate, self.model.max_rate_rps) * fade
         self._rear_mps, self._step_ns = abs(rolled[0, 2]), now_ns
         points = tuple(
-            Setpoint(now_ns + round(k * _STAGE_S * 1e9), speed, rate)
+            Setpoint(now_ns + round(k * STAGE_S * 1e9), speed, rate)
             for k, (speed, rate, _) in enumerate(rolled.tolist())
         )
         self._note(points[0])
@@ -148,28 +150,15 @@ class Tracker:
 
     def _rolled(self, leg: Leg, state: State, errors: Errors4, speed: float) -> FloatArray:
         """Return (K + 1, 3): speed of the front axle, rate, speed of the rear axle, of the closed loop from the state on."""
-        out = np.zeros((_STAGES + 1, 3))
-        gear, curve, one = leg.curve.gear, leg.curve, self.settings
-        x, along, left, bend = errors.x.copy(), errors.along_m, errors.left_m, state[3]
-        lengths = self.filter.lengths
-        lag = self.model.steering_lag_s
-        speed = min(speed, leg.speeds.at(along, left))
-        gain = self.gains.at(gear * max(speed, one.slow_mps), gear)
-        a, b = reduced(gear * max(speed, one.slow_mps), lag, lengths[:2])
-        ahead = one.method == "both"
-        for k in range(_STAGES + 1):
-            rear = gear * speed
-            row = curve.at(along + rear * lag)
-            forward = rear * row[5] if ahead or leg.path is None else 0.0
-            still = min(speed / one.slow_mps, 1.0)
-            rate = _within(forward - still * float(gain @ clipped(x, one.clip_m)), self.model.max_rate_rps)
-            out[k] = front_speed(rear, bend, rate, lengths), rate, rear
-            for _ in range(2):
-                x = x + 0.5 * _STAGE_S * (a @ x + b[:, 0] * (rate - forward))
-            bend += rate * _STAGE_S
-            along, left = along + rear * _STAGE_S, left - speed * _STAGE_S
-            speed = min(speed + one.accelerate_mps2 * _STAGE_S, leg.speeds.at(along, left))
-        return out
+        one, gear, lengths = self.settings, leg.curve.gear, self.filter.lengths
+        speed = min(speed, speed_at(leg.speeds.caps_mps, errors.along_m, errors.left_m, leg.speeds.brake_mps2))
+        design = gear * max(speed, one.slow_mps)
+        a, b = reduced(design, lengths[2], lengths[:2])
+        feed = 1.0 if one.method == "both" or leg.path is None else 0.0
+        loop = Loop(self.gains.at(design, gear), a, b[:, 0], gear, lengths, feed)
+        bounds = Bounds(one.clip_m, one.slow_mps, one.accelerate_mps2, leg.speeds.brake_mps2, self.model.max_rate_rps)
+        start = Start(errors.x, errors.along_m, errors.left_m, speed, state[3])
+        return rolled(leg.curve.rows, leg.speeds.caps_mps, start, loop, bounds)
 
     def _last_motion(self, motion: Motion | None, state: State) -> Motion:
         if motion is not None and all(math.isfinite(value) for value in motion):
@@ -179,7 +168,7 @@ class Tracker:
     def _stop(self, now_ns: int, reason: str, x: FloatArray | None = None, left_m: float = math.nan) -> Step:
         """Return a standstill: a plan that ends, which the executor brakes for."""
         self._rear_mps, self._step_ns = 0.0, now_ns
-        points = (Setpoint(now_ns, 0.0, 0.0), Setpoint(now_ns + round(_STAGES * _STAGE_S * 1e9), 0.0, 0.0))
+        points = (Setpoint(now_ns, 0.0, 0.0), Setpoint(now_ns + round(STAGES * STAGE_S * 1e9), 0.0, 0.0))
         self._note(points[0])
         state = "arrived" if self._state == "arrived" and not reason else "stopped"
         return Step(0.0, 0.0, points, state, reason, np.full(4, math.nan) if x is None else x, left_m)

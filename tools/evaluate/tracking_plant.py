@@ -126,8 +126,7 @@ def drive(
             x0, y0, _ = front_axle(plant.state, plant.lengths)
             fronts, z0, _, _ = beside(truth, x0, y0, fronts, 6.0, 6.0)
             near, z1, _, _ = beside(truth, plant.state[0], plant.state[1], near, 6.0, 6.0)
-            found = tracker.filter.state
-            slip = 0.0 if found is None else float(found[5])
+            slip = float(tracker.filter.state[5])
             out.rows.append(
                 (plant.now_ns * 1e-9, *plant.state, plant.rear_mps, z0, z1, step.steering_rate_rps, slip, plant.slip)
             )
@@ -151,5 +150,3 @@ def _at(queue: Setpoints, now: int, model: DriveModel) -> Setpoint:
 def placed(x: float, y: float, heading: float, bend: float = 0.0) -> State:
     """A machine at rest by its rear axle."""
     return x, y, heading, bend, 0.0
-
-
