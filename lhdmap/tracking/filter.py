@@ -42,9 +42,7 @@ class Filter:
 
     def take(self, motion: Motion, sent: Sequence[Setpoint]) -> None:
         """Take a motion that is newer than the last one; `sent`: commands in the order of time."""
-        if not all(math.isfinite(value) for value in motion) or (
-            self.state is not None and motion.stamp_ns <= self.stamp_ns
-        ):
+        if not all(math.isfinite(value) for value in motion) or (self.known and motion.stamp_ns <= self.stamp_ns):
             return
         self.front_mps = motion.speed_mps
         if not self.known or motion.stamp_ns - self.stamp_ns > 2_000_000_000 or self._refused >= _REFUSED:
