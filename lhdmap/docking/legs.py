@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import itertools
+
 import numpy as np
 
 from lhdmap.docking.kernel import driven
@@ -21,7 +23,7 @@ def legs_of(states: FloatArray, lengths: Lengths2) -> tuple[Curve, ...]:
         return ()
     cuts = moving[np.flatnonzero(np.diff(np.sign(step[moving])) != 0)] + 1
     bounds = [0, *cuts.tolist(), len(states) - 1]
-    parts = [states[low : high + 1] for low, high in zip(bounds[:-1], bounds[1:], strict=True)]
+    parts = [states[low : high + 1] for low, high in itertools.pairwise(bounds)]
     return tuple(_leg(part, lengths) for part in parts if abs(part[-1, 4] - part[0, 4]) > 0.5 * STEP_M)
 
 

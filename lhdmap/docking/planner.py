@@ -11,9 +11,8 @@ import numpy as np
 
 from lhdmap.docking.connect import Candidate, Shape, connected, shape_of, states_of, words_to
 from lhdmap.docking.legs import legs_of
-from lhdmap.docking.room import Room, room_of
+from lhdmap.docking.room import Room
 from lhdmap.docking.settings import DockingSettings
-from lhdmap.driving.bodies import Bodies
 from lhdmap.driving.model import DriveModel
 from lhdmap.errors import InputError
 from lhdmap.messages import FloatArray

@@ -15,6 +15,7 @@ from lhdmap.tracking.reference_kernel import improve, merit
 
 _ROUNDS = 25
 _ENOUGH = 1e-6
+_LOOSER, _MISS_M = (1.0, 2.0, 8.0), 0.02
 
 
 class Curve(NamedTuple):
@@ -53,9 +54,13 @@ def reference_of(path: Path, gear: int, most_per_m: FloatArray, lengths: Lengths
     if count < 10:
         raise InputError("the path is shorter than the machine")
     q, near = _first_guess(points, count, lengths)
-    u = np.clip(np.diff(q[:, 3]) / STEP_M, -most_per_m[:count], most_per_m[:count])
-    most = np.maximum(most_per_m[:count], 1e-4)
-    q, u, found = _solved(points, (q, u, near), most, lengths)
+    for looser in _LOOSER:  # where the joint has to be quicker than the speed allows, the machine goes slower
+        most = np.maximum(looser * most_per_m[:count], 1e-3)
+        u = np.clip(np.diff(q[:, 3]) / STEP_M, -most, most)
+        q1, u1, found = _solved(points, (q, u, near), most, lengths)
+        if found[1] < 1e-3 and found[2] < _MISS_M:
+            break
+    q, u = q1, u1
     if found[1] > 1e-3 or not np.isfinite(q).all():
         raise InputError("no curve of the machine follows the path: it bends too much, or too suddenly")
     rows = rows_of(q, u, lengths)

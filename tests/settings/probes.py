@@ -52,6 +52,7 @@ from tests.report.test_recording import read
 from tests.settings import streams
 from tests.settings.guided import barred, plans, remembered, stops, trips
 from tests.settings.streams import Stream
+from tests.settings.tracked import docks, tracks
 
 Probe = Callable[[Settings], str]
 
@@ -315,6 +316,16 @@ def navigated(settings: Settings) -> str:
     return digest(trips(settings))
 
 
+def tracked(settings: Settings) -> str:
+    """Return the digest of what a tracker commands on a drive with slip, noise, an offset, and poses that fail."""
+    return digest(tracks(settings.tracking))
+
+
+def docked(settings: Settings) -> str:
+    """Return the digest of ways to a dock on wide and tight aprons, or why there is none."""
+    return digest(docks(settings.docking))
+
+
 def _mapped(stream: Callable[[], Stream], primary: Literal["front", "points"] = "front", *, own: bool = False) -> Probe:
     return lambda settings: run(settings, stream(), primary, own=own)
 
@@ -337,6 +348,8 @@ PROBES: dict[str, Probe] = {
     "driven": driven,
     "guided": guided,
     "navigated": navigated,
+    "tracked": tracked,
+    "docked": docked,
     "landmarks": landmarks,
     "pile": pile,
     "recording": recording,

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from typing import Protocol
 
 import numpy as np
 from lhdmap.driving.model import DriveModel
@@ -12,7 +13,7 @@ from lhdmap.driving.motion import Motion, Setpoint, Setpoints
 from lhdmap.messages import FloatArray
 from lhdmap.tracking.kernel import State, front_axle, moved, rear_speed
 from lhdmap.tracking.path import beside, nearest
-from lhdmap.tracking.tracker import Tracker
+from lhdmap.tracking.tracker import Step, Tracker
 
 STEP_NS, PERIOD_NS = 10_000_000, 50_000_000
 GRAVITY = 9.81
@@ -109,19 +110,25 @@ class Plant:
         )
 
 
+class Stepper(Protocol):
+    """A tracker, or a run of legs."""
+
+    def step(self, now_ns: int, motion: Motion | None, sent: Sequence[Setpoint] | None = None) -> Step: ...
+
+
 def drive(
-    tracker: Tracker, plant: Plant, truth: FloatArray, seconds: float, each: Callable[[Plant], bool] | None = None
+    tracker: Tracker, plant: Plant, truth: FloatArray, seconds: float, stepper: Stepper | None = None
 ) -> Drive:
     """Drive what the tracker follows until it arrives, stops or the time is over; `truth`: rows of the exact path.
 
-    `each` is asked each 50 ms whether to go on.
+    `stepper`: who is stepped, where it is not the tracker itself.
     """
     out, queue, begun = Drive(), (), plant.now_ns
     near = nearest(truth, *plant.state[:3])
     fronts = near + sum(plant.lengths[:2])
     while plant.now_ns - begun < seconds * 1e9:
         if plant.now_ns % PERIOD_NS == 0:
-            step = tracker.step(plant.now_ns, plant.measured(), plant.sent[-80:])
+            step = (stepper or tracker).step(plant.now_ns, plant.measured(), plant.sent[-80:])
             queue = step.setpoints
             x0, y0, _ = front_axle(plant.state, plant.lengths)
             fronts, z0, _, _ = beside(truth, x0, y0, fronts, 6.0, 6.0)
@@ -132,7 +139,7 @@ def drive(
             )
             out.reason = step.reason
             out.arrived = step.state == "arrived" and abs(plant.speed) < 0.01
-            if out.arrived or (step.state == "stopped" and abs(plant.speed) < 0.01) or (each and not each(plant)):
+            if out.arrived or (step.state == "stopped" and abs(plant.speed) < 0.01):
                 break
         plant.sent.append(_at(queue, plant.now_ns, plant._model))  # noqa: SLF001
         plant.step()
