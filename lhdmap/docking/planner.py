@@ -12,6 +12,7 @@ import numpy as np
 from lhdmap.docking.connect import Candidate, Shape, connected, shape_of, states_of, words_to
 from lhdmap.docking.legs import legs_of
 from lhdmap.docking.room import Room
+from lhdmap.docking.search import searched
 from lhdmap.docking.settings import DockingSettings
 from lhdmap.driving.model import DriveModel
 from lhdmap.errors import InputError
@@ -22,6 +23,8 @@ from lhdmap.tracking.reference import Curve
 _ARCS_M = (2.5, 5.0, 7.5, 10.0, 13.0, 16.0, 20.0)
 _TRIES = 150
 _RATE_SHARE = 0.8
+_SAMPLED = 2
+"""Changes of gear up to which ways are sampled; with more, and where these find none, they are searched."""
 
 
 class DockPlan(NamedTuple):
@@ -65,12 +68,21 @@ def plan_dock(
     shapes, reason = _shapes(start, goal, room, model, settings, gear)
     if reason:
         return DockPlan((), reason)
-    for cusps, shape in _order(shapes, settings.cusps):
+    for cusps, shape in _order(shapes, min(settings.cusps, _SAMPLED)):
         moves = _sampled(start, goal, room, shape, gear, cusps)
         if moves is not None:
-            states = states_of(start, moves, shape)
-            return DockPlan(legs_of(states, lengths), "", shape.radius_m, shape.straight_m, float(moves[:, 2].sum()))
-    return DockPlan((), f"no way with {settings.cusps} changes of gear or less has room for both bodies")
+            return _planned(start, moves, shape)
+    limits, told = (settings.cusps, settings.cusp_m, settings.nodes), ""
+    for shape in dict.fromkeys((shapes[0], shapes[-1])):
+        moves, told = searched(start, goal, room, shape, gear, limits)
+        if moves is not None:
+            return _planned(start, moves, shape)
+    return DockPlan((), f"no way with {settings.cusps} changes of gear or less has room for both bodies: {told}")
+
+
+def _planned(start: FloatArray, moves: FloatArray, shape: Shape) -> DockPlan:
+    legs = legs_of(states_of(start, moves, shape), shape.lengths)
+    return DockPlan(legs, "", shape.radius_m, shape.straight_m, float(moves[:, 2].sum()))
 
 
 def _rear(pose: FloatArray, lengths: tuple[float, float]) -> FloatArray:

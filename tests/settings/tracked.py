@@ -24,7 +24,9 @@ def tracks(settings: TrackingSettings) -> list[Any]:
     rows, told = turn(10.0 / 3.6, step=True, ends_m=12.0), []
     for aside in (1.5, 9.0):
         tracker = Tracker(MODEL, settings)
-        curve = tracker.follow(rows[::10, :2] + 0.01 * np.random.default_rng(4).standard_normal((len(rows[::10]), 2)), 8.0)
+        curve = tracker.follow(
+            rows[::10, :2] + 0.01 * np.random.default_rng(4).standard_normal((len(rows[::10]), 2)), 8.0
+        )
         plant = Plant(placed(-3.4, aside, 0.1, 0.05), MODEL, Errors(seed=5))
         told.append((curve.rows, _commands(tracker, plant)))
     return told

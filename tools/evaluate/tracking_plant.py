@@ -116,9 +116,7 @@ class Stepper(Protocol):
     def step(self, now_ns: int, motion: Motion | None, sent: Sequence[Setpoint] | None = None) -> Step: ...
 
 
-def drive(
-    tracker: Tracker, plant: Plant, truth: FloatArray, seconds: float, stepper: Stepper | None = None
-) -> Drive:
+def drive(tracker: Tracker, plant: Plant, truth: FloatArray, seconds: float, stepper: Stepper | None = None) -> Drive:
     """Drive what the tracker follows until it arrives, stops or the time is over; `truth`: rows of the exact path.
 
     `stepper`: who is stepped, where it is not the tracker itself.
