@@ -15,7 +15,7 @@ from lhdmap.tracking.reference_kernel import improve, merit
 
 _ROUNDS = 25
 _ENOUGH = 1e-6
-_LOOSER, _MISS_M = (1.0, 2.0, 8.0), 0.02
+_LOOSER, _MISS_M, _LOST_M = (1.0, 2.0, 8.0), 0.02, 0.3
 
 
 class Curve(NamedTuple):
@@ -61,7 +61,7 @@ def reference_of(path: Path, gear: int, most_per_m: FloatArray, lengths: Lengths
         if found[1] < 1e-3 and found[2] < _MISS_M:
             break
     q, u = q1, u1
-    if found[1] > 1e-3 or not np.isfinite(q).all():
+    if found[1] > 1e-3 or found[2] > _LOST_M or not np.isfinite(q).all():
         raise InputError("no curve of the machine follows the path: it bends too much, or too suddenly")
     rows = rows_of(q, u, lengths)
     back, front = near[:, 1], near[:, 0]

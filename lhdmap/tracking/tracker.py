@@ -84,6 +84,10 @@ class Tracker:
         speed = _at_points(laid, waypoints, np.abs(asked))
         most = most_change(speed, laid.points[:, 3], self.model, self.settings)
         curve = reference_of(laid, gear, most, lengths)
+        bent = float(np.abs(curve.rows[:, 4]).max())
+        if bent > self.model.max_articulation_rad:
+            told = f"{math.degrees(bent):.0f} deg of the joint, of {math.degrees(self.model.max_articulation_rad):.0f}"
+            raise InputError(f"the path bends more than the machine: it asks for {told}")
         ahead = round((0.0 if gear < 0 else sum(lengths)) / STEP_M)  # the speed is that of the leading axle's place
         at_rows = speed[np.minimum(np.arange(len(curve.rows)) + ahead, len(speed) - 1)]
         self._begin(
