@@ -14,6 +14,7 @@ from lhdmap.tracking.path import STEP_M
 STAGE_S, STAGES = 0.1, 45
 END_S = 0.7
 """The last way is gone with this time constant."""
+_LOOK_S = 0.4
 
 
 class Start(NamedTuple):
@@ -38,13 +39,20 @@ class Loop(NamedTuple):
 
 
 class Bounds(NamedTuple):
-    """Largest offset that counts (m), speed below which the joint slows (m/s), speeding up, braking (m/s2), rate (rad/s)."""
+    """Largest offset that counts (m), speed below which the joint slows (m/s), speeding up, braking (m/s2), rate (rad/s).
+
+    `ceiling_mps`: speed that is gone down to by `slow_mps2`. The joint is held to a lateral acceleration (m/s2) and an angle (rad).
+    """
 
     clip_m: float
     slow_mps: float
     accelerate_mps2: float
     brake_mps2: float
     rate_rps: float
+    ceiling_mps: float
+    slow_mps2: float
+    lateral_mps2: float
+    bend_rad: float
 
 
 @nb.njit(cache=True, nogil=True)
@@ -63,6 +71,9 @@ def rolled(rows: FloatArray, caps: FloatArray, start: Start, loop: Loop, bounds:
         for i in range(1, 4):
             asked += loop.gain[i] * x[i]
         rate = forward - min(speed / bounds.slow_mps, 1.0) * asked
+        # the joint stays within its stop, and within what the machine stands at this speed
+        bent = min(bounds.bend_rad, bounds.lateral_mps2 * (front_m + rear_m) / max(speed * speed, 0.1))
+        rate = min(max(rate, (-bent - bend) / _LOOK_S), (bent - bend) / _LOOK_S)
         rate = min(max(rate, -bounds.rate_rps), bounds.rate_rps)
         apart = front_m + rear_m * math.cos(bend)
         front = ((rear_m + front_m * math.cos(bend)) * rear - front_m * rear_m * math.sin(bend) * rate) / apart
@@ -76,7 +87,8 @@ def rolled(rows: FloatArray, caps: FloatArray, start: Start, loop: Loop, bounds:
                 x[i] += 0.5 * STAGE_S * change[i]
         bend += rate * STAGE_S
         along, left = along + rear * STAGE_S, left - speed * STAGE_S
-        speed = min(speed + bounds.accelerate_mps2 * STAGE_S, speed_at(caps, along, left, bounds.brake_mps2))
+        held = max(bounds.ceiling_mps, speed - bounds.slow_mps2 * STAGE_S)
+        speed = min(speed + bounds.accelerate_mps2 * STAGE_S, held, speed_at(caps, along, left, bounds.brake_mps2))
     return out
 
 

@@ -67,6 +67,15 @@ class TrackingSettings:
     lateral_mps2: float = setting(
         1.2, unit="m/s2", minimum=0.1, maximum=5.0, source="haulage findings, section 0", doc="Acceleration in bends."
     )
+    swerve_share: float = setting(
+        2.0,
+        minimum=1.0,
+        maximum=20.0,
+        doc="How much more of it than `lateral_mps2` feedback may ask for: the joint is held within that.",
+    )
+    aside_mps: float = setting(
+        3.0, unit="m/s", minimum=0.2, maximum=20.0, doc="Speed while it is farther from the path than `clip_m`."
+    )
     accelerate_mps2: float = setting(0.5, unit="m/s2", minimum=0.05, maximum=3.0, doc="Speeding up.")
     brake_mps2: float = setting(
         0.35, unit="m/s2", minimum=0.05, maximum=3.0, source="haulage findings, section 3", doc="Slowing down."
@@ -100,7 +109,7 @@ class TrackingSettings:
         5.0, minimum=1.0, maximum=100.0, doc="Deviations from which on a pose is not believed; a few in a row are."
     )
     lost_m: float = setting(
-        8.0, unit="m", minimum=0.5, maximum=100.0, doc="Farther from the path the machine stops: it is on another one."
+        20.0, unit="m", minimum=0.5, maximum=100.0, doc="Farther from the path the machine stops: it is on another one."
     )
     age_s: float = setting(
         0.5, unit="s", minimum=0.05, maximum=5.0, doc="The machine stops where the last motion is older."

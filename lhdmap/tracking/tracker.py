@@ -27,6 +27,7 @@ from lhdmap.tracking.speeds import Speeds, most_change, speeds_of
 _BEYOND_M = 4.0  # the path goes on so far beyond its ends, and by the machine's length
 _ARRIVED_M, _STANDING_MPS = 0.05, 0.05
 _KEPT = 120
+_SLOW_SHARE = 0.5  # of the drive's deceleration, to slow down beside the path
 
 
 class Step(NamedTuple):
@@ -138,6 +139,9 @@ class Tracker:
     def _out(self, now_ns: int, motion: Motion | None, leg: Leg, state: State, errors: Errors4) -> Step:
         period = min(max((now_ns - self._step_ns) * 1e-9, 0.0), 0.2) if self._step_ns else 0.05
         speed = min(self._rear_mps + self.settings.accelerate_mps2 * period, abs(self.filter.rear_mps) + 1.0)
+        if abs(errors.x[0]) > self.settings.clip_m:
+            braked = self._rear_mps - _SLOW_SHARE * self.model.deceleration_mps2 * period
+            speed = min(speed, max(self.settings.aside_mps, braked))
         rolled = self._rolled(leg, state, errors, speed)
         if self.settings.method == "paper":
             raw = self._last_motion(motion, state)
@@ -160,7 +164,18 @@ class Tracker:
         a, b = reduced(design, lengths[2], lengths[:2])
         feed = 1.0 if one.method == "both" or leg.path is None else 0.0
         loop = Loop(self.gains.at(design, gear), a, b[:, 0], gear, lengths, feed)
-        bounds = Bounds(one.clip_m, one.slow_mps, one.accelerate_mps2, leg.speeds.brake_mps2, self.model.max_rate_rps)
+        model, aside = self.model, abs(errors.x[0]) > one.clip_m
+        bounds = Bounds(
+            one.clip_m,
+            one.slow_mps,
+            one.accelerate_mps2,
+            leg.speeds.brake_mps2,
+            model.max_rate_rps,
+            one.aside_mps if aside else math.inf,
+            _SLOW_SHARE * model.deceleration_mps2,
+            one.swerve_share * one.lateral_mps2,
+            model.max_articulation_rad,
+        )
         start = Start(errors.x, errors.along_m, errors.left_m, speed, state[3])
         return rolled(leg.curve.rows, leg.speeds.caps_mps, start, loop, bounds)
 

@@ -20,9 +20,9 @@ from tests.guidance.tunnels import BODIES, MODEL
 
 
 def tracks(settings: TrackingSettings) -> list[Any]:
-    """Return commands: a bend from 1.5 m beside it, with failing poses; and from 9 m beside the path."""
+    """Return commands: a bend from 1.5 m beside it, with failing poses; and from 22 m beside the path."""
     rows, told = turn(10.0 / 3.6, step=True, ends_m=12.0), []
-    for aside in (1.5, 9.0):
+    for aside in (1.5, 22.0):
         tracker = Tracker(MODEL, settings)
         curve = tracker.follow(
             rows[::10, :2] + 0.01 * np.random.default_rng(4).standard_normal((len(rows[::10]), 2)), 8.0

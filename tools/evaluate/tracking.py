@@ -180,7 +180,7 @@ def recoveries() -> Iterator[Row]:
         model, _ = machine(name)
         for kmh, clip_m in ((30, 0.8), (10, 0.8), (-8, 0.8), (30, 10.0)):
             for aside, turned, bent in ((5, 20, 10), (5, -20, 0), (5, 20, -10), (2, 20, 10), (-5, -20, 10)):
-                tracker = Tracker(model, TrackingSettings(clip_m=clip_m, lost_m=30.0))
+                tracker = Tracker(model, TrackingSettings(clip_m=clip_m))
                 tracker.follow(line[::20, :2] if kmh > 0 else line[::-20, :2], kmh / 3.6)
                 start = placed(20.0 if kmh > 0 else 200.0, aside, math.radians(turned), math.radians(bent))
                 plant = Plant(start, model, Errors(seed=1))
