@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 import math
 from collections.abc import Iterator
 from typing import NamedTuple
@@ -12,7 +11,7 @@ import numpy as np
 from lhdmap.docking.connect import Candidate, Shape, connected, shape_of, states_of, words_to
 from lhdmap.docking.legs import legs_of
 from lhdmap.docking.room import Room
-from lhdmap.docking.search import searched
+from lhdmap.docking.search import CUSP_M, searched
 from lhdmap.docking.settings import DockingSettings
 from lhdmap.driving.model import DriveModel
 from lhdmap.errors import InputError
@@ -68,11 +67,11 @@ def plan_dock(
     shapes, reason = _shapes(start, goal, room, model, settings, gear)
     if reason:
         return DockPlan((), reason)
-    for cusps, shape in _order(shapes, min(settings.cusps, _SAMPLED)):
-        moves = _sampled(start, goal, room, shape, gear, cusps)
+    for counts, shape in _order(shapes, min(settings.cusps, _SAMPLED)):
+        moves = _sampled(start, goal, room, shape, gear, counts)
         if moves is not None:
             return _planned(start, moves, shape)
-    limits, told = (settings.cusps, settings.cusp_m, settings.nodes), ""
+    limits, told = (settings.cusps, settings.nodes), ""
     for shape in dict.fromkeys((shapes[0], shapes[-1])):
         moves, told = searched(start, goal, room, shape, gear, limits)
         if moves is not None:
@@ -136,42 +135,58 @@ def _straight_to(goal: FloatArray, gear: int, straight_m: float) -> FloatArray:
     return np.column_stack([place, np.full(len(way), goal[2]), np.zeros(len(way))])
 
 
-def _order(shapes: list[Shape], cusps: int) -> Iterator[tuple[int, Shape]]:
-    """Yield what is tried in order: few changes of gear with wide turns, then with tight ones, then more changes."""
-    for group in ((0, 1), *((more,) for more in range(2, cusps + 1))):
-        for shape, count in itertools.product(shapes, group):
-            if count <= cusps:
-                yield count, shape
+def _order(shapes: list[Shape], cusps: int) -> Iterator[tuple[tuple[int, ...], Shape]]:
+    """Yield what is tried in order: one change of gear at most with wide turns, then with tight ones, then two."""
+    for counts in ((0, 1), (2,)):
+        allowed = tuple(count for count in counts if count <= cusps)
+        if allowed:
+            yield from ((allowed, shape) for shape in shapes)
 
 
-def _sampled(start: FloatArray, goal: FloatArray, room: Room, shape: Shape, gear: int, cusps: int) -> FloatArray | None:
-    """Return the moves of the shortest way with so many changes of gear, of those that are sampled."""
-    candidates: list[Candidate] = []
-    for before in _prefixes(start, room, shape, gear, cusps):
-        at = start if len(before) == 0 else states_of(start, before, shape)[-1][:4]
-        candidates += words_to(at, goal, gear, shape, before)[:3]
-    candidates.sort(key=lambda one: one.length_m)
-    for candidate in candidates[:_TRIES]:
+def _sampled(
+    start: FloatArray, goal: FloatArray, room: Room, shape: Shape, gear: int, counts: tuple[int, ...]
+) -> FloatArray | None:
+    """Return the moves of the shortest way with these changes of gear, each worth some way, of those that are sampled."""
+    candidates: list[tuple[float, Candidate]] = []
+    for cusps in counts:
+        for before in _prefixes(start, room, shape, gear, cusps):
+            at = start if len(before) == 0 else states_of(start, before, shape)[-1][:4]
+            found = words_to(at, goal, gear, shape, before)[:3]
+            candidates += [(one.length_m + CUSP_M * cusps, one) for one in found]
+    candidates.sort(key=lambda one: one[0])
+    for _, candidate in candidates[:_TRIES]:
         moves = connected(candidate, goal, gear, shape)
         if moves is not None and room.free(states_of(start, moves, shape)):
             return moves
     return None
 
 
-def _prefixes(start: FloatArray, room: Room, shape: Shape, gear: int, cusps: int) -> Iterator[FloatArray]:
-    """Yield moves (K, 3) that lead to the last leg: one arc or straight of each gear before it, as far as there is room."""
+def _prefixes(
+    start: FloatArray, room: Room, shape: Shape, gear: int, cusps: int, first: bool = True
+) -> Iterator[FloatArray]:
+    """Yield moves (K, 3) that lead to the last leg, as far as there is room.
+
+    With one change of gear two arcs or straights before it, with more one in each gear.
+    """
     if cusps == 0:
         yield np.zeros((0, 3))
         return
-    first = gear if cusps % 2 == 0 else -gear
+    for move, end in _arcs(start, room, shape, gear if cusps % 2 == 0 else -gear):
+        for rest in _prefixes(end, room, shape, gear, cusps - 1, first=False):
+            yield np.concatenate([move, rest])
+        if cusps == 1 and first:
+            for more, _ in _arcs(end, room, shape, -gear):
+                if more[0, 1] != move[0, 1]:
+                    yield np.concatenate([move, more])
+
+
+def _arcs(start: FloatArray, room: Room, shape: Shape, gear: int) -> Iterator[tuple[FloatArray, FloatArray]]:
+    """Yield moves (1, 3) of one gear that have room, and where each ends (4,)."""
     for bend in (0.0, shape.bend_rad, -shape.bend_rad):
-        way = states_of(start, np.array([[first, bend, _ARCS_M[-1]]]), shape)
-        missed = room.first_miss(way, 1)
-        free_m = _ARCS_M[-1] if missed < 0 else abs(way[max(missed - 1, 0), 4])
+        way = states_of(start, np.array([[gear, bend, _ARCS_M[-1]]]), shape)
+        missed = room.first_miss(way, 2)
+        free_m = _ARCS_M[-1] if missed < 0 else abs(way[max(missed - 2, 0), 4])
         for length in _ARCS_M:
             if length > free_m:
                 break
-            move = np.array([[first, bend, length]])
-            end = way[round(length / _ARCS_M[-1] * (len(way) - 1)), :4]
-            for rest in _prefixes(end, room, shape, gear, cusps - 1):
-                yield np.concatenate([move, rest])
+            yield np.array([[gear, bend, length]]), way[round(length / _ARCS_M[-1] * (len(way) - 1)), :4]

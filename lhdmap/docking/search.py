@@ -16,6 +16,8 @@ from lhdmap.docking.connect import Shape, connected, states_of, words_to
 from lhdmap.docking.room import Room
 from lhdmap.messages import FloatArray
 
+CUSP_M = 12.0
+"""Way that a change of gear is worth."""
 _PRIMITIVE_M = 1.6
 _CELL_M, _CELL_RAD, _CELL_BEND_RAD = 0.8, math.radians(12.0), math.radians(12.0)
 _TRY_EACH, _TRY_WORDS = 3, 2
@@ -32,13 +34,13 @@ class _Node(NamedTuple):
 
 
 def searched(
-    start: FloatArray, goal: FloatArray, room: Room, shape: Shape, gear: int, limits: tuple[int, float, int]
+    start: FloatArray, goal: FloatArray, room: Room, shape: Shape, gear: int, limits: tuple[int, int]
 ) -> tuple[FloatArray | None, str]:
     """Return moves (K, 3) from a configuration (4,) to a pose (3,) of the rear axle, or None and why.
 
-    `limits`: changes of gear at most, way that one is worth (m), states that are visited at most.
+    `limits`: changes of gear at most, states that are visited at most.
     """
-    most_cusps, cusp_m, most_nodes = limits
+    most_cusps, most_nodes = limits
     nodes = [_Node(start, 0, 0, 0.0, -1, (0.0, 0.0, 0.0))]
     queue = [(_least(start, goal, shape), 0)]
     closed: set[tuple[int, ...]] = set()
@@ -62,7 +64,7 @@ def searched(
                 move = (float(signed), bend, _PRIMITIVE_M)
                 way = states_of(node.state, np.array([move]), shape)
                 after = _Node(
-                    way[-1, :4], signed, cusps, node.gone + _PRIMITIVE_M + cusp_m * (cusps - node.cusps), k, move
+                    way[-1, :4], signed, cusps, node.gone + _PRIMITIVE_M + CUSP_M * (cusps - node.cusps), k, move
                 )
                 if _cell(after) in closed or not room.free(way):
                     continue

@@ -42,5 +42,4 @@ class DockingSettings:
         0.4, unit="m", minimum=0.0, maximum=5.0, doc="Room between both bodies and what bounds them."
     )
     cusps: int = setting(3, minimum=0, maximum=8, doc="Changes of gear at most.")
-    cusp_m: float = setting(12.0, unit="m", minimum=0.0, maximum=100.0, doc="Way that a change of gear is worth.")
     nodes: int = setting(2500, minimum=100, maximum=200_000, doc="States that the search visits at most.")

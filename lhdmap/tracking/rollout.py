@@ -41,7 +41,7 @@ class Loop(NamedTuple):
 class Bounds(NamedTuple):
     """Largest offset that counts (m), speed below which the joint slows (m/s), speeding up, braking (m/s2), rate (rad/s).
 
-    `ceiling_mps`: speed that is gone down to by `slow_mps2`. The joint is held to a lateral acceleration (m/s2) and an angle (rad).
+    `ceiling_mps`: speed that is gone down to by `slow_mps2`. The joint is held within an acceleration (m/s2) and an angle (rad).
     """
 
     clip_m: float

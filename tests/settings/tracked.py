@@ -49,13 +49,20 @@ def _commands(tracker: Tracker, plant: Plant) -> list[Any]:
 
 
 def docks(settings: DockingSettings) -> list[Any]:
-    """Return plans on aprons of which some have little room."""
-    return []
+    """Return plans: with room, with little, with something before the dock, and in a drift in which nobody turns round."""
+    told = []
+    nothing = np.zeros((0, 2))
+    for width, height, start, dock, blocked in (
+        (45.0, 40.0, (10.0, 12.0, 0.5, 0.1), (22.0, 32.95, -0.5 * math.pi), nothing),
+        (30.0, 22.0, (10.0, 8.0, 2.5, 0.0), (15.0, 14.95, -0.5 * math.pi), nothing),
+        (45.0, 40.0, (10.0, 12.0, 0.5, 0.0), (22.0, 32.9, -0.5 * math.pi), np.array([[22.0, 27.0]])),
+        (22.0, 5.0, (10.0, 2.5, 0.0, 0.0), (9.0, 2.5, math.pi), nothing),
+    ):
+        room = room_of(apron(width, height), MODEL, BODIES, settings.margin_m, blocked)
+        told.append(plan_dock(np.array(start), np.array(dock), room, MODEL, settings))
+    return told
 
 
 def apron(width_m: float, height_m: float) -> FloatArray:
     """A rectangle from the origin."""
     return np.array([[0.0, 0.0], [width_m, 0.0], [width_m, height_m], [0.0, height_m]])
-
-
-__all__ = ["BODIES", "apron", "docks", "plan_dock", "room_of", "tracks"]
