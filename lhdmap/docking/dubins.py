@@ -28,8 +28,10 @@ def words(start: tuple[float, float, float], goal: tuple[float, float, float], r
     for first, last in ((1, 1), (-1, -1), (1, -1), (-1, 1)):
         if first == last:
             square = 2.0 + d * d - 2.0 * cab + first * 2.0 * d * (sa - sb)
-            across = math.atan2(first * (cb - ca), d + first * (sa - sb))
             straight = math.sqrt(max(square, 0.0))
+            across = (
+                math.atan2(first * (cb - ca), d + first * (sa - sb)) if straight > 1e-6 else b
+            )  # one circle: one turn
             parts = (_turn(first * (across - a)), straight, _turn(last * (b - across)))
         else:
             square = d * d - 2.0 + 2.0 * cab + first * 2.0 * d * (sa + sb)
@@ -44,9 +46,6 @@ def words(start: tuple[float, float, float], goal: tuple[float, float, float], r
         if abs(cosine) > 1.0:
             continue
         middle = 2.0 * math.pi - math.acos(cosine)
-        start_turn = _turn(
-            -first * a + math.atan2(first * (cb - ca) if first < 0 else ca - cb, d - sa + sb) + 0.5 * middle
-        )
         if first < 0:
             start_turn = _turn(a - math.atan2(ca - cb, d - sa + sb) + 0.5 * middle)
         else:
@@ -77,4 +76,4 @@ def _scaled(parts: tuple[float, float, float], radius_m: float) -> tuple[float, 
 def _turn(angle: float) -> float:
     """Return an angle in [0, 2π); what is short of a whole turn by rounding alone is none."""
     turned = angle % (2.0 * math.pi)
-    return 0.0 if turned > 2.0 * math.pi - 1e-9 else turned
+    return 0.0 if turned > 2.0 * math.pi - 1e-7 else turned

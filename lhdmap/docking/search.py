@@ -20,7 +20,7 @@ CUSP_M = 12.0
 """Way that a change of gear is worth."""
 _PRIMITIVE_M = 1.6
 _CELL_M, _CELL_RAD, _CELL_BEND_RAD = 0.8, math.radians(12.0), math.radians(12.0)
-_TRY_EACH, _TRY_WORDS = 3, 2
+_TRY_EACH, _TRY_WORDS = 5, 2
 _EDGE_WEIGHT = 1.3
 
 

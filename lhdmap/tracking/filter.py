@@ -18,7 +18,7 @@ from lhdmap.tracking.kernel import Lengths, State, front_axle, moved, rear_speed
 from lhdmap.tracking.settings import TrackingSettings
 
 _STEP_S = 0.02
-_SLIP_LAG_S = 3.0  # without news the slip is forgotten
+_SLIP_LAG_S = 10.0  # without news the slip is forgotten
 _REFUSED = 5  # poses in a row that are not believed: then the filter is wrong
 _WALK = (0.01, 0.01, math.radians(0.1), math.radians(0.15), math.radians(2.0), 0.0, math.radians(0.01))
 """Process noise of each state but the slip, per root of a second."""

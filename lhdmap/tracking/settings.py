@@ -91,7 +91,7 @@ class TrackingSettings:
         0.7, unit="deg", minimum=0.0, maximum=10.0, source=_NOISE, doc="Offset of the joint's sensor that is expected."
     )
     slip_noise: float = setting(
-        0.01,
+        0.015,
         unit="rad/s1/2",
         minimum=0.0,
         maximum=1.0,
