@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from lhdmap.docking.settings import DockingSettings
 from lhdmap.errors import ConfigError
 from lhdmap.executor.settings import ExecutorSettings
 from lhdmap.guidance.settings import GuidanceSettings
@@ -40,6 +41,7 @@ from lhdmap.rockbreaker.settings import RockbreakerSettings
 from lhdmap.settings import load_section, nearest, section_toml
 from lhdmap.smoothing.settings import SmoothingSettings
 from lhdmap.topology.settings import TopologySettings
+from lhdmap.tracking.settings import TrackingSettings
 
 _HEADER = """\
 # Settings of the lhdmap pipeline: the defaults. Copy this file, change what you need and pass it with --config; keys that
@@ -68,6 +70,8 @@ class Settings:
     localization: LocalizationSettings = field(default_factory=LocalizationSettings)
     navigation: NavigationSettings = field(default_factory=NavigationSettings)
     guidance: GuidanceSettings = field(default_factory=GuidanceSettings)
+    tracking: TrackingSettings = field(default_factory=TrackingSettings)
+    docking: DockingSettings = field(default_factory=DockingSettings)
     executor: ExecutorSettings = field(default_factory=ExecutorSettings)
     loading: LoadingSettings = field(default_factory=LoadingSettings)
     pile: PileSettings = field(default_factory=PileSettings)

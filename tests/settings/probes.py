@@ -53,6 +53,7 @@ from tests.settings import loading, streams
 from tests.settings.digs import charges, decisions, digs, weighings
 from tests.settings.guided import barred, plans, remembered, stops, trips
 from tests.settings.streams import Stream
+from tests.settings.tracked import docks, tracks
 
 Probe = Callable[[Settings], str]
 
@@ -328,6 +329,12 @@ def loading_cycle(settings: Settings) -> str:
 def loading_limits(settings: Settings) -> str:
     """Return the digest of when each limit of the loading task counts."""
     return digest(loading.limits(settings.loading))
+def tracked(settings: Settings) -> str:
+    """Return the digest of what a tracker commands on a drive with slip, noise, an offset, and poses that fail."""
+    return digest(tracks(settings.tracking))
+def docked(settings: Settings) -> str:
+    """Return the digest of ways to a dock on wide and tight aprons, or why there is none."""
+    return digest(docks(settings.docking))
 
 
 def _mapped(stream: Callable[[], Stream], primary: Literal["front", "points"] = "front", *, own: bool = False) -> Probe:
@@ -361,6 +368,8 @@ PROBES: dict[str, Probe] = {
     "decided": lambda settings: digest(decisions(settings)),
     "loading_cycle": loading_cycle,
     "loading_limits": loading_limits,
+    "tracked": tracked,
+    "docked": docked,
     "landmarks": landmarks,
     "pile": pile,
     "recording": recording,
