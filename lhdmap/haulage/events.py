@@ -80,9 +80,10 @@ def _begins(
 
 
 def _service(at: Status, given: MissionInput) -> Moment | None:
-    if given.service_due and not at.service and at.state in WORKS:
+    due = given.service_due or given.make_way
+    if due and not at.service and at.state in WORKS:
         return Moment(Event.SERVICE_DUE)
-    return Moment(Event.SERVICED) if at.state == State.REFUEL and at.service and not given.service_due else None
+    return Moment(Event.SERVICED) if at.state == State.REFUEL and at.service and not due else None
 
 
 def _of_state(machine: HaulageMachine, at: Status, given: MissionInput, where: Whereabouts, task: int) -> Moment | None:

@@ -36,23 +36,31 @@ class MissionTask:
         self._where = Whereabouts(layout)
         self._ledger = Ledger()
         self._orders: list[Buckets] = []
-        self._taken = self._task = self._number = 0
+        self.orders_taken = self._task = self._number = 0
         self._bucket = Report()
         self._cycle: Cycle | None = None
 
     def update(self, given: MissionInput) -> MissionOutput:
         """Return what is asked for now."""
-        self._orders += given.orders[self._taken :]
-        self._taken = max(self._taken, len(given.orders))
+        self._orders += given.orders[self.orders_taken :]
+        self.orders_taken = max(self.orders_taken, len(given.orders))
         events: list[Event] = []
         self._cycle = None
         self._where.moved(given)
         while len(events) < _MOST_EVENTS and (moment := self._moment(given)) is not None:
+            before = self.status.edge
             self._take(moment, given)
             events.append(moment.event)
+            if self.status.edge != before and given.permit is not None:
+                given = given._replace(permit=False, point_free=False)  # what was granted has been used
         phase, cause = phase_of(self.machine, self.status, given, first=self._number == 0)
         self._ledger.note(given.now_ns, phase, self._where.place(self.status), cause, given.odometer_m)
         return self._output(given, tuple(events))
+
+    @property
+    def to_go_m(self) -> float:
+        """Way to the end of the edge that the machine is on; 0 where it is not known, and where it stands at the end."""
+        return self._where.to_go_m
 
     def rest(self) -> Cycle | None:
         """Return what has been done since the last cycle ended, as a cycle that was not finished; None: nothing."""

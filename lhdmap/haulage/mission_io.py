@@ -61,6 +61,7 @@ class MissionInput(NamedTuple):
         abort: the station ends the mission.
         answer: what the operator says to an open request.
         service_due: fuel, or another service, is due; it is over once it is no longer.
+        make_way: others can only go on if the machine is at home; its next bucket waits.
     """
 
     now_ns: int
@@ -79,6 +80,7 @@ class MissionInput(NamedTuple):
     abort: bool = False
     answer: Answer = ""
     service_due: bool = False
+    make_way: bool = False
 
 
 class MissionOutput(NamedTuple):

@@ -13,12 +13,23 @@ from lhdmap.traffic.claims import Claims, Joint
 from lhdmap.traffic.sections import Cycle, Haul, Leg, Place, SectionMap
 
 
+class _Wait(NamedTuple):
+    """What a machine waits for: since when, for which section (empty: any), whether it is bound for home."""
+
+    since_ns: int
+    section: str
+    home: bool
+
+
 class Grant(NamedTuple):
     """A machine may drive into a section, and is on this leg then."""
 
     machine: str
     section: str
     leg: Leg
+
+
+_FREE = (Leg.EMPTY, Leg.HOME)
 
 
 class TrafficControl:
@@ -29,22 +40,26 @@ class TrafficControl:
         self.claims = Claims([Cycle(sections, haul) for haul in hauls.values()])
         self._at: Joint = self.claims.home
         self._behind: dict[str, str] = {}
-        self._waits: dict[str, tuple[int, str]] = {}
+        self._waits: dict[str, _Wait] = {}
 
     def place(self, machine: str) -> Place:
         """Return what a machine is at: the section that was granted last."""
         who = self.names.index(machine)
         return self.claims.cycles[who].places[self._at[who]]
 
+    def haul(self, machine: str) -> Haul:
+        """Return what a machine does."""
+        return self.claims.cycles[self.names.index(machine)].haul
+
     def held(self) -> dict[str, str]:
         """Return who holds each section that is held."""
         front = {self.place(name).section: name for name in self.names}
         return {section: name for name, section in self._behind.items()} | front
 
-    def wants(self, machine: str, now_ns: int, towards: str = "") -> None:
-        """A machine asks to go on: where it may choose, `load` or `home` (`towards`), else wherever its way leads."""
-        since, _ = self._waits.get(machine, (now_ns, ""))
-        self._waits[machine] = (since, towards)
+    def wants(self, machine: str, now_ns: int, section: str = "", *, home: bool = False) -> None:
+        """A machine asks to go on: wherever its way leads, or into one section alone; `home`: it has nothing more to load."""
+        since = self._waits[machine].since_ns if machine in self._waits else now_ns
+        self._waits[machine] = _Wait(since, section, home)
 
     def left(self, machine: str) -> None:
         """The rear of a machine has left the section behind it."""
@@ -52,7 +67,7 @@ class TrafficControl:
 
     def waiting(self) -> dict[str, int]:
         """Return who waits, and since when."""
-        return {name: since for name, (since, _) in self._waits.items()}
+        return {name: wait.since_ns for name, wait in self._waits.items()}
 
     def step(self) -> list[Grant]:
         """Return what is granted now, in order; a machine that got something asks anew for what follows."""
@@ -63,13 +78,13 @@ class TrafficControl:
 
     def _next(self) -> Grant | None:
         held = self.held()
-        for name in sorted(self._waits, key=lambda name: (self._waits[name][0], self.names.index(name))):
+        for name in sorted(self._waits, key=lambda name: (self._waits[name].since_ns, self.names.index(name))):
             who = self.names.index(name)
-            if name in self._behind:
-                continue  # its rear is still in the section behind: a third one is not held
-            for following in self._options(who, self._waits[name][1]):
+            for following in self._options(who, self._waits[name]):
                 after = (*self._at[:who], following, *self._at[who + 1 :])
                 place = self.claims.cycles[who].places[following]
+                if self._behind.get(name, place.section) != place.section:
+                    continue  # its rear is still in the section behind: a third one is not held
                 if held.get(place.section, name) == name and self.claims.safe(after):
                     self._behind[name] = self.place(name).section
                     self._at = after
@@ -77,14 +92,17 @@ class TrafficControl:
                     return Grant(name, place.section, place.leg)
         return None
 
-    def _options(self, who: int, towards: str) -> Sequence[int]:
+    def _options(self, who: int, wait: _Wait) -> Sequence[int]:
         """Return the states that a machine may go to, the best first; home only where that is wanted, or nothing else is safe."""
         cycle = self.claims.cycles[who]
-        options = cycle.moves[self._at[who]]
-        place = cycle.places[self._at[who]]
-        if place.leg != Leg.HOME or place.section not in (cycle.haul.dump, cycle.haul.home):
+        options, place = list(cycle.moves[self._at[who]]), cycle.places[self._at[who]]
+        if place.leg != Leg.LOADED:  # it may think better of its next bucket, and of going home
+            options += [k for other in _FREE if other != place.leg for k in cycle.moves_of(Place(other, place.section))]
+        options = [k for k in dict.fromkeys(options) if wait.section in ("", cycle.places[k].section)]
+        if place.leg == Leg.LOADED:
             return options
-        home = [k for k in options if cycle.places[k].leg == Leg.HOME]
-        if towards == "home":
+        home = [k for k in options if cycle.places[k].leg == Leg.HOME and cycle.places[k].section != cycle.haul.dump]
+        if wait.home:
             return home
-        return options if place.section == cycle.haul.dump else [k for k in options if k not in home]
+        onward = [k for k in options if k not in home]
+        return onward if place == Place(Leg.HOME, cycle.haul.home) else [*onward, *home]

@@ -157,7 +157,7 @@ def test_a_machine_that_wants_home_goes_home() -> None:
     places = []
     for now_ns in range(10):
         control.left("m0")
-        control.wants("m0", 100 + now_ns, "home")
+        control.wants("m0", 100 + now_ns, home=True)
         places += [one.section for one in control.step()]
     assert places[-1] == "p0"
     assert "r0" not in places
