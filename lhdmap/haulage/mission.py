@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from typing import Literal
 
-from lhdmap.haulage.events import Moment, event_of
+from lhdmap.haulage.events import Facts, Moment, event_of
 from lhdmap.haulage.layout import Layout
 from lhdmap.haulage.machine import NOWHERE, Errand, HaulageMachine, Status, Tries
 from lhdmap.haulage.mission_io import Buckets, MissionInput, MissionOutput, Motion, Report
@@ -37,6 +37,7 @@ class MissionTask:
         self._ledger = Ledger()
         self._orders: list[Buckets] = []
         self.orders_taken = self._task = self._number = 0
+        self._helped = False
         self._bucket = Report()
         self._cycle: Cycle | None = None
 
@@ -68,7 +69,9 @@ class MissionTask:
         return self._made(intervals, finished=False) if intervals else None
 
     def _moment(self, given: MissionInput) -> Moment | None:
-        return event_of(self.machine, self.status, given, self._where, self._task, ordered=bool(self._orders))
+        return event_of(
+            self.machine, self.status, given, Facts(self._where, self._task, bool(self._orders), self._helped)
+        )
 
     def _take(self, moment: Moment, given: MissionInput) -> None:
         """Let the machine take an event, and note what it means."""
@@ -82,6 +85,8 @@ class MissionTask:
         self.status = self.machine.step(before, event, moment.edge, buckets)
         if self.status.loaded and not before.loaded:
             self._bucket = given.loading
+        if self.status.state == State.ASSIST and before.state != State.ASSIST:
+            self._helped = event in (Event.LOST, Event.OBSTACLE_STAYS)
         if event == Event.ABORT:
             self._orders.clear()
         again = event in (Event.LOAD_FAILED, Event.DUMP_STUCK)
@@ -128,12 +133,16 @@ class MissionTask:
             following is not None and edges[following].gives_way,
             cause if at.state == State.ASSIST else "",
             at.left + sum(one.buckets for one in self._orders),
+            self._where.place(at),
+            cause,
             events,
             self._cycle,
         )
 
     def _goal(self, at: Status) -> str:
-        """Return where navigation is to go: to the goal, or as far as is permitted."""
+        """Return where navigation is to go: to the goal, or as far as is permitted; with its own help it keeps its goal."""
+        if at.state == State.ASSIST:
+            return self.machine.goal(at) if self._helped else ""
         if at.state not in MOVING | {State.QUEUE} or _motion(at) == "stop":
             return ""
         if at.edge != NOWHERE and (at.permission == Permission.WAIT or at.state == State.QUEUE):

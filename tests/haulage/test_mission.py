@@ -166,10 +166,34 @@ def test_service_is_done_after_the_dump_and_the_mission_goes_on(drive: Drive) ->
 
 def test_a_dock_that_is_missed_is_tried_again_from_the_queue_point(drive: Drive) -> None:
     until(drive, State.DOCK)
-    task = drive.task
-    task.status = task.machine.step(task.status, Event.DOCK_MISSED)
-    assert (task.status.state, task.status.tries) == (State.QUEUE, 1)
-    assert drive.tick(ORDER).state == State.DOCK
+    missed = drive.tick(ORDER, navigation=Navigation("missed", "L1"))
+    assert (missed.state, missed.goal) == (State.QUEUE, "A1 queue")
+    for _ in range(20):
+        assert drive.tick(ORDER, navigation=Navigation("driving", "A1 queue")).state == State.QUEUE
+    assert drive.tick(ORDER, navigation=Navigation("arrived", "A1 queue")).state == State.DOCK
+    drive.tick(ORDER, navigation=Navigation("missed", "L1"))
+    drive.tick(ORDER, navigation=Navigation("arrived", "A1 queue"))
+    helped = drive.tick(ORDER, navigation=Navigation("missed", "L1"))
+    assert (helped.state, drive.events.count(Event.DOCK_MISSED)) == (State.ASSIST, 3)
+
+
+def test_help_that_navigation_got_of_itself_needs_no_other_answer(drive: Drive) -> None:
+    until(drive, State.ROAD)
+    for _ in range(30):
+        helped = drive.tick(ORDER, navigation=Navigation("assistance", "L1", "no other route"))
+        assert (helped.state, helped.phase, helped.motion) == (State.ASSIST, Phase.ASSISTANCE, "stop")
+    assert helped.goal == "D1"
+    assert drive.tick(ORDER).state == State.ROAD
+    drive.run(ORDER, 3000.0)
+    assert sum(one.seconds(Phase.ASSISTANCE) for one in drive.cycles) == pytest.approx(3.0, abs=0.2)
+
+
+def test_loading_that_was_given_up_is_not_gone_on_with_by_itself(drive: Drive) -> None:
+    drive.fails = ["failed", "failed", "failed"]
+    until(drive, State.ASSIST)
+    for _ in range(30):
+        assert drive.tick(ORDER).state == State.ASSIST
+    assert drive.tick(ORDER, answer="done", estop=True).state == State.ASSIST
 
 
 @settings(deadline=None, max_examples=25)
