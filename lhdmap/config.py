@@ -12,6 +12,7 @@ from typing import Any
 from lhdmap.errors import ConfigError
 from lhdmap.executor.settings import ExecutorSettings
 from lhdmap.guidance.settings import GuidanceSettings
+from lhdmap.haulage.settings import HaulageSettings
 from lhdmap.integration.integrator import IntegrationSettings
 from lhdmap.landmarks.settings import LandmarkSettings
 from lhdmap.localization.settings import LocalizationSettings
@@ -31,6 +32,7 @@ from lhdmap.rockbreaker.settings import RockbreakerSettings
 from lhdmap.settings import load_section, nearest, section_toml
 from lhdmap.smoothing.settings import SmoothingSettings
 from lhdmap.topology.settings import TopologySettings
+from lhdmap.traffic.settings import TrafficSettings
 
 _HEADER = """\
 # Settings of the lhdmap pipeline: the defaults. Copy this file, change what you need and pass it with --config; keys that
@@ -64,6 +66,8 @@ class Settings:
     figure9: Figure9Constants = field(default_factory=Figure9Constants)
     figure9_repaired: RepairedConstants = field(default_factory=RepairedConstants)
     movement: MovementSettings = field(default_factory=MovementSettings)
+    haulage: HaulageSettings = field(default_factory=HaulageSettings)
+    traffic: TrafficSettings = field(default_factory=TrafficSettings)
     recording: RecordingSettings = field(default_factory=RecordingSettings)
     rockbreaker: RockbreakerSettings = field(default_factory=RockbreakerSettings)
 

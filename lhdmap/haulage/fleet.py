@@ -14,20 +14,28 @@ from lhdmap.haulage.layout import Layout
 from lhdmap.haulage.machine import NOWHERE, Errand, Status
 from lhdmap.haulage.mission import MissionTask
 from lhdmap.haulage.mission_io import MissionInput, MissionOutput
+from lhdmap.haulage.settings import HaulageSettings
 from lhdmap.haulage.states import TASKS, State
 from lhdmap.traffic.control import TrafficControl
 from lhdmap.traffic.sections import Haul, Leg, Section, SectionMap
 
-MACHINE_M = 10.0
-ASK_M = 40.0  # before the end of its section a machine asks for the next one: it brakes from 25 km/h in so much
-
 
 class Fleet:
-    """Machines by name, each with its errand (its orders are to be from and to the same points) and a park of its own."""
+    """Machines by name, each with its errand (its orders are to be from and to the same points) and a park of its own.
 
-    def __init__(self, layout: Layout, errands: Mapping[str, Errand], machine_m: float = MACHINE_M) -> None:
-        self._layout, self._machine_m = layout, machine_m
-        self.tasks = {name: MissionTask(layout, name, errand.park) for name, errand in errands.items()}
+    `machine_m`: length of a machine; its rear has left a section once it is so far beyond.
+    """
+
+    def __init__(
+        self,
+        layout: Layout,
+        errands: Mapping[str, Errand],
+        settings: HaulageSettings | None = None,
+        machine_m: float = 10.0,
+    ) -> None:
+        self._layout, self._settings, self._machine_m = layout, settings or HaulageSettings(), machine_m
+        tries = self._settings.tries
+        self.tasks = {name: MissionTask(layout, name, errand.park, tries) for name, errand in errands.items()}
         hauls = {name: Haul(*(self._section_at(point) for point in errand)) for name, errand in errands.items()}
         self.control = TrafficControl(sections_of_layout(layout, errands), hauls)
         self._entered: dict[str, tuple[str, float]] = {}
@@ -76,7 +84,7 @@ class Fleet:
     def _next_section(self, name: str, told: MissionInput) -> str:
         """Return the section after the one that a machine is in; empty: none is wanted yet."""
         task, ahead = self.tasks[name], self._bound(name, told)
-        if (ahead.state in TASKS and task.machine.working(ahead)) or task.to_go_m > ASK_M:
+        if (ahead.state in TASKS and task.machine.working(ahead)) or task.to_go_m > self._settings.ask_m:
             return ""
         here = self._layout.edges[ahead.edge].node
         for _ in range(len(self._layout.edges)):

@@ -51,6 +51,7 @@ from tests.report.synthetic import START_NS, report_data
 from tests.report.test_recording import read
 from tests.settings import streams
 from tests.settings.guided import barred, plans, remembered, stops, trips
+from tests.settings.hauled import asked, fleet, tried
 from tests.settings.streams import Stream
 
 Probe = Callable[[Settings], str]
@@ -315,6 +316,16 @@ def navigated(settings: Settings) -> str:
     return digest(trips(settings))
 
 
+def hauled(settings: Settings) -> str:
+    """Return the digest of how often a mission tries, and when it asks for its next section."""
+    return digest(tried(settings.haulage), list(asked(settings.haulage)))
+
+
+def shared(settings: Settings) -> str:
+    """Return the digest of what three machines achieve on a level."""
+    return digest(fleet(settings.traffic))
+
+
 def _mapped(stream: Callable[[], Stream], primary: Literal["front", "points"] = "front", *, own: bool = False) -> Probe:
     return lambda settings: run(settings, stream(), primary, own=own)
 
@@ -337,6 +348,8 @@ PROBES: dict[str, Probe] = {
     "driven": driven,
     "guided": guided,
     "navigated": navigated,
+    "hauled": hauled,
+    "shared": shared,
     "landmarks": landmarks,
     "pile": pile,
     "recording": recording,
