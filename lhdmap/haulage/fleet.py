@@ -44,7 +44,7 @@ class Fleet:
         """Return what is asked of each machine; one that is not told of is left alone, with the sections that it holds."""
         for name, told in given.items():
             self._asks(name, told)
-        self.control.step()
+        self.control.step(max((told.now_ns for told in given.values()), default=0))
         outputs = {}
         for name, told in given.items():
             free, way = self._free(name, told), self._makes_way(name)

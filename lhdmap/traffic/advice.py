@@ -51,7 +51,7 @@ def throughput(
 ) -> Throughput | None:
     """Return the throughput to a dump from the nearest draw points; None where there are not two machines' worth of places.
 
-    Each machine has a draw point of its own; where there are fewer, the rest share the nearest one and are at home in a park.
+    Each machine has a draw point of its own, and is at home there; a single one is shared by machines that are at home in parks.
 
     Raises:
         InputError: a draw point and the dump are not joined.
@@ -77,13 +77,14 @@ def _hauls(topology: TopologicalMap, made: MapSections, dump: str, machines: int
     draws = sorted(
         (name for name in draws if made.places[name] in to_go_m), key=lambda name: to_go_m[made.places[name]]
     )
-    homes = dict.fromkeys(made.places[name] for name in draws if made.places[name] != at)
-    hauls = [Haul(home, at, home) for home in homes]
-    if hauls:
-        parks = dict.fromkeys(
-            made.places[one.name] for one in topology.waypoints if one.purpose == "park" and one.name in made.places
-        )
-        hauls += [Haul(hauls[0].load, at, park) for park in parks if park not in (*homes, at) and park in to_go_m]
+    loads = dict.fromkeys(made.places[name] for name in draws if made.places[name] != at)
+    parks = dict.fromkeys(
+        made.places[one.name] for one in topology.waypoints if one.purpose == "park" and one.name in made.places
+    )
+    hauls = [Haul(load, at, load) for load in loads]
+    if len(loads) == 1:
+        (load,) = loads
+        hauls = [Haul(load, at, park) for park in parks if park not in (load, at) and park in to_go_m]
     return {f"machine {k + 1}": haul for k, haul in enumerate(hauls[:machines])}
 
 

@@ -1,7 +1,8 @@
 """Section control: who may drive into which section next. Pure: time is an input, grants are the output.
 
 A machine holds the section that it is in, and the one behind it until its rear has left it. What it wants next is granted where
-that is free and the state after it is safe (`lhdmap.traffic.claims`); who has waited longest is asked first.
+that is free and the state after it is safe (`lhdmap.traffic.claims`); who has waited longest is asked first. Who has waited longer
+than `PATIENCE_S` stops new cycles of all others: they come home, and from there its own can always be driven.
 """
 
 from __future__ import annotations
@@ -9,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
+from lhdmap.errors import UsageError
 from lhdmap.traffic.claims import Claims, Joint
 from lhdmap.traffic.sections import Cycle, Haul, Leg, Place, SectionMap
 
@@ -29,11 +31,16 @@ class Grant(NamedTuple):
     leg: Leg
 
 
+PATIENCE_S = 90.0
 _FREE = (Leg.EMPTY, Leg.HOME)
 
 
 class TrafficControl:
-    """Controls machines on one map; each begins at its home."""
+    """Controls machines on one map; each begins at its home.
+
+    Raises:
+        UsageError: a machine that is at home is always in the way of another.
+    """
 
     def __init__(self, sections: SectionMap, hauls: Mapping[str, Haul]) -> None:
         self.names = list(hauls)
@@ -41,6 +48,9 @@ class TrafficControl:
         self._at: Joint = self.claims.home
         self._behind: dict[str, str] = {}
         self._waits: dict[str, _Wait] = {}
+        for who, name in enumerate(self.names):
+            if not self.claims.can_dump_alone(who):
+                raise UsageError(f"machine '{name}' can never dump: another one that is at home is in its way")
 
     def place(self, machine: str) -> Place:
         """Return what a machine is at: the section that was granted last."""
@@ -69,24 +79,32 @@ class TrafficControl:
         """Return who waits, and since when."""
         return {name: wait.since_ns for name, wait in self._waits.items()}
 
-    def step(self) -> list[Grant]:
+    def step(self, now_ns: int) -> list[Grant]:
         """Return what is granted now, in order; a machine that got something asks anew for what follows."""
         given: list[Grant] = []
-        while (grant := self._next()) is not None:
+        while (grant := self._next(now_ns)) is not None:
             given.append(grant)
         return given
 
-    def _next(self) -> Grant | None:
+    def _next(self, now_ns: int) -> Grant | None:
+        line = sorted(self._waits, key=lambda name: (self._waits[name].since_ns, self.names.index(name)))
+        starved = line and now_ns - self._waits[line[0]].since_ns > PATIENCE_S * 1e9
+        return (starved and self._first(line, new_cycles=line[:1])) or self._first(line, new_cycles=line) or None
+
+    def _first(self, line: Sequence[str], new_cycles: Sequence[str]) -> Grant | None:
+        """Return the first grant along a line of machines; those in `new_cycles` may begin another cycle."""
         held = self.held()
-        for name in sorted(self._waits, key=lambda name: (self._waits[name].since_ns, self.names.index(name))):
-            who = self.names.index(name)
+        for name in line:
+            who, here = self.names.index(name), self.place(name)
             for following in self._options(who, self._waits[name]):
                 after = (*self._at[:who], following, *self._at[who + 1 :])
                 place = self.claims.cycles[who].places[following]
                 if self._behind.get(name, place.section) != place.section:
                     continue  # its rear is still in the section behind: a third one is not held
+                if here.leg == Leg.HOME and place.leg != Leg.HOME and name not in new_cycles:
+                    continue
                 if held.get(place.section, name) == name and self.claims.safe(after):
-                    self._behind[name] = self.place(name).section
+                    self._behind[name] = here.section
                     self._at = after
                     del self._waits[name]
                     return Grant(name, place.section, place.leg)

@@ -255,3 +255,28 @@ def test_a_mission_on_a_map_follows_the_nodes_that_localization_tells() -> None:
     assert output.cycle is not None
     assert output.cycle.mass_t == 9.5
     assert output.goal == "P1"
+
+
+def test_a_closed_tunnel_is_gone_round() -> None:
+    layout = layout_of_map(map_of_plan("level"), "level")
+    task = MissionTask(layout)
+    shortest = layout.route("DP1", "OP1")
+    assert shortest is not None
+    closed = next(layout.edges[k].node for k in shortest if layout.edges[k].kind == State.ROAD)
+
+    def told(now_ns: int, **more: Any) -> State:
+        orders = (Buckets("DP1", "OP1"),)
+        return task.update(MissionInput(now_ns, orders=orders, closed=(closed,), **more)).state
+
+    assert told(1, navigation=Navigation("arrived", "DP1")) == State.LOAD
+    told(2, loading=Report(1, "done"))
+    nodes = [layout.edges[task.status.edge].node]
+    for now_ns in range(3, 60):
+        following = task.machine.next_edge(task.status)
+        if following is None:
+            break
+        nodes.append(layout.edges[following].node)
+        last = told(now_ns, node=nodes[-1], navigation=Navigation("driving"))
+    assert last == State.DOCK
+    assert closed not in nodes
+    assert len(nodes) > len(shortest)
