@@ -13,6 +13,7 @@ from lhdmap.docking.settings import DockingSettings
 from lhdmap.errors import ConfigError
 from lhdmap.executor.settings import ExecutorSettings
 from lhdmap.guidance.settings import GuidanceSettings
+from lhdmap.haulage.settings import HaulageSettings
 from lhdmap.integration.integrator import IntegrationSettings
 from lhdmap.landmarks.settings import LandmarkSettings
 from lhdmap.loading.digging_settings import (
@@ -42,6 +43,7 @@ from lhdmap.settings import load_section, nearest, section_toml
 from lhdmap.smoothing.settings import SmoothingSettings
 from lhdmap.topology.settings import TopologySettings
 from lhdmap.tracking.settings import TrackingSettings
+from lhdmap.traffic.settings import TrafficSettings
 
 _HEADER = """\
 # Settings of the lhdmap pipeline: the defaults. Copy this file, change what you need and pass it with --config; keys that
@@ -84,6 +86,8 @@ class Settings:
     weighing: WeighingSettings = field(default_factory=WeighingSettings)
     attempts: AttemptSettings = field(default_factory=AttemptSettings)
     movement: MovementSettings = field(default_factory=MovementSettings)
+    haulage: HaulageSettings = field(default_factory=HaulageSettings)
+    traffic: TrafficSettings = field(default_factory=TrafficSettings)
     recording: RecordingSettings = field(default_factory=RecordingSettings)
     rockbreaker: RockbreakerSettings = field(default_factory=RockbreakerSettings)
 

@@ -27,7 +27,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="N",
         help="machines for which throughput is told (default: 3; 0: none)",
     )
-    add_settings(parser, ["movement"])
+    add_settings(parser, ["movement", "traffic"])
 
 
 def run(arguments: argparse.Namespace, console: Console) -> int:
@@ -39,11 +39,11 @@ def run(arguments: argparse.Namespace, console: Console) -> int:
     from lhdmap.topology.files import read_topology
     from lhdmap.traffic.advice import traffic_findings
 
-    settings = load_settings(arguments.config, arguments.set).movement
+    settings = load_settings(arguments.config, arguments.set)
     machine = load_machine(arguments.machine) if arguments.machine else None
-    verdict = check_map(arguments.map, settings, machine)
+    verdict = check_map(arguments.map, settings.movement, machine)
     if arguments.machines > 1:
-        told = traffic_findings(read_topology(arguments.map), arguments.machines)
+        told = traffic_findings(read_topology(arguments.map), arguments.machines, settings.traffic)
         verdict = verdict_of([*verdict.findings, *told])
     failure = None
     if not verdict.ready:

@@ -18,16 +18,20 @@ class Moment(NamedTuple):
     edge: int = NOWHERE
 
 
-def event_of(
-    machine: HaulageMachine,
-    at: Status,
-    given: MissionInput,
-    where: Whereabouts,
-    task: int,
-    *,
-    ordered: bool,
-) -> Moment | None:
-    """Return the next event of a moment, None where all of them have been taken. `task`: number of the one that runs."""
+class Facts(NamedTuple):
+    """What the executive knows beside its status: where it is, the number of the task that runs, whether buckets are ordered.
+
+    `helped`: navigation asked for the help that is given now; it goes on of itself.
+    """
+
+    where: Whereabouts
+    task: int
+    ordered: bool
+    helped: bool
+
+
+def event_of(machine: HaulageMachine, at: Status, given: MissionInput, facts: Facts) -> Moment | None:
+    """Return the next event of a moment, None where all of them have been taken."""
     safety = _permission(at, given)
     if safety is not None:
         return Moment(safety)
@@ -35,9 +39,9 @@ def event_of(
         return Moment(Event.ABORT)
     return (
         _ways(machine.layout, at, given)
-        or _begins(machine, at, given, where, ordered=ordered)
+        or _begins(machine, at, given, facts)
         or _service(at, given)
-        or _of_state(machine, at, given, where, task)
+        or _of_state(machine, at, given, facts)
     )
 
 
@@ -67,35 +71,40 @@ def _ways(layout: Layout, at: Status, given: MissionInput) -> Moment | None:
     return None
 
 
-def _begins(
-    machine: HaulageMachine, at: Status, given: MissionInput, where: Whereabouts, *, ordered: bool
-) -> Moment | None:
-    if not ordered or given.abort:
+def _begins(machine: HaulageMachine, at: Status, given: MissionInput, facts: Facts) -> Moment | None:
+    if not facts.ordered or given.abort:
         return None
     if at.state == State.IDLE:
         return Moment(Event.DISPATCH)
     if at.state == State.ABORTED:
-        return Moment(Event.DISPATCH, where.edge_now(machine, at._replace(left=1)))
+        return Moment(Event.DISPATCH, facts.where.edge_now(machine, at._replace(left=1)))
     return None
 
 
 def _service(at: Status, given: MissionInput) -> Moment | None:
-    if given.service_due and not at.service and at.state in WORKS:
+    due = given.service_due or given.make_way
+    if due and not at.service and at.state in WORKS:
         return Moment(Event.SERVICE_DUE)
-    return Moment(Event.SERVICED) if at.state == State.REFUEL and at.service and not given.service_due else None
+    return Moment(Event.SERVICED) if at.state == State.REFUEL and at.service and not due else None
 
 
-def _of_state(machine: HaulageMachine, at: Status, given: MissionInput, where: Whereabouts, task: int) -> Moment | None:
+def _of_state(machine: HaulageMachine, at: Status, given: MissionInput, facts: Facts) -> Moment | None:
     if at.state in MOVING:
-        return _moving(machine, at, given, where)
+        return _moving(machine, at, given, facts.where)
     if at.state == State.QUEUE:
-        free = given.point_free is not False and at.permission == Permission.GO
+        free = given.point_free is not False and at.permission == Permission.GO and _in_queue(machine, at, given)
         return Moment(Event.POINT_FREE) if free and machine.next_edge(at) is not None else None
     if at.state == State.LOAD and machine.working(at):
-        return _task(given.loading, task, Event.LOADED, Event.LOAD_FAILED)
+        return _task(given.loading, facts.task, Event.LOADED, Event.LOAD_FAILED)
     if at.state == State.DUMP and machine.working(at):
-        return _task(given.dumping, task, Event.DUMPED, Event.DUMP_STUCK)
-    return _assisted(machine, at, given, where) if at.state == State.ASSIST else None
+        return _task(given.dumping, facts.task, Event.DUMPED, Event.DUMP_STUCK)
+    return _assisted(machine, at, given, facts) if at.state == State.ASSIST else None
+
+
+def _in_queue(machine: HaulageMachine, at: Status, given: MissionInput) -> bool:
+    """Return whether a machine is at its queue point: after a dock that it missed it has to come back first."""
+    said = given.navigation
+    return not at.tries or (said.state == "arrived" and said.goal == machine.layout.edges[at.edge].end)
 
 
 def _moving(machine: HaulageMachine, at: Status, given: MissionInput, where: Whereabouts) -> Moment | None:
@@ -104,9 +113,9 @@ def _moving(machine: HaulageMachine, at: Status, given: MissionInput, where: Whe
         return Moment(Event.LOST if "place" in said.reason else Event.OBSTACLE_STAYS)
     if at.ended:
         return None
+    if said.state == "missed" and at.state == State.DOCK:
+        return Moment(Event.DOCK_MISSED)
     there = said.state == "arrived" and said.goal in (machine.goal(at), machine.layout.edges[at.edge].end)
-    if there and said.goal != machine.goal(at):  # as far as it was permitted
-        return Moment(Event.REACH)
     return Moment(Event.REACH) if there or where.crossed(machine, at) else None
 
 
@@ -117,10 +126,13 @@ def _task(report: Report, task: int, done: Event, failed: Event) -> Moment | Non
     return {"done": Moment(done), "failed": Moment(failed)}.get(report.state)
 
 
-def _assisted(machine: HaulageMachine, at: Status, given: MissionInput, where: Whereabouts) -> Moment | None:
+def _assisted(machine: HaulageMachine, at: Status, given: MissionInput, facts: Facts) -> Moment | None:
     if given.answer == "abort":
         return Moment(Event.ABORT)
+    if at.permission == Permission.STOPPED:
+        return None
     if given.answer == "done":
         return Moment(Event.COMPLETED)
-    on = given.answer == "go_on" and given.navigation.state != "assistance"
-    return Moment(Event.ASSISTED, where.edge_now(machine, at)) if on else None
+    asks = given.navigation.state == "assistance"
+    on = (given.answer == "go_on" or facts.helped) and not asks
+    return Moment(Event.ASSISTED, facts.where.edge_now(machine, at)) if on else None

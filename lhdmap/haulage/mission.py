@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from typing import Literal
 
-from lhdmap.haulage.events import Moment, event_of
+from lhdmap.haulage.events import Facts, Moment, event_of
 from lhdmap.haulage.layout import Layout
 from lhdmap.haulage.machine import NOWHERE, Errand, HaulageMachine, Status, Tries
 from lhdmap.haulage.mission_io import Buckets, MissionInput, MissionOutput, Motion, Report
@@ -36,23 +36,32 @@ class MissionTask:
         self._where = Whereabouts(layout)
         self._ledger = Ledger()
         self._orders: list[Buckets] = []
-        self._taken = self._task = self._number = 0
+        self.orders_taken = self._task = self._number = 0
+        self._helped = False
         self._bucket = Report()
         self._cycle: Cycle | None = None
 
     def update(self, given: MissionInput) -> MissionOutput:
         """Return what is asked for now."""
-        self._orders += given.orders[self._taken :]
-        self._taken = max(self._taken, len(given.orders))
+        self._orders += given.orders[self.orders_taken :]
+        self.orders_taken = max(self.orders_taken, len(given.orders))
         events: list[Event] = []
         self._cycle = None
         self._where.moved(given)
         while len(events) < _MOST_EVENTS and (moment := self._moment(given)) is not None:
+            before = self.status.edge
             self._take(moment, given)
             events.append(moment.event)
+            if self.status.edge != before and given.permit is not None:
+                given = given._replace(permit=False, point_free=False)  # what was granted has been used
         phase, cause = phase_of(self.machine, self.status, given, first=self._number == 0)
         self._ledger.note(given.now_ns, phase, self._where.place(self.status), cause, given.odometer_m)
         return self._output(given, tuple(events))
+
+    @property
+    def to_go_m(self) -> float:
+        """Way to the end of the edge that the machine is on; 0 where it is not known, and where it stands at the end."""
+        return self._where.to_go_m
 
     def rest(self) -> Cycle | None:
         """Return what has been done since the last cycle ended, as a cycle that was not finished; None: nothing."""
@@ -60,7 +69,9 @@ class MissionTask:
         return self._made(intervals, finished=False) if intervals else None
 
     def _moment(self, given: MissionInput) -> Moment | None:
-        return event_of(self.machine, self.status, given, self._where, self._task, ordered=bool(self._orders))
+        return event_of(
+            self.machine, self.status, given, Facts(self._where, self._task, bool(self._orders), self._helped)
+        )
 
     def _take(self, moment: Moment, given: MissionInput) -> None:
         """Let the machine take an event, and note what it means."""
@@ -74,6 +85,8 @@ class MissionTask:
         self.status = self.machine.step(before, event, moment.edge, buckets)
         if self.status.loaded and not before.loaded:
             self._bucket = given.loading
+        if self.status.state == State.ASSIST and before.state != State.ASSIST:
+            self._helped = event in (Event.LOST, Event.OBSTACLE_STAYS)
         if event == Event.ABORT:
             self._orders.clear()
         again = event in (Event.LOAD_FAILED, Event.DUMP_STUCK)
@@ -120,12 +133,16 @@ class MissionTask:
             following is not None and edges[following].gives_way,
             cause if at.state == State.ASSIST else "",
             at.left + sum(one.buckets for one in self._orders),
+            self._where.place(at),
+            cause,
             events,
             self._cycle,
         )
 
     def _goal(self, at: Status) -> str:
-        """Return where navigation is to go: to the goal, or as far as is permitted."""
+        """Return where navigation is to go: to the goal, or as far as is permitted; with its own help it keeps its goal."""
+        if at.state == State.ASSIST:
+            return self.machine.goal(at) if self._helped else ""
         if at.state not in MOVING | {State.QUEUE} or _motion(at) == "stop":
             return ""
         if at.edge != NOWHERE and (at.permission == Permission.WAIT or at.state == State.QUEUE):

@@ -20,7 +20,10 @@ class Buckets(NamedTuple):
 
 
 class Navigation(NamedTuple):
-    """What navigation says: its state (`idle`, `driving`, `resting`, `backing`, `halted`, `arrived`, `assistance`), goal, why."""
+    """What navigation says: its state (`idle`, `driving`, `resting`, `backing`, `halted`, `arrived`, `assistance`), goal, why.
+
+    `missed`: it came to its goal, not within tolerance, and does not try again itself.
+    """
 
     state: str = "idle"
     goal: str = ""
@@ -61,6 +64,7 @@ class MissionInput(NamedTuple):
         abort: the station ends the mission.
         answer: what the operator says to an open request.
         service_due: fuel, or another service, is due; it is over once it is no longer.
+        make_way: others can only go on if the machine is at home; its next bucket waits.
     """
 
     now_ns: int
@@ -79,6 +83,7 @@ class MissionInput(NamedTuple):
     abort: bool = False
     answer: Answer = ""
     service_due: bool = False
+    make_way: bool = False
 
 
 class MissionOutput(NamedTuple):
@@ -97,6 +102,8 @@ class MissionOutput(NamedTuple):
         gives_way: the next turn crosses the opposing lane.
         asks: what help is asked for.
         left: buckets still to be dumped, of all orders.
+        place: name of where the machine is, for the journal.
+        cause: why the phase of now is what it is; empty: nothing to say.
         events: events since the last time.
         cycle: a cycle that has just ended.
     """
@@ -113,5 +120,7 @@ class MissionOutput(NamedTuple):
     gives_way: bool
     asks: str
     left: int
+    place: str
+    cause: str
     events: tuple[Event, ...] = ()
     cycle: Cycle | None = None

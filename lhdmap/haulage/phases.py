@@ -32,6 +32,8 @@ def phase_of(machine: HaulageMachine, at: Status, given: MissionInput, *, first:
 
 
 def _task(at: Status, given: MissionInput) -> tuple[Phase, str]:
+    if at.state == State.REFUEL and given.make_way and not given.service_due:
+        return Phase.TRAFFIC, "makes way for others"
     report = given.loading if at.state == State.LOAD else given.dumping
     helped = at.state != State.REFUEL and report.state == "assistance"
     return (Phase.ASSISTANCE, report.reason) if helped else (_TASKS[at.state], "")

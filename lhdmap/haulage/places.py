@@ -39,6 +39,11 @@ class Whereabouts:
         if self._along is not None and self._pose is not None and before.edge != NOWHERE:
             self._along.moved(*self._pose[:2])
 
+    @property
+    def to_go_m(self) -> float:
+        """Way to the end of the edge; 0 where that is not known."""
+        return 0.0 if self._along is None else max(self._along.length_m - self._along.at_m, 0.0)
+
     def crossed(self, machine: HaulageMachine, at: Status) -> bool:
         """Return whether the end of the edge is behind the machine: by the nodes where they are told, else by the pose."""
         edge = self._layout.edges[at.edge]

@@ -68,6 +68,9 @@ class Road:
         doc="Width of a lane.",
     )
     speed_kmh: float = setting(30.0, unit="km/h", minimum=1.0, maximum=60.0, doc="Speed on it.")
+    checkpoint_m: float = setting(
+        0.0, unit="m", minimum=0.0, doc="A checkpoint each so many metres, where another machine may follow; 0: none."
+    )
 
 
 @dataclass(frozen=True, slots=True)

@@ -85,22 +85,27 @@ class _Drawing:
                 at_m, name = area.at_m, _side(sign)
                 if 0 < number < len(way) - 1:
                     line = self._lane(at_m - sign * self._reach, at_m + sign * self._reach)
-                    yield _edge(
-                        f"{area.name} in {name}",
-                        f"{area.name} out {name}",
-                        State.THROUGH,
-                        line,
-                        self.site.road.speed_kmh,
-                    )
+                    start, end = f"{area.name} in {name}", f"{area.name} out {name}"
+                    edge = _edge(start, end, State.THROUGH, line, self.site.road.speed_kmh)
+                    yield edge._replace(node=f"{area.name} junction")
             for one, other in pairwise(way):
                 from_m, to_m = one.at_m + sign * self._reach, other.at_m - sign * self._reach
                 if (to_m - from_m) * sign < 1.0:
                     raise ConfigError(
                         f"areas '{one.name}' and '{other.name}': {2 * self._reach + 1:g} m of road between them were wanted"
                     )
-                start, end = f"{one.name} out {_side(sign)}", f"{other.name} in {_side(sign)}"
-                line = self._lane(from_m, to_m)
-                yield _edge(start, end, State.ROAD, line, self.site.road.speed_kmh)._replace(node=f"{start} to {end}")
+                yield from self._stretch(
+                    f"{one.name} out {_side(sign)}", f"{other.name} in {_side(sign)}", from_m, to_m
+                )
+
+    def _stretch(self, start: str, end: str, from_m: float, to_m: float) -> Iterator[Edge]:
+        """Yield a lane between two junctions, cut at checkpoints."""
+        road = self.site.road
+        count = max(round(abs(to_m - from_m) / road.checkpoint_m), 1) if road.checkpoint_m else 1
+        names = [start, *(f"{start} {k}" for k in range(1, count)), end]
+        for k, (a, b) in enumerate(pairwise(names)):
+            ends = (from_m + (to_m - from_m) * share / count for share in (k, k + 1))
+            yield _edge(a, b, State.ROAD, self._lane(*ends), road.speed_kmh)._replace(node=f"{a} to {b}")
 
     def _turns(self, area: SiteArea) -> Iterator[Edge]:
         """Yield the turns of a T-junction, onto the road and off it, in the directions in which the road goes on."""
@@ -125,7 +130,7 @@ class _Drawing:
         turn = math.remainder(b[2] - a[2], 2.0 * math.pi)
         kind = State.JUNCTION_ON if start == f"{area.name} out" else State.JUNCTION_OFF
         edge = _edge(start, end, kind, line, self.site.turn_kmh)
-        return edge._replace(area=area.name, gives_way=turn * self._left < 0.0)
+        return edge._replace(area=area.name, gives_way=turn * self._left < 0.0, node=f"{area.name} junction")
 
     def _at_mouth(self, area: SiteArea, outward: int) -> FloatArray:
         """Return the pose at the mouth, where the way out ends (`outward` 1), or the way in begins (-1)."""
@@ -153,7 +158,7 @@ class _Drawing:
         yield made(_edge(f"{area.name} in", queue, State.AREA_IN, _way(comes, at_queue)), f"{area.name} in")
         if area.exit:
             line = _way(at_queue, mouth, [self._in_map(area, point) for point in area.exit_by])
-            yield made(_edge(queue, f"{area.name} out", State.AREA_OUT, line), queue)
+            yield made(_edge(queue, f"{area.name} out", State.AREA_OUT, line), f"{area.name} out")
         for place in area.places:
             yield made(self._dock(area, place, at_queue), place.name)
             joins = place.joins == "queue"
@@ -161,7 +166,7 @@ class _Drawing:
             kind = State.AREA_IN if joins else State.AREA_OUT
             way = [self._in_map(area, point) for point in place.out]
             line = _way(self._in_map(area, place.pose), end, way)
-            yield made(_edge(place.name, name, kind, line), place.name)
+            yield made(_edge(place.name, name, kind, line), f"{area.name} in" if joins else f"{area.name} out")
 
     def _dock(self, area: SiteArea, place: SitePlace, at_queue: FloatArray) -> Edge:
         stands = self._in_map(area, place.pose)

@@ -71,10 +71,11 @@ def usage_chart(production: Production) -> Figure:
     for row, level in enumerate(LEVELS):
         hours = stack.level_s(level) / 3600.0
         axes.barh(row, hours, color=charts.FINAL, alpha=0.85, height=0.7)
-        axes.text(hours, row, f" {hours:.2f} h", va="center", ha="left", fontsize=8)
+        axes.text(0.0, row, f" {hours:.2f} h", va="center", ha="left", fontsize=8)
         if row:
             lost = classes[row - 1]
-            axes.barh(row, stack.class_s(lost) / 3600.0, left=hours, color=_USAGES[lost], height=0.25, label=str(lost))
+            label = str(lost) if stack.by_class_ns[lost] else None
+            axes.barh(row, stack.class_s(lost) / 3600.0, left=hours, color=_USAGES[lost], height=0.25, label=label)
     axes.set_yticks(range(len(LEVELS)), LEVELS)
     axes.set(xlabel="time, h", ylim=(len(LEVELS) - 0.5, -0.5))
     axes.set_xlim(0.0, 1.12 * max(stack.level_s("calendar") / 3600.0, 1e-6))

@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 
 from lhdmap.errors import UsageError
-from lhdmap.traffic.sections import Cycle
+from lhdmap.traffic.sections import Cycle, Leg
 
 Joint = tuple[int, ...]
 MOST_STATES = 2_000_000
@@ -41,6 +41,20 @@ class Claims:
                 section = cycle.section_of[following]
                 if section not in held or section == cycle.section_of[k]:
                     yield who, (*at[:who], following, *at[who + 1 :])
+
+    def can_dump_alone(self, who: int) -> bool:
+        """Return whether a machine can drive its cycle while all others are at home."""
+        cycle = self.cycles[who]
+        seen, stack = {self.home}, [self.home]
+        while stack:
+            for one, after in self.moves(stack.pop()):
+                if one == who and after not in seen:
+                    place = cycle.places[after[who]]
+                    if place.leg == Leg.HOME and place.section == cycle.haul.dump:
+                        return True
+                    seen.add(after)
+                    stack.append(after)
+        return False
 
     def safe(self, at: Joint) -> bool:
         """Return whether all can be brought home from there.

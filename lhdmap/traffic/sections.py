@@ -104,11 +104,24 @@ class Cycle:
             Leg.LOADED: sections.to_go_m(haul.dump, works),
             Leg.HOME: sections.to_go_m(haul.home, works),
         }
+        for leg, start in (
+            (Leg.LOADED, haul.load),
+            (Leg.EMPTY, haul.dump),
+            (Leg.HOME, haul.dump),
+            (Leg.EMPTY, haul.home),
+        ):
+            if start not in self._far[leg]:
+                goal = {Leg.LOADED: haul.dump, Leg.EMPTY: haul.load, Leg.HOME: haul.home}[leg]
+                raise InputError(f"no way leads from section '{start}' to '{goal}'")
         self.places: list[Place] = []
         self.moves: list[tuple[int, ...]] = []
         self._number: dict[Place, int] = {}
         self.home = self._walk(Place(Leg.HOME, haul.home))
         self.section_of = tuple(place.section for place in self.places)
+
+    def moves_of(self, place: Place) -> tuple[int, ...]:
+        """Return the states that can follow a state; none where the machine never is in it."""
+        return self.moves[self._number[place]] if place in self._number else ()
 
     def _walk(self, begin: Place) -> int:
         """Number all states that can be come to; those that follow in order of preference."""
@@ -132,8 +145,6 @@ class Cycle:
         found = self._nearer(place)
         if place.leg == Leg.HOME and place.section in (self.haul.dump, self.haul.home):
             found = [*self._nearer(Place(Leg.EMPTY, place.section)), *found]
-        if not found and not (place.leg == Leg.HOME and place.section == self.haul.home):
-            raise InputError(f"section '{place.section}': no way leads {place.leg} for {self.haul}")
         return found
 
     def _nearer(self, place: Place) -> list[Place]:

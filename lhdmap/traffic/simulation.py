@@ -80,7 +80,7 @@ class _Simulation:
                 self._buckets[name] += 1
                 continue
             since = self._control.waiting()
-            for grant in self._control.step():
+            for grant in self._control.step(now_ns):
                 self._waited(now_ns - since[grant.machine])
                 self._drives(now_ns, grant)
         for since_ns in self._control.waiting().values():

@@ -49,15 +49,18 @@ class Drive:
         return output
 
     def tick(self, orders: tuple[Buckets, ...], **given: Any) -> MissionOutput:
-        self.now_ns += TICK_NS
-        inputs: dict[str, Any] = {
-            "pose_map": self._pose(), "odometer_m": self.odometer_m, "navigation": Navigation("driving"), "orders": orders,
-        }  # fmt: skip
-        if self.arrived:
-            inputs["navigation"] = Navigation("arrived", self.arrived)
-        output = self.task.update(MissionInput(self.now_ns, **(inputs | self._reports() | given)))
-        self._follow(output)
+        output = self.task.update(self.inputs(orders, **given))
+        self.follow(output)
         return output
+
+    def inputs(self, orders: tuple[Buckets, ...], **given: Any) -> MissionInput:
+        """Return what the mission is told a tick later."""
+        self.now_ns += TICK_NS
+        said = Navigation("arrived", self.arrived) if self.arrived else Navigation("driving")
+        inputs: dict[str, Any] = {
+            "pose_map": self._pose(), "odometer_m": self.odometer_m, "navigation": said, "orders": orders,
+        }  # fmt: skip
+        return MissionInput(self.now_ns, **(inputs | self._reports() | given))
 
     def _reports(self) -> dict[str, Report]:
         status, now_s = self.task.status, 1e-9 * self.now_ns
@@ -68,7 +71,8 @@ class Drive:
                 reports[name] = Report(self.number, end, 10.0, 0.91, 1, 0.05)  # type: ignore[arg-type]
         return reports
 
-    def _follow(self, output: MissionOutput) -> None:
+    def follow(self, output: MissionOutput) -> None:
+        """Do what the mission asks for."""
         self.events += output.events
         if not self.states or self.states[-1] != output.state:
             self.states.append(output.state)
@@ -80,8 +84,9 @@ class Drive:
             self.number, self.begun_s = output.task, 1e-9 * self.now_ns
         status = self.task.status
         if status.edge != self.edge and status.state in MOVING:
-            self.edge, self.s_m, self.arrived = status.edge, 0.0, ""
-        if output.motion == "go" and status.state in MOVING:
+            self.edge, self.arrived = status.edge, ""
+            self.s_m = self.layout.edges[self.edge].length_m if status.ended else 0.0
+        if output.motion != "stop" and status.state in MOVING and not status.ended:
             step_m = SPEED_MPS * 1e-9 * TICK_NS
             self.s_m += step_m
             self.odometer_m += step_m

@@ -63,7 +63,8 @@ def map_of_plan(name: str) -> TopologicalMap:
 def _twins(node: dict[str, Any], tunnel: dict[str, Any], end: int) -> list[AccessPoint]:
     """Return both access points where an intersection and the end of a tunnel meet."""
     mid = 0.5 * (tunnel["from_m"] + tunnel["to_m"])
-    mine = [one for one in node["access_points"] if one["drift"] == tunnel["drift"]]
+    drifts = _drifts(tunnel)
+    mine = [one for one in node["access_points"] if one["drift"] == drifts[-1 if end else 0]]
     edge_m = tunnel["from_m"] if end == 0 else tunnel["to_m"]
     near = min(mine, key=lambda one: abs(one["at_m"] - edge_m) + 1e-3 * abs(one["at_m"] - mid))
     pose = np.array([*near["position"], math.radians(near["heading_deg"])])

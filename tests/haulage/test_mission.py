@@ -166,10 +166,34 @@ def test_service_is_done_after_the_dump_and_the_mission_goes_on(drive: Drive) ->
 
 def test_a_dock_that_is_missed_is_tried_again_from_the_queue_point(drive: Drive) -> None:
     until(drive, State.DOCK)
-    task = drive.task
-    task.status = task.machine.step(task.status, Event.DOCK_MISSED)
-    assert (task.status.state, task.status.tries) == (State.QUEUE, 1)
-    assert drive.tick(ORDER).state == State.DOCK
+    missed = drive.tick(ORDER, navigation=Navigation("missed", "L1"))
+    assert (missed.state, missed.goal) == (State.QUEUE, "A1 queue")
+    for _ in range(20):
+        assert drive.tick(ORDER, navigation=Navigation("driving", "A1 queue")).state == State.QUEUE
+    assert drive.tick(ORDER, navigation=Navigation("arrived", "A1 queue")).state == State.DOCK
+    drive.tick(ORDER, navigation=Navigation("missed", "L1"))
+    drive.tick(ORDER, navigation=Navigation("arrived", "A1 queue"))
+    helped = drive.tick(ORDER, navigation=Navigation("missed", "L1"))
+    assert (helped.state, drive.events.count(Event.DOCK_MISSED)) == (State.ASSIST, 3)
+
+
+def test_help_that_navigation_got_of_itself_needs_no_other_answer(drive: Drive) -> None:
+    until(drive, State.ROAD)
+    for _ in range(30):
+        helped = drive.tick(ORDER, navigation=Navigation("assistance", "L1", "no other route"))
+        assert (helped.state, helped.phase, helped.motion) == (State.ASSIST, Phase.ASSISTANCE, "stop")
+    assert helped.goal == "D1"
+    assert drive.tick(ORDER).state == State.ROAD
+    drive.run(ORDER, 3000.0)
+    assert sum(one.seconds(Phase.ASSISTANCE) for one in drive.cycles) == pytest.approx(3.0, abs=0.2)
+
+
+def test_loading_that_was_given_up_is_not_gone_on_with_by_itself(drive: Drive) -> None:
+    drive.fails = ["failed", "failed", "failed"]
+    until(drive, State.ASSIST)
+    for _ in range(30):
+        assert drive.tick(ORDER).state == State.ASSIST
+    assert drive.tick(ORDER, answer="done", estop=True).state == State.ASSIST
 
 
 @settings(deadline=None, max_examples=25)
@@ -231,3 +255,28 @@ def test_a_mission_on_a_map_follows_the_nodes_that_localization_tells() -> None:
     assert output.cycle is not None
     assert output.cycle.mass_t == 9.5
     assert output.goal == "P1"
+
+
+def test_a_closed_tunnel_is_gone_round() -> None:
+    layout = layout_of_map(map_of_plan("level"), "level")
+    task = MissionTask(layout)
+    shortest = layout.route("DP1", "OP1")
+    assert shortest is not None
+    closed = next(layout.edges[k].node for k in shortest if layout.edges[k].kind == State.ROAD)
+
+    def told(now_ns: int, **more: Any) -> State:
+        orders = (Buckets("DP1", "OP1"),)
+        return task.update(MissionInput(now_ns, orders=orders, closed=(closed,), **more)).state
+
+    assert told(1, navigation=Navigation("arrived", "DP1")) == State.LOAD
+    told(2, loading=Report(1, "done"))
+    nodes = [layout.edges[task.status.edge].node]
+    for now_ns in range(3, 60):
+        following = task.machine.next_edge(task.status)
+        if following is None:
+            break
+        nodes.append(layout.edges[following].node)
+        last = told(now_ns, node=nodes[-1], navigation=Navigation("driving"))
+    assert last == State.DOCK
+    assert closed not in nodes
+    assert len(nodes) > len(shortest)

@@ -52,6 +52,7 @@ from tests.report.test_recording import read
 from tests.settings import loading, streams
 from tests.settings.digs import charges, decisions, digs, weighings
 from tests.settings.guided import barred, plans, remembered, stops, trips
+from tests.settings.hauled import asked, fleet, tried
 from tests.settings.streams import Stream
 from tests.settings.tracked import docks, tracks
 
@@ -335,6 +336,12 @@ def tracked(settings: Settings) -> str:
 def docked(settings: Settings) -> str:
     """Return the digest of ways to a dock on wide and tight aprons, or why there is none."""
     return digest(docks(settings.docking))
+def hauled(settings: Settings) -> str:
+    """Return the digest of how often a mission tries, and when it asks for its next section."""
+    return digest(tried(settings.haulage), list(asked(settings.haulage)))
+def shared(settings: Settings) -> str:
+    """Return the digest of what three machines achieve on a level."""
+    return digest(fleet(settings.traffic))
 
 
 def _mapped(stream: Callable[[], Stream], primary: Literal["front", "points"] = "front", *, own: bool = False) -> Probe:
@@ -370,6 +377,8 @@ PROBES: dict[str, Probe] = {
     "loading_limits": loading_limits,
     "tracked": tracked,
     "docked": docked,
+    "hauled": hauled,
+    "shared": shared,
     "landmarks": landmarks,
     "pile": pile,
     "recording": recording,

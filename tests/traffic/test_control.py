@@ -124,13 +124,13 @@ def test_a_section_is_held_until_the_rear_has_left_it() -> None:
     sections, hauls = drift(2)
     control = TrafficControl(sections, hauls)
     control.wants("m0", 0)
-    assert [(one.machine, one.section, one.leg) for one in control.step()] == [("m0", "j", Leg.LOADED)]
+    assert [(one.machine, one.section, one.leg) for one in control.step(10)] == [("m0", "j", Leg.LOADED)]
     control.wants("m1", 1)
-    assert control.step() == []
+    assert control.step(10) == []
     control.wants("m0", 2)
-    assert control.step() == []  # its rear is still in the draw point
+    assert control.step(10) == []  # its rear is still in the draw point
     control.left("m0")
-    assert [one.section for one in control.step()] == ["a0"]
+    assert [one.section for one in control.step(10)] == ["a0"]
     assert control.held()["j"] == "m0"
     assert control.waiting() == {"m1": 1}
 
@@ -141,7 +141,7 @@ def test_who_has_waited_longest_goes_first() -> None:
     control.wants("m2", 5)
     control.wants("m0", 7)
     control.wants("m2", 9)  # asks again: its place in the line stays
-    assert [one.machine for one in control.step()] == ["m2"]
+    assert [one.machine for one in control.step(10)] == ["m2"]
 
 
 def test_a_machine_that_wants_home_goes_home() -> None:
@@ -153,12 +153,12 @@ def test_a_machine_that_wants_home_goes_home() -> None:
         if place.section == "r6":
             break
         control.wants("m0", now_ns)
-        control.step()
+        control.step(10)
     places = []
     for now_ns in range(10):
         control.left("m0")
-        control.wants("m0", 100 + now_ns, "home")
-        places += [one.section for one in control.step()]
+        control.wants("m0", 100 + now_ns, home=True)
+        places += [one.section for one in control.step(10)]
     assert places[-1] == "p0"
     assert "r0" not in places
 
@@ -180,3 +180,28 @@ def test_a_single_machine_needs_as_long_as_its_way() -> None:
     cycle_s = 120.0 / (10.0 / 3.6) + 130.0 / (12.0 / 3.6) + 25.0 + 18.0
     assert shift.total == pytest.approx(36_000.0 / cycle_s, abs=1.0)
     assert shift.longest_wait_s < 30.0 / (10.0 / 3.6)
+
+
+def test_a_machine_whose_draw_point_is_the_home_of_another_is_refused() -> None:
+    sections, hauls = drift(2)
+    both = named(
+        [*((one.name, one.length_m) for one in sections.sections), ("park", 15.0)],
+        ["park j", "dp0 j", "dp1 j", "j dump"],
+    )
+    with pytest.raises(UsageError, match="machine 'm1' can never dump"):
+        TrafficControl(both, {"m0": hauls["m0"], "m1": Haul("dp0", "dump", "park")})
+
+
+def test_who_has_waited_too_long_stops_new_cycles() -> None:
+    """Two machines before one lane: the first comes back again and again, the second asks for something that is never free."""
+    sections, hauls = drift(2, bay=False)
+    control = TrafficControl(sections, hauls)
+    control.wants("m1", 0, "a1")  # not next to it: never granted
+    control.wants("m0", int(95e9))
+    assert [one.machine for one in control.step(int(95e9))] == [
+        "m0"
+    ]  # nothing else could be granted: not held back for nothing
+    control.left("m0")
+    control.wants("m1", int(96e9), "j")
+    control.wants("m0", int(96e9), "a0")
+    assert [one.machine for one in control.step(int(97e9))] == ["m0"]  # out of the way, as its cycle has begun

@@ -59,7 +59,7 @@ def test_links_go_both_ways(level: TopologicalMap) -> None:
 
 def test_a_pocket_pays_on_a_level_with_its_dump_at_a_dead_end(level: TopologicalMap) -> None:
     as_it_is = throughput(level, "OP1", 3)
-    better = throughput(level, "OP1", 3, Extra(pocket="OP1"))
+    better = throughput(level, "OP1", 3, extra=Extra(pocket="OP1"))
     assert as_it_is is not None
     assert better is not None
     assert 1.0 < as_it_is.ratio < better.ratio < 3.0

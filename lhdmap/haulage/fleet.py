@@ -1,0 +1,137 @@
+"""Several missions on one layout under section control: `Fleet.update({machine: MissionInput}) -> {machine: MissionOutput}`.
+
+A section is what edges of the same name (`node`) lie in. Each machine asks for the next one while it is in its own; what is
+granted becomes its `permit`, or frees its point. A machine that can only be let home is told to make way.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from itertools import groupby, pairwise
+
+from lhdmap.errors import UsageError
+from lhdmap.haulage.layout import Layout
+from lhdmap.haulage.machine import NOWHERE, Errand, Status
+from lhdmap.haulage.mission import MissionTask
+from lhdmap.haulage.mission_io import MissionInput, MissionOutput
+from lhdmap.haulage.settings import HaulageSettings
+from lhdmap.haulage.states import TASKS, State
+from lhdmap.traffic.control import TrafficControl
+from lhdmap.traffic.sections import Haul, Leg, Section, SectionMap
+
+
+class Fleet:
+    """Machines by name, each with its errand (its orders are to be from and to the same points) and a park of its own.
+
+    `machine_m`: length of a machine; its rear has left a section once it is so far beyond.
+    """
+
+    def __init__(
+        self,
+        layout: Layout,
+        errands: Mapping[str, Errand],
+        settings: HaulageSettings | None = None,
+        machine_m: float = 10.0,
+    ) -> None:
+        self._layout, self._settings, self._machine_m = layout, settings or HaulageSettings(), machine_m
+        tries = self._settings.tries
+        self.tasks = {name: MissionTask(layout, name, errand.park, tries) for name, errand in errands.items()}
+        hauls = {name: Haul(*(self._section_at(point) for point in errand)) for name, errand in errands.items()}
+        self.control = TrafficControl(sections_of_layout(layout, errands), hauls)
+        self._entered: dict[str, tuple[str, float]] = {}
+
+    def update(self, given: Mapping[str, MissionInput]) -> dict[str, MissionOutput]:
+        """Return what is asked of each machine; one that is not told of is left alone, with the sections that it holds."""
+        for name, told in given.items():
+            self._asks(name, told)
+        self.control.step(max((told.now_ns for told in given.values()), default=0))
+        outputs = {}
+        for name, told in given.items():
+            free, way = self._free(name, told), self._makes_way(name)
+            outputs[name] = self.tasks[name].update(told._replace(permit=free, point_free=free, make_way=way))
+        return outputs
+
+    def _section_at(self, point: str) -> str:
+        return self._layout.edges[self._layout.entering[point][0]].node
+
+    def _asks(self, name: str, told: MissionInput) -> None:
+        """Let a machine give back what is behind it, and ask for what comes next."""
+        task = self.tasks[name]
+        if task.status.edge == NOWHERE:
+            return
+        here, granted = self._layout.edges[task.status.edge].node, self.control.place(name).section
+        if here != granted:
+            return  # it has what comes next, and is not there yet
+        at, entered_m = self._entered.get(name, ("", 0.0))
+        if at != here:
+            self._entered[name] = (here, told.odometer_m)
+        elif told.odometer_m - entered_m >= self._machine_m:
+            self.control.left(name)
+        following = self._next_section(name, told)
+        if following:
+            status = task.status
+            home = not status.left and not status.loaded and not told.orders[task.orders_taken :]
+            self.control.wants(name, told.now_ns, following, home=home or told.service_due)
+
+    def _bound(self, name: str, told: MissionInput) -> Status:
+        """Return the status with which a machine goes on: of a parked one that of its next order."""
+        task = self.tasks[name]
+        status = task.status
+        if status.state == State.IDLE and told.orders[task.orders_taken :]:
+            return status._replace(left=1)
+        return status._replace(service=True) if self._makes_way(name) else status
+
+    def _next_section(self, name: str, told: MissionInput) -> str:
+        """Return the section after the one that a machine is in; empty: none is wanted yet."""
+        task, ahead = self.tasks[name], self._bound(name, told)
+        if (ahead.state in TASKS and task.machine.working(ahead)) or task.to_go_m > self._settings.ask_m:
+            return ""
+        here = self._layout.edges[ahead.edge].node
+        for _ in range(len(self._layout.edges)):
+            following = task.machine.next_edge(ahead)
+            if following is None:
+                return ""
+            if self._layout.edges[following].node != here:
+                return self._layout.edges[following].node
+            ahead = ahead._replace(edge=following)
+        return ""
+
+    def _free(self, name: str, told: MissionInput) -> bool:
+        """Return whether a machine may drive into what comes next."""
+        bound = self._bound(name, told)
+        if bound.edge == NOWHERE:
+            return False
+        here, granted = self._layout.edges[bound.edge].node, self.control.place(name).section
+        following = self.tasks[name].machine.next_edge(bound)
+        return following is not None and self._layout.edges[following].node in (
+            {here} if here == granted else {here, granted}
+        )
+
+    def _makes_way(self, name: str) -> bool:
+        """Return whether a machine with more to load has been let home alone: its next bucket waits until it is there."""
+        place, task = self.control.place(name), self.tasks[name]
+        haul = self.control.haul(name)
+        bound = place.leg == Leg.HOME and place.section not in (haul.dump, haul.home)
+        return bound and task.status.left > 0 and not task.status.loaded
+
+
+def sections_of_layout(layout: Layout, errands: Mapping[str, Errand]) -> SectionMap:
+    """Return the sections of the ways between the points of errands: of edges with the same name, linked as they are driven.
+
+    Raises:
+        UsageError: an errand has no way.
+    """
+    lengths: dict[str, float] = {}
+    links: dict[tuple[str, str], None] = {}
+    for name, errand in errands.items():
+        for start, goal in (
+            (errand.park, errand.load), (errand.load, errand.dump), (errand.dump, errand.load), (errand.dump, errand.park),
+        ):  # fmt: skip
+            route = layout.route(start, goal)
+            if route is None:
+                raise UsageError(f"machine '{name}': no way from {start} to {goal}")
+            edges = [layout.edges[layout.entering[start][0]], *(layout.edges[k] for k in route)]
+            for edge in edges:
+                lengths[edge.node] = max(lengths.get(edge.node, 0.0), edge.length_m)
+            links |= dict.fromkeys(pairwise(node for node, _ in groupby(edges, key=lambda edge: edge.node)))
+    return SectionMap(tuple(Section(name, length) for name, length in lengths.items()), tuple(links))
