@@ -330,15 +330,23 @@ def loading_cycle(settings: Settings) -> str:
 def loading_limits(settings: Settings) -> str:
     """Return the digest of when each limit of the loading task counts."""
     return digest(loading.limits(settings.loading))
+
+
 def tracked(settings: Settings) -> str:
     """Return the digest of what a tracker commands on a drive with slip, noise, an offset, and poses that fail."""
     return digest(tracks(settings.tracking))
+
+
 def docked(settings: Settings) -> str:
     """Return the digest of ways to a dock on wide and tight aprons, or why there is none."""
     return digest(docks(settings.docking))
+
+
 def hauled(settings: Settings) -> str:
     """Return the digest of how often a mission tries, and when it asks for its next section."""
     return digest(tried(settings.haulage), list(asked(settings.haulage)))
+
+
 def shared(settings: Settings) -> str:
     """Return the digest of what three machines achieve on a level."""
     return digest(fleet(settings.traffic))
