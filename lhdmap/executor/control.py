@@ -137,9 +137,9 @@ class Control:
         if motion is not None and self._guarded(now_ns, motion, pull_mps2) and asked < Stop.FULL:
             asked, cause = Stop.FULL, "guard: contact on the braking path"
         if self._pedals is not None and self.digs(now_ns):
-            return self.executor.dig(now_ns, motion, self._pedals, asked, cause)
-        return self.executor.step(now_ns, motion, asked, cause, pull_mps2)
-        command = self.executor.step(now_ns, motion, asked, cause, pull_mps2)
+            command = self.executor.dig(now_ns, motion, self._pedals, asked, cause)
+        else:
+            command = self.executor.step(now_ns, motion, asked, cause, pull_mps2)
         self._joint.gave(now_ns, command.steering_rate_rps)
         return command
 
