@@ -14,6 +14,7 @@ from lhdmap.logs.writer import LogWriter
 from lhdmap.pipeline.interruption import Interruption
 from lhdmap.replay.assemble import Run, Watchers, assemble, parts_of
 from lhdmap.replay.journal import Journal
+from lhdmap.replay.mission_tally import MissionTally
 from lhdmap.replay.parts import Parts
 from lhdmap.replay.processes.film import Film
 from lhdmap.replay.processes.film_drive import DriveFilm
@@ -97,6 +98,8 @@ class _Replay:
             run = assemble(
                 self._request.scenario, self._parts, journal, Watchers(film, Recorder(log, truth=self._request.truth))
             )
+            missions = MissionTally() if self._request.scenario.mission else None
+            journal.listeners += [] if missions is None else [missions]
             started = time.monotonic()
             with interruption:
                 self._go(run, journal, interruption)
@@ -104,6 +107,7 @@ class _Replay:
             factor = simulated_s / max(time.monotonic() - started, 1e-6)
         faults = [fault.told() for fault in run.faults.all]
         verdict = run.monitor.tally.verdict(run.engine.now_ns, faults, factor, journal.sha256) | run.monitor.verdict()
+        verdict |= {} if missions is None else missions.verdict(run.engine.now_ns)
         self._write(verdict, film)
         return verdict
 
@@ -116,7 +120,8 @@ class _Replay:
             self._recording.begin(self._parts.lines_m, expected_s)
         given = self._parts.autonomous
         drive = None if given is None else DriveFilm(given.known.topology)
-        load = None if self._parts.loading is None else LoadFilm(machine.drive.payload_kg)
+        loads = self._parts.loading is not None or bool(request.scenario.mission)
+        load = LoadFilm(machine.drive.payload_kg) if loads else None
         film = Film(machine, self._recording, live=request.live_port is not None, drive=drive, load=load)
         journal.listeners.append(film.take)
         return film

@@ -52,6 +52,7 @@ def render(data: ReplayData) -> str:
         markup.section("Stops", _stops(data.stops)),
         markup.section("Contacts", _contacts(data.verdict["contacts"])),
         markup.section("Faults and what followed", _faults(data.verdict["faults"])),
+        markup.section("Where the time went", _phases(data.verdict)),
         markup.section("Verdict", _verdict(data.verdict)),
         markup.section("How it was made", _made(data)),
     ]
@@ -75,6 +76,11 @@ def _cards(data: ReplayData) -> Iterator[tuple[str, str, str]]:
     yield "stops", str(verdict["stops"]), "rests on the way, without those of start and end"
     yield "assistance", str(verdict["assists"]), f"requests; {verdict['assist_s']:.0f} s until they were answered"
     yield "faults", str(len(verdict["faults"])), "injected by the scenario"
+    if "cycles" in verdict:
+        yield "cycles", str(verdict["cycles"]), f"{verdict['tonnes']:.1f} t to the dump"
+    elif verdict.get("fill") is not None:
+        tries = f"after {verdict['attempts']} attempts, ± {verdict['fill_std']:.2f}; truly {verdict['fill_true']:.2f}"
+        yield "fill", f"{verdict['fill']:.2f}", tries
     if data.drive is not None:
         yield from _drive_cards(data.drive)
 
@@ -159,8 +165,17 @@ def _followed(one: Mapping[str, Any]) -> str:
     return f"{one['after_s']:+.2f} s {one['process']}: {one['to'] or one['event']}"
 
 
+def _phases(verdict: Mapping[str, Any]) -> str:
+    by_phase = verdict.get("time_by_phase_s", {})
+    whole_s = max(sum(by_phase.values()), 1e-9)
+    rows = [(name, f"{s:.1f}", f"{100.0 * s / whole_s:.0f} %") for name, s in by_phase.items()]
+    return markup.table(("phase", "seconds", "share"), rows, numbers_from=1) if rows else ""
+
+
 def _verdict(verdict: Mapping[str, Any]) -> str:
-    rows = [(key, _said(value)) for key, value in verdict.items() if key not in ("contacts", "faults")]
+    rows = [
+        (key, _said(value)) for key, value in verdict.items() if key not in ("contacts", "faults", "time_by_phase_s")
+    ]
     return markup.table(("figure of verdict.json", "value"), rows)
 
 

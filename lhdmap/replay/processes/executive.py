@@ -60,7 +60,7 @@ class Executive(Process):
         self._dumping: DumpingNow | None = None
         self._health: Health | None = None
         self._orders, self._key, self._loads = Orders(0, 0, "", loaded=False), ("", False, 0), 0
-        self._emergency = self._go_on = False
+        self._emergency = self._go_on = self._gave_up = False
         self._mission, self._task = "", 0
         self._odometer_m, self._place = 0.0, np.full(2, np.nan)
 
@@ -97,6 +97,7 @@ class Executive(Process):
             dumping=self._dumped(),
             estop=self._emergency,
             orders=self._buckets,
+            abort=self._gave_up,
             answer="go_on" if self._go_on else "",
         )
 
@@ -196,3 +197,4 @@ class Executive(Process):
         elif topic == STATION_SAYS:
             self._emergency = bool(message.emergency) or (self._emergency and not message.release)
             self._go_on = message.go_on
+            self._gave_up |= bool(message.gave_up)

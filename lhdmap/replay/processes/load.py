@@ -8,7 +8,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from lhdmap.guidance.directive import HEADING, Directive, X, Y
-from lhdmap.loading.assistance import GO_ON, Answer
+from lhdmap.loading.assistance import ABORT, GO_ON, Answer
 from lhdmap.loading.moment import LoadingInput, LoadingOutput, Mission, Target
 from lhdmap.loading.states import ASSISTANCE, Event, State
 from lhdmap.loading.task import LoadingTask
@@ -110,8 +110,10 @@ class Loads(Process):
             self._emergency = bool(message.emergency) or (self._emergency and not message.release)
 
     def _said_go_on(self, word: Word) -> Answer | None:
-        """Return the station's `go on` as an answer to the open request."""
-        return Answer(self._request, GO_ON, by="station") if word.go_on and self._request else None
+        """Return what the station says as an answer to the open request."""
+        if not self._request or not (word.go_on or word.gave_up):
+            return None
+        return Answer(self._request, ABORT if word.gave_up else GO_ON, by="station")
 
     def _told(self, now_ns: int) -> LoadingInput:
         motion, health = self._feed.motion, self._health

@@ -1,0 +1,41 @@
+"""What is counted of a mission, from its journal: cycles, tonnes, and where the time went."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from lhdmap.replay.journal import Event
+from lhdmap.replay.processes.executive import EXECUTIVE
+from lhdmap.simulation.history import SECOND_NS, START_NS
+
+_BEFORE = "idle"
+
+
+class MissionTally:
+    """A listener of the journal; each moment of the run counts for one phase."""
+
+    def __init__(self) -> None:
+        self.cycles, self.tonnes = 0, 0.0
+        self._phase, self._since_ns = _BEFORE, START_NS
+        self._ns_of: dict[str, int] = {}
+
+    def __call__(self, event: Event) -> None:
+        """Take an event."""
+        if event.process != EXECUTIVE:
+            return
+        if event.event == "cycle":
+            self.cycles += 1
+            self.tonnes += float(event.values.get("mass_t") or 0.0)
+        elif event.event == "state":
+            self._until(event.t_ns)
+            self._phase = event.after
+
+    def verdict(self, now_ns: int) -> dict[str, Any]:
+        """Return what `verdict.json` says of the mission."""
+        self._until(now_ns)
+        by_phase = {name: ns / SECOND_NS for name, ns in sorted(self._ns_of.items())}
+        return {"cycles": self.cycles, "tonnes": self.tonnes, "time_by_phase_s": by_phase}
+
+    def _until(self, now_ns: int) -> None:
+        self._ns_of[self._phase] = self._ns_of.get(self._phase, 0) + max(now_ns - self._since_ns, 0)
+        self._since_ns = max(now_ns, self._since_ns)
