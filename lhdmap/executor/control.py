@@ -173,11 +173,10 @@ class Control:
         if self._looked_ns is not None and now_ns - self._looked_ns < _GUARD_NS:
             return self._blocked
         self._looked_ns = now_ns
-        wanted = self.executor.queue.at(now_ns)
         self.swept = self.guard.sweep(
             motion,
             self._beside(self._seen_from(motion), motion),
-            commanded_mps=None if wanted is None else wanted.speed_mps,
+            commanded_mps=self._commanded_mps(now_ns),
             plan=self._plan_ahead(),
             pull_mps2=pull_mps2,
         )
@@ -203,6 +202,13 @@ class Control:
         """Return all points in `base_link` of a motion: the machine has moved since they were seen."""
         seen = [_moved(points, at, motion) for at, points in self._points.values()]
         return np.concatenate(seen) if seen else np.zeros((0, 2))
+
+    def _commanded_mps(self, now_ns: int) -> float | None:
+        """Return the speed that is asked for, by pedals or by the queue; None where nobody asks."""
+        if self._pedals is not None and self.digs(now_ns):
+            return self._pedals.propel * self.executor.model.top_speed_mps
+        wanted = self.executor.queue.at(now_ns)
+        return None if wanted is None else wanted.speed_mps
 
     def _beside(self, points: FloatArray, motion: Motion) -> FloatArray:
         """Return points in `base_link` without those that the bucket is to touch."""
