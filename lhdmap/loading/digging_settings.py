@@ -13,6 +13,7 @@ _TABLE_2 = "autonomous_loading, Table 2"
 _PAPER = "autonomous_loading, section 3.3"
 _FINDINGS = "loading findings, sections 3 and 6"
 _SEARCHED = "searched for on a model: evaluation/loading.md"
+_MODEL = "adaptive on a model of a mine; `fit_gains` takes a machine's own"
 _NOT_PRINTED = "the paper prints none; loading findings, section 1"
 
 
@@ -369,9 +370,17 @@ class AttemptSettings:
         180.0, unit="s", minimum=0.0, maximum=7200.0, doc="Time from the last attempt to the next load's first."
     )
     attempt_s: float = setting(
-        32.0, unit="s", minimum=1.0, maximum=600.0, source="loading findings, section 5", doc="Time of an attempt."
+        30.0, unit="s", minimum=1.0, maximum=600.0, source=_MODEL, doc="Time of an attempt, charge to weighing."
     )
-    first_fill: float = setting(0.75, minimum=0.05, maximum=1.5, doc="Mean fill after the first attempt.")
-    first_std: float = setting(0.21, minimum=0.0, maximum=1.0, doc="Its deviation.")
-    gain_empty: float = setting(0.55, minimum=0.0, maximum=1.5, doc="Gain of an attempt by a line: at fill 0.")
-    gain_full: float = setting(0.02, minimum=-0.5, maximum=1.0, doc="... and at fill 1.")
+    first_fill: float = setting(
+        0.77, minimum=0.05, maximum=1.5, source=_MODEL, doc="Mean fill after the first attempt, as weighed."
+    )
+    first_std: float = setting(0.23, minimum=0.0, maximum=1.0, source=_MODEL, doc="Its deviation.")
+    gain_empty: float = setting(
+        0.70,
+        minimum=0.0,
+        maximum=1.5,
+        source=_MODEL,
+        doc="Gain of a further attempt by a line over the fill: at fill 0.",
+    )
+    gain_full: float = setting(0.0, minimum=-0.5, maximum=1.0, source=_MODEL, doc="... and at fill 1.")
