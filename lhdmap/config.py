@@ -14,14 +14,8 @@ from lhdmap.executor.settings import ExecutorSettings
 from lhdmap.guidance.settings import GuidanceSettings
 from lhdmap.integration.integrator import IntegrationSettings
 from lhdmap.landmarks.settings import LandmarkSettings
-from lhdmap.loading.digging_settings import (
-    AttemptSettings,
-    ChargingSettings,
-    ExcavationSettings,
-    PaperDigSettings,
-    TunedDigSettings,
-    WeighingSettings,
-)
+from lhdmap.loading.digging_settings import ChargingSettings, ExcavationSettings, PaperDigSettings, TunedDigSettings
+from lhdmap.loading.weighing_settings import AttemptSettings, WeighingSettings
 from lhdmap.localization.settings import LocalizationSettings
 from lhdmap.movement.settings import MovementSettings
 from lhdmap.navigation.settings import NavigationSettings

@@ -8,8 +8,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from lhdmap.loading.digging_settings import WeighingSettings
 from lhdmap.loading.signals import Pedals, Signals, Turn
+from lhdmap.loading.weighing_settings import WeighingSettings
 from lhdmap.loading.weighing_settle import Settled, mean_of, sinusoid_of
 
 _LOOK_NS = 100_000_000

@@ -12,7 +12,8 @@ import numpy as np
 from lhdmap.evaluation.loading.loads import Attempt, Load
 from lhdmap.evaluation.loading.tables import tables_of
 from lhdmap.loading.attempts import Attempts, fit_gains
-from lhdmap.loading.digging_settings import AttemptSettings, ChargingSettings, WeighingSettings
+from lhdmap.loading.digging_settings import ChargingSettings
+from lhdmap.loading.weighing_settings import AttemptSettings, WeighingSettings
 from lhdmap.resources import resource
 from lhdmap.simulation.ground.sections import load_ground
 
