@@ -30,6 +30,13 @@ class WeighingSettings:
     lift: float = setting(0.6, minimum=0.05, maximum=1.0, doc="Lift command on the way to β_weigh.")
     fill_per_bar: float = setting(0.0207, unit="1/bar", minimum=1e-5, maximum=1.0, source=_TABLE_2, doc="m of Eq. (9).")
     fill_offset: float = setting(1.0774, minimum=-10.0, maximum=10.0, source=_TABLE_2, doc="n of Eq. (9).")
+    tare_bar: float = setting(
+        0.0,
+        unit="bar",
+        minimum=0.0,
+        maximum=1000.0,
+        doc="Pressure of the empty bucket, weighed the same way: takes out zero and friction; 0: it was not weighed.",
+    )
     method: str = setting(
         "sinusoid",
         choices=("mean", "sinusoid"),

@@ -176,6 +176,9 @@ def detection(count: int = 0) -> dict[str, Any]:
         ("fused without the range", "fused", replace(settings, gate_std=10.0, gate_m=5.0, relief_s=0.0), 4),
     ):
         found[name] = _detected(charge_all(name, detector, chosen, seeds[::step]))
+    for toe_m in (0.3, 0.5):
+        name = f"fused, toe perceived with {toe_m:g} m"
+        found[name] = _detected(charge_all(name, "fused", settings, seeds[::4], toe_m))
     return found
 
 
