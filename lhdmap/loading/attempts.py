@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from lhdmap.loading.digging_settings import AttemptSettings
+from lhdmap.loading.weighing_settings import AttemptSettings
 
 _QUANTILES = 41
 _ROUNDS = 50

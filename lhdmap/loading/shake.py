@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from lhdmap.loading.digging_settings import ExcavationSettings, WeighingSettings
+from lhdmap.loading.digging_settings import ExcavationSettings
 from lhdmap.loading.signals import Pedals, Signals, Turn
+from lhdmap.loading.weighing_settings import WeighingSettings
 
 
 class Shake:

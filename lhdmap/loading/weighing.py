@@ -8,8 +8,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from lhdmap.loading.digging_settings import WeighingSettings
 from lhdmap.loading.signals import Pedals, Signals, Turn
+from lhdmap.loading.weighing_settings import WeighingSettings
 from lhdmap.loading.weighing_settle import Settled, mean_of, sinusoid_of
 
 _LOOK_NS = 100_000_000
@@ -29,12 +29,13 @@ class Weighed(NamedTuple):
 class Weighing:
     """The controller of weighing; ends with `weighed`, or `not settled` where patience ran out: `result` has the fill.
 
-    `tare_bar`: pressure of the empty bucket, weighed the same way; it takes the zero of the sensor out (0.5 % of 600 bar are
-    6 % of a fill). The values of its last turn: `fill`, `fill_std`, `pressure_bar`, `settling_s`.
+    `tare_bar`: pressure of the empty bucket, weighed the same way (by default that of the settings); it takes the zero of the
+    sensor out (0.5 % of 600 bar are 6 % of a fill), and the friction. The values of its last turn: `fill`, `fill_std`,
+    `pressure_bar`, `settling_s`.
     """
 
     def __init__(self, settings: WeighingSettings, tare_bar: float | None = None) -> None:
-        self._settings, self.tare_bar = settings, tare_bar
+        self._settings, self.tare_bar = settings, tare_bar if tare_bar is not None else settings.tare_bar or None
         self.result: Weighed | None = None
         self._rows: deque[tuple[int, float, float]] = deque()  # time, pressure, the same low-passed
         self._held_ns = self._looked_ns = 0

@@ -226,6 +226,8 @@ _SETTINGS = {
     "excavation.stuck_rps": Case("dug", 1.0),
     **_dig_case("excavation_paper", "dug_as_printed", 0.4),
     **_dig_case("excavation_tuned", "dug_tuned", 0.0),
+    "weighing.tare_bar": Case("weighed", 54.0),
+    "attempts.gain_full": Case("decided", 0.2),
     "attempts.full": Case("decided", base={"attempts.rule": "threshold"}),
     "tracking.swerve_share": Case("tracked", 1.0),
     "docking.nodes": Case("docked", 100),

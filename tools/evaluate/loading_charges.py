@@ -42,9 +42,10 @@ class Charges:
 
 
 @functools.cache
-def disturbed(ground: str, kind: str) -> Grounds:
-    """Return the ground on which a kind of charge takes place."""
+def disturbed(ground: str, kind: str, toe_m: float) -> Grounds:
+    """Return the ground on which a kind of charge takes place; `toe_m`: error of the toe, 0: that of the mine's file."""
     base = load_ground(ground)
+    base = replace(base, errors=replace(base.errors, toe_m=toe_m or base.errors.toe_m))
     calm = replace(base.floor, wet_chance=0.0, high_chance=0.0, bumps_per_m=0.0)
     changes: dict[str, dict[str, Any]] = {
         "bumps": {"bumps_per_m": 1.0},
@@ -66,10 +67,10 @@ def kind_of(number: int, count: int) -> str:
 
 
 def charge_all(
-    name: str, detector: str, settings: ChargingSettings, seeds: Sequence[int], ground: str = "default"
+    name: str, detector: str, settings: ChargingSettings, seeds: Sequence[int], toe_m: float = 0.0
 ) -> Charges:
     """Return what a detector makes of the charges of these seeds."""
-    loaders = {kind: Loader(Machine(), disturbed(ground, kind)) for kind in MIX}
+    loaders = {kind: Loader(Machine(), disturbed("default", kind, toe_m)) for kind in MIX}
     found = Charges(name)
     for number, seed in enumerate(seeds):
         kind = kind_of(number, len(seeds))

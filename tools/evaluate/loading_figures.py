@@ -12,7 +12,8 @@ import numpy as np
 from lhdmap.evaluation.loading.loads import Attempt, Load
 from lhdmap.evaluation.loading.tables import tables_of
 from lhdmap.loading.attempts import Attempts, fit_gains
-from lhdmap.loading.digging_settings import AttemptSettings, ChargingSettings, WeighingSettings
+from lhdmap.loading.digging_settings import ChargingSettings
+from lhdmap.loading.weighing_settings import AttemptSettings, WeighingSettings
 from lhdmap.resources import resource
 from lhdmap.simulation.ground.sections import load_ground
 
@@ -175,6 +176,9 @@ def detection(count: int = 0) -> dict[str, Any]:
         ("fused without the range", "fused", replace(settings, gate_std=10.0, gate_m=5.0, relief_s=0.0), 4),
     ):
         found[name] = _detected(charge_all(name, detector, chosen, seeds[::step]))
+    for toe_m in (0.3, 0.5):
+        name = f"fused, toe perceived with {toe_m:g} m"
+        found[name] = _detected(charge_all(name, "fused", settings, seeds[::4], toe_m))
     return found
 
 

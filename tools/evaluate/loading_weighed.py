@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-from lhdmap.loading.digging_settings import ExcavationSettings, WeighingSettings
+from lhdmap.loading.digging_settings import ExcavationSettings
 from lhdmap.loading.shake import Shake
 from lhdmap.loading.signals import Controller, Pedals, Signals
 from lhdmap.loading.weighing import Weighing
+from lhdmap.loading.weighing_settings import WeighingSettings
 from lhdmap.simulation.ground.loader import Loader
 
 from tools.evaluate.loading_loads import TICK_S, Plan, charged, dug, loader_on

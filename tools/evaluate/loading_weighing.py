@@ -12,9 +12,9 @@ from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
-from lhdmap.loading.digging_settings import WeighingSettings
 from lhdmap.loading.signals import Signals
 from lhdmap.loading.weighing import Weighing
+from lhdmap.loading.weighing_settings import WeighingSettings
 
 _TICK_NS = 20_000_000
 _PER_BAR, _OFFSET = 0.0207, 1.0774

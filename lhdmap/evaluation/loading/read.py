@@ -13,7 +13,7 @@ from lhdmap.evaluation.loading.journal import loads_in
 from lhdmap.evaluation.loading.loads import Load
 from lhdmap.evaluation.loading.segments import loads_of
 from lhdmap.evaluation.loading.signals import ROLES, LoadingCollector, LoadingSignals
-from lhdmap.loading.digging_settings import WeighingSettings
+from lhdmap.loading.weighing_settings import WeighingSettings
 from lhdmap.logs.source import LogSource
 
 _WITHOUT = {

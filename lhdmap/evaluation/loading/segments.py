@@ -16,7 +16,7 @@ import numpy.typing as npt
 
 from lhdmap.evaluation.loading.loads import Attempt, Load
 from lhdmap.evaluation.loading.signals import STEP_S, LoadingSignals
-from lhdmap.loading.digging_settings import WeighingSettings
+from lhdmap.loading.weighing_settings import WeighingSettings
 
 _ASKED = 0.02
 _PULSE_S, _BREAK_S, _LEAST_S = 0.3, 1.5, 1.0

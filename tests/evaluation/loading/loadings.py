@@ -6,10 +6,11 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from lhdmap.loading.charge import Charge
-from lhdmap.loading.digging_settings import ChargingSettings, WeighingSettings
+from lhdmap.loading.digging_settings import ChargingSettings
 from lhdmap.loading.excavation import DigSettings, excavation_of
 from lhdmap.loading.signals import Controller, Pedals, Signals
 from lhdmap.loading.weighing import Weighing
+from lhdmap.loading.weighing_settings import WeighingSettings
 from lhdmap.logs.writer import LogWriter
 from lhdmap.messages import Command, Joints, Pressure, Tachometer, Text
 

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from lhdmap.loading.attempts import Attempts, Gains, best_rate, fit_gains
-from lhdmap.loading.digging_settings import AttemptSettings
+from lhdmap.loading.weighing_settings import AttemptSettings
 
 SETTINGS = AttemptSettings()
 

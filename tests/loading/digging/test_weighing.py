@@ -8,9 +8,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from lhdmap.loading.digging_settings import ExcavationSettings, WeighingSettings
+from lhdmap.loading.digging_settings import ExcavationSettings
 from lhdmap.loading.shake import Shake
 from lhdmap.loading.weighing import Weighing
+from lhdmap.loading.weighing_settings import WeighingSettings
 from lhdmap.loading.weighing_settle import mean_of, sinusoid_of
 
 from tests.loading.digging.rig import Loader, World, run
