@@ -220,15 +220,18 @@ def told(bends: list[Bend]) -> str:
     """Return how often they agree."""
     apart = np.array([one.rule_m - one.search_m for one in bends if math.isfinite(one.rule_m)])
     wrong = [one for one in bends if one.by_rule != one.by_search]
-    off = [abs(one.width_m - one.search_m) for one in wrong]
+    tight = sum(math.isinf(one.rule_m) for one in wrong)
+    off = [abs(one.width_m - one.search_m) for one in wrong if math.isfinite(one.rule_m)]
     bold = sum(one.by_rule and not one.by_search for one in bends)
     mapped = sum(one.map_says == one.by_search for one in bends)
     open_m = sum(one.map_says and not one.by_search for one in bends)
     return (
         f"{len(bends)} bends: rule and search agree in {len(bends) - len(wrong)}; the rule lets through {bold} that the search "
         f"does not; widths of the rule less those of the search {np.median(apart):+.2f} m (median; {apart.min():+.2f} to "
-        f"{apart.max():+.2f}); where they disagree the width is within {max(off, default=0.0):.2f} m of what is needed. "
-        f"The map's check agrees with the search in {mapped} and lets through {open_m} that the search does not."
+        f"{apart.max():+.2f}); of those in which they disagree {tight} are tighter than the machine, but "
+        f"so wide that a wider line leads through, the others within {max(off, default=0.0):.2f} m of what is needed. "
+        f"The map's check, whose front axle keeps to the centre line, agrees with the search in {mapped} and lets through "
+        f"{open_m} that the search does not: it refuses what has room beside the machine on the outside alone."
     )
 
 
