@@ -25,7 +25,6 @@ from lhdmap.loading.digging_settings import (
     WeighingSettings,
 )
 from lhdmap.loading.task_settings import LoadingSettings
-from lhdmap.loading.digging_settings import ChargingSettings, ExcavationSettings, PaperDigSettings, TunedDigSettings
 from lhdmap.loading.weighing_settings import AttemptSettings, WeighingSettings
 from lhdmap.localization.settings import LocalizationSettings
 from lhdmap.movement.settings import MovementSettings
