@@ -13,7 +13,7 @@ from lhdmap.errors import UsageError
 from lhdmap.haulage.mission import MissionTask
 from lhdmap.haulage.mission_io import Buckets, MissionInput, Navigation, Report
 from lhdmap.haulage.of_map import layout_of_map
-from lhdmap.haulage.records import Phase
+from lhdmap.haulage.records import Cycle, Phase
 from lhdmap.haulage.states import Event, State
 
 from tests.haulage.drives import DUMP_S, LOAD_S, TICK_NS, Drive
@@ -286,7 +286,8 @@ def test_a_closed_tunnel_is_gone_round() -> None:
 def test_orders_are_named_in_their_cycles_and_must_be_on_the_map() -> None:
     layout = layout_of_map(map_of_plan("level"), "level")
     task, orders = MissionTask(layout), (Buckets("DP1", "OP1"), Buckets("DP5", "OP2"))
-    at, cycles = "DP1", []
+    at = "DP1"
+    cycles: list[Cycle] = []
     for now_ns in range(1, 12):
         done = Report(task.update(MissionInput(now_ns, orders=orders)).task, "done")
         output = task.update(

@@ -5,7 +5,6 @@ from __future__ import annotations
 import csv
 import json
 import math
-from dataclasses import dataclass
 from pathlib import Path
 
 import pyarrow.parquet as pq
@@ -107,11 +106,6 @@ def test_the_page_is_one_file_that_names_the_stop(production: Production, tmp_pa
     assert "None was dumped." in render(production_of([]))
 
 
-@dataclass
-class Clock:
-    t_ns: int = 0
-
-
 def test_a_mission_that_was_driven_is_read_back_from_its_journal(tmp_path: Path) -> None:
     journal = Journal(tmp_path / "journal.jsonl")
     scribe, drive = journal.of("mission"), Drive(hejase())
@@ -131,6 +125,16 @@ def test_a_mission_that_was_driven_is_read_back_from_its_journal(tmp_path: Path)
         for phase in Phase:
             assert theirs.seconds(phase) == pytest.approx(mine.seconds(phase), abs=0.2), phase
         assert theirs.distance_m == pytest.approx(mine.distance_m, abs=1.0)
+
+
+def test_a_mission_is_at_the_pace_that_its_productive_time_allows() -> None:
+    drive = Drive(hejase())
+    drive.run(ORDER, 3000.0)
+    rest = drive.task.rest()
+    assert rest is not None
+    found = production_of([*drive.cycles, rest])
+    assert found.pace >= 0.95
+    assert found.stack.level_s("calendar") == pytest.approx(1e-9 * (rest.to_ns - drive.cycles[0].from_ns))
 
 
 def test_a_drive_without_a_mission_has_its_drives_and_waits(tmp_path: Path) -> None:
