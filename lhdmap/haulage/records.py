@@ -109,8 +109,8 @@ class Ledger:
     def note(self, now_ns: int, phase: Phase, place: str, cause: str, odometer_m: float) -> None:
         """Note the phase from now on.
 
-        A stamp before the last one is taken for the last. An odometer that is not finite tells nothing; where it never told anything
-        the ways are nan.
+        A stamp before the last one is taken for the last. An odometer that is not finite tells nothing; where it never told
+        anything the ways are nan.
         """
         now, known = self._now, math.isfinite(odometer_m)
         driven_m = max(odometer_m - self._odometer_m, 0.0) if known and math.isfinite(self._odometer_m) else 0.0
