@@ -64,8 +64,9 @@ def _ways(layout: Layout, at: Status, given: MissionInput) -> Moment | None:
     """Return an edge that has been closed or opened since."""
     if not given.closed and not at.closed:
         return None
+    names = {layout.ids.get(name, name) for name in given.closed}
     for k, edge in enumerate(layout.edges):
-        shut, wanted = bool(at.closed >> k & 1), edge.kind in CLOSABLE and edge.node in given.closed
+        shut, wanted = bool(at.closed >> k & 1), edge.kind in CLOSABLE and edge.node in names
         if shut != wanted:
             return Moment(Event.CLOSED if wanted else Event.OPENED, k)
     return None

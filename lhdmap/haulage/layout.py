@@ -48,12 +48,13 @@ class Edge(NamedTuple):
 
 @dataclass(frozen=True)
 class Layout:
-    """Points and edges; `roles`: what is done in each area (`load`, `dump`, …)."""
+    """Points and edges; `roles`: what is done in each area (`load`, `dump`, …); `ids`: names of nodes by the map's ids."""
 
     name: str
     points: tuple[Point, ...]
     edges: tuple[Edge, ...]
     roles: dict[str, str] = field(default_factory=dict)
+    ids: dict[str, str] = field(default_factory=dict)
 
     @cached_property
     def point(self) -> dict[str, Point]:

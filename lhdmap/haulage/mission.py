@@ -8,15 +8,18 @@ from __future__ import annotations
 
 from typing import Literal
 
+from lhdmap.errors import UsageError
+from lhdmap.haulage.book import Book
 from lhdmap.haulage.events import Facts, Moment, event_of
 from lhdmap.haulage.layout import Layout
 from lhdmap.haulage.machine import NOWHERE, Errand, HaulageMachine, Status, Tries
-from lhdmap.haulage.mission_io import Buckets, MissionInput, MissionOutput, Motion, Report
+from lhdmap.haulage.mission_io import Buckets, MissionInput, MissionOutput, Motion
 from lhdmap.haulage.phases import phase_of
 from lhdmap.haulage.places import Whereabouts
-from lhdmap.haulage.records import Cycle, Interval, Ledger
+from lhdmap.haulage.records import Cycle, Phase
 from lhdmap.haulage.stages import stage_of
 from lhdmap.haulage.states import MOVING, Event, Permission, State
+from lhdmap.settings import nearest
 
 _MOST_EVENTS = 64  # at a moment
 _TASKS: dict[State, Literal["load", "dump", "refuel"]] = {
@@ -28,25 +31,26 @@ class MissionTask:
     """Runs on one layout; `park`: where the machine stands at first, and goes when nothing is left (empty: the first one)."""
 
     def __init__(self, layout: Layout, machine: str = "lhd", park: str = "", tries: Tries | None = None) -> None:
-        self._name, self._tries = machine, tries
+        self._tries = tries
         self._park = park or layout.of("park")[0]
         first = Errand(layout.of("load")[0], layout.of("dump")[0], self._park)
         self.machine = HaulageMachine(layout, first, tries)
         self.status: Status = self.machine.idle()
-        self._where = Whereabouts(layout)
-        self._ledger = Ledger()
+        self._where, self._book = Whereabouts(layout), Book(machine)
         self._orders: list[Buckets] = []
-        self.orders_taken = self._task = self._number = 0
+        self.orders_taken = self._task = 0
         self._helped = False
-        self._bucket = Report()
-        self._cycle: Cycle | None = None
 
     def update(self, given: MissionInput) -> MissionOutput:
-        """Return what is asked for now."""
-        self._orders += given.orders[self.orders_taken :]
+        """Return what is asked for now.
+
+        Raises:
+            UsageError: an order names what is no draw point or no dump of the layout.
+        """
+        self._orders += [self._checked(one) for one in given.orders[self.orders_taken :]]
         self.orders_taken = max(self.orders_taken, len(given.orders))
         events: list[Event] = []
-        self._cycle = None
+        self._book.ended = None
         self._where.moved(given)
         while len(events) < _MOST_EVENTS and (moment := self._moment(given)) is not None:
             before = self.status.edge
@@ -54,8 +58,7 @@ class MissionTask:
             events.append(moment.event)
             if self.status.edge != before and given.permit is not None:
                 given = given._replace(permit=False, point_free=False)  # what was granted has been used
-        phase, cause = phase_of(self.machine, self.status, given, first=self._number == 0)
-        self._ledger.note(given.now_ns, phase, self._where.place(self.status), cause, given.odometer_m)
+        self._note(given)
         return self._output(given, tuple(events))
 
     @property
@@ -65,26 +68,28 @@ class MissionTask:
 
     def rest(self) -> Cycle | None:
         """Return what has been done since the last cycle ended, as a cycle that was not finished; None: nothing."""
-        intervals = self._ledger.take()
-        return self._made(intervals, finished=False) if intervals else None
+        return self._book.rest(self.machine.errand)
+
+    def _checked(self, order: Buckets) -> Buckets:
+        for name, purpose in ((order.load, "load"), (order.dump, "dump")):
+            known = self.machine.layout.of(purpose)
+            if name not in known:
+                raise UsageError(f"'{name}' is no point to {purpose}{nearest(name, known)}")
+        return order
 
     def _moment(self, given: MissionInput) -> Moment | None:
-        return event_of(
-            self.machine, self.status, given, Facts(self._where, self._task, bool(self._orders), self._helped)
-        )
+        facts = Facts(self._where, self._task, bool(self._orders), self._helped)
+        return event_of(self.machine, self.status, given, facts)
 
     def _take(self, moment: Moment, given: MissionInput) -> None:
         """Let the machine take an event, and note what it means."""
-        before, event = self.status, moment.event
-        if event == Event.DISPATCH:
-            self._next_errand()
-        buckets = self._orders.pop(0).buckets if event == Event.DISPATCH else 1
+        before, event, errand = self.status, moment.event, self.machine.errand
+        buckets = self._next_errand() if event == Event.DISPATCH else 1
         if event == Event.DUMPED and before.left == 1 and self._orders:
-            self._next_errand()
-            before = before._replace(left=1 + self._orders.pop(0).buckets)
+            before = before._replace(left=1 + self._next_errand())
         self.status = self.machine.step(before, event, moment.edge, buckets)
         if self.status.loaded and not before.loaded:
-            self._bucket = given.loading
+            self._book.loaded(given.loading)
         if self.status.state == State.ASSIST and before.state != State.ASSIST:
             self._helped = event in (Event.LOST, Event.OBSTACLE_STAYS)
         if event == Event.ABORT:
@@ -93,30 +98,28 @@ class MissionTask:
         if self.status.state in _TASKS and (self.status.state != before.state or again):
             self._task += 1
         if before.loaded and not self.status.loaded:
-            self._end_cycle(given)
+            self._note(given)
+            self._book.dumped(errand)
         if (self.status.edge, self.status.ended) != (before.edge, before.ended) or event == Event.DOCK_MISSED:
             self._where.begins(self.status, before)
 
-    def _next_errand(self) -> None:
-        order = self._orders[0]
+    def _next_errand(self) -> int:
+        """Take up the next order, return its buckets."""
+        order = self._orders.pop(0)
         self.machine = HaulageMachine(self.machine.layout, Errand(order.load, order.dump, self._park), self._tries)
+        return order.buckets
 
-    def _end_cycle(self, given: MissionInput) -> None:
-        """Close the cycle whose bucket has just been dumped."""
-        phase, cause = phase_of(self.machine, self.status, given, first=False)
-        self._ledger.note(given.now_ns, phase, self._where.place(self.status), cause, given.odometer_m)
-        self._cycle = self._made(self._ledger.take(), finished=True)
-        self._number += 1
+    def _note(self, given: MissionInput) -> None:
+        phase, cause = self._phase(given)
+        self._book.ledger.note(given.now_ns, phase, self._where.place(self.status), cause, given.odometer_m)
 
-    def _made(self, intervals: tuple[Interval, ...], *, finished: bool) -> Cycle:
-        errand, told = self.machine.errand, self._bucket
-        self._bucket = Report()
-        measured = (told.mass_t, told.fill, told.attempts, told.slip)
-        return Cycle(self._name, self._number + 1, errand.load, errand.dump, intervals, *measured, finished)
+    def _phase(self, given: MissionInput) -> tuple[Phase, str]:
+        first = self._book.cycles == 0 and self._book.ended is None
+        return phase_of(self.machine, self.status, given, first=first)
 
     def _output(self, given: MissionInput, events: tuple[Event, ...]) -> MissionOutput:
         at = self.status
-        phase, cause = phase_of(self.machine, at, given, first=self._number == 0)
+        phase, cause = self._phase(given)
         working = at.state in _TASKS and self.machine.working(at)
         following = self._where.following(self.machine, at)
         edges = self.machine.layout.edges
@@ -136,7 +139,7 @@ class MissionTask:
             self._where.place(at),
             cause,
             events,
-            self._cycle,
+            self._book.ended,
         )
 
     def _goal(self, at: Status) -> str:

@@ -51,7 +51,7 @@ class MissionInput(NamedTuple):
     Attributes:
         now_ns: time of now.
         pose_map: x, y (m) and yaw (rad) in `map`; None where it is not known.
-        node: name of the node of the map that the machine is in, by localization; on a site nothing.
+        node: name or id of the node of the map that the machine is in, by localization; on a site nothing.
         odometer_m: how far was driven since some beginning.
         navigation: what navigation says.
         loading, dumping: what the tasks say.
@@ -59,7 +59,7 @@ class MissionInput(NamedTuple):
         point_free: whether the point of work is granted; None: nobody else is on the map.
         obstacle: something stands in the way.
         estop: an emergency stop is pressed.
-        closed: names of closed nodes (on a site: of edges, `from to to`).
+        closed: names or ids of closed nodes (on a site: `Edge.node`).
         orders: buckets that are asked for; they are counted once, by how many there are.
         abort: the station ends the mission.
         answer: what the operator says to an open request.

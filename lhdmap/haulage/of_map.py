@@ -40,7 +40,7 @@ class _Maker:
             for one in self._map.waypoints
             if one.id in self._works and one.node in self._areas
         }
-        return Layout(name, points, edges, roles)
+        return Layout(name, points, edges, roles, {key: node.name for key, node in self._map.nodes.items()})
 
     def _open(self, one: Connection) -> bool:
         node = self._map.nodes.get(self._map.points[one.start].node)

@@ -26,7 +26,7 @@ class Whereabouts:
 
     def moved(self, given: MissionInput) -> None:
         """Take where the machine is now; what is not finite is not taken."""
-        self._node = given.node or self._node
+        self._node = self._layout.ids.get(given.node, given.node) or self._node
         if given.pose_map is not None and all(np.isfinite(given.pose_map)):
             self._pose = given.pose_map
             if self._along is not None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from enum import StrEnum
 from typing import NamedTuple
 
@@ -23,7 +24,7 @@ class Phase(StrEnum):
     ASSISTANCE = "assistance"
     TRAFFIC = "traffic"
     OBSTACLE = "obstacle"
-    STOPPED = "emergency stop"
+    STOPPED = "safety stop"
     PLACE = "place not known"
     NO_ROUTE = "no route"
     ABORTED = "aborted"
@@ -44,7 +45,7 @@ HOLDS = (
 
 
 class Interval(NamedTuple):
-    """A phase from a stamp to another: where (a place or node of the map), why, and how far was driven in it."""
+    """A phase from a stamp to another: where (place or node of the map), why, how far was driven in it (nan: not known)."""
 
     phase: Phase
     from_ns: int
@@ -103,24 +104,28 @@ class Ledger:
     def __init__(self) -> None:
         self._done: list[Interval] = []
         self._now: Interval | None = None
-        self._odometer_m = 0.0
+        self._odometer_m = math.nan
 
-    def note(self, now_ns: int, phase: Phase, place: str, cause: str, odometer_m: float) -> bool:
-        """Note the phase from now on; return whether it is another one. A stamp before the last one is taken for the last."""
-        now = self._now
+    def note(self, now_ns: int, phase: Phase, place: str, cause: str, odometer_m: float) -> None:
+        """Note the phase from now on.
+
+        A stamp before the last one is taken for the last. An odometer that is not finite tells nothing; where it never told
+        anything the ways are nan.
+        """
+        now, known = self._now, math.isfinite(odometer_m)
+        driven_m = max(odometer_m - self._odometer_m, 0.0) if known and math.isfinite(self._odometer_m) else 0.0
+        self._odometer_m = odometer_m if known else self._odometer_m
+        way_m = 0.0 if math.isfinite(self._odometer_m) else math.nan
         if now is None:
-            self._now, self._odometer_m = Interval(phase, now_ns, now_ns, place, cause), odometer_m
-            return True
-        driven_m = max(odometer_m - self._odometer_m, 0.0) if odometer_m == odometer_m else 0.0
-        self._odometer_m = odometer_m if odometer_m == odometer_m else self._odometer_m
+            self._now = Interval(phase, now_ns, now_ns, place, cause, way_m)
+            return
         now = now._replace(to_ns=max(now_ns, now.to_ns), distance_m=now.distance_m + driven_m)
         if (now.phase, now.place) == (phase, place):
             self._now = now
-            return False
+            return
         if now.to_ns > now.from_ns:
             self._done.append(now)
-        self._now = Interval(phase, now.to_ns, now.to_ns, place, cause)
-        return now.phase != phase
+        self._now = Interval(phase, now.to_ns, now.to_ns, place, cause, way_m)
 
     def take(self) -> tuple[Interval, ...]:
         """Return the intervals so far, and begin anew: the phase of now goes on in the next ones."""
@@ -128,5 +133,5 @@ class Ledger:
         self._done = []
         if now is not None and now.to_ns > now.from_ns:
             done.append(now)
-            self._now = now._replace(from_ns=now.to_ns, distance_m=0.0)
+            self._now = now._replace(from_ns=now.to_ns, distance_m=0.0 * now.distance_m)
         return tuple(done)

@@ -79,8 +79,8 @@ def iredes_xml(cycles: Sequence[Cycle]) -> str:
     parts = [part for one in cycles for part in one.intervals]
     loaded = sum(part.distance_m for part in parts if part.phase in (Phase.HAUL, Phase.RETURN))
     _add(root, "LTPPCyclTot", str(len(done)))
-    _add(root, "LTPPdistTot", f"{sum(part.distance_m for part in parts) / 1000.0:.1f}")
-    _add(root, "LTPPwrkDist", f"{loaded / 1000.0:.1f}")
+    _add(root, "LTPPdistTot", _km(sum(part.distance_m for part in parts), 1))
+    _add(root, "LTPPwrkDist", _km(loaded, 1))
     _add(root, "LTPPloadTot", f"{_mass_t(done):.2f}")
     _waits(root, parts)
     for pair in dict.fromkeys((one.load, one.dump) for one in done):
@@ -105,7 +105,7 @@ def _pair(root: ET.Element, load: str, dump: str, cycles: Sequence[Cycle]) -> No
     _add(element, "LTPPLdumpPtN", dump or "dump")
     _add(element, "LTPPLmass", f"{_mass_t(cycles):.2f}")
     _add(element, "LTPPLcycl", str(len(cycles)))
-    _add(element, "LTPPLdist", f"{sum(one.distance_m for one in cycles) / 1000.0:.2f}")
+    _add(element, "LTPPLdist", _km(sum(one.distance_m for one in cycles), 2) or "0.00")
     for from_ns, to_ns in _runs(cycles):
         times = ET.SubElement(element, _tag("LTPPTimeRep"))
         _add(times, "LTPPStartTime", _time(from_ns))
@@ -144,7 +144,7 @@ def _mission(root: ET.Element, number: int, trip: Trip) -> None:
         ("LTPPMtimeAct", _duration(act)),
         ("LTPPMpayld", f"{trip.payload_t:.2f}"),
         ("LTPPMtramEnd", _time(drives[-1].to_ns)),
-        ("LTPPMtramDist", f"{sum(part.distance_m for part in drives) / 1000.0:.4f}"),
+        ("LTPPMtramDist", _km(sum(part.distance_m for part in drives), 4)),
     ):
         _add(element, name, text)
 
@@ -153,8 +153,15 @@ def _mass_t(cycles: Sequence[Cycle]) -> float:
     return sum(one.mass_t for one in cycles if math.isfinite(one.mass_t))
 
 
+def _km(way_m: float, digits: int) -> str:
+    """Return kilometres, nothing where they are not known."""
+    return f"{way_m / 1000.0:.{digits}f}" if math.isfinite(way_m) else ""
+
+
 def _add(parent: ET.Element, name: str, text: str) -> None:
-    ET.SubElement(parent, _tag(name)).text = text
+    """Add an element; one that has nothing to say is left out."""
+    if text:
+        ET.SubElement(parent, _tag(name)).text = text
 
 
 def _tag(name: str) -> str:

@@ -1,21 +1,24 @@
 """Records of cycles from a run folder's `journal.jsonl`, and what a mission writes into it.
 
 The process `mission` notes each phase as a state (`values`: `place`, `odometer_m`) and each bucket as an event `cycle` (`values`:
-the columns of a cycle). A run without a mission has what navigation notes: drives, rests, help.
+the columns of a cycle). A run without a mission has what navigation notes (drives, rests, help, lost
+places) and the stops of the executor; its ways are not known.
 """
 
 from __future__ import annotations
 
 import json
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 from lhdmap.errors import InputError
 from lhdmap.haulage.records import Cycle, Ledger, Phase
 
-MISSION, NAVIGATION, ENGINE = "mission", "navigation", "engine"
+MISSION, NAVIGATION = "mission", "navigation"
+_EXECUTOR, _ASKED_FOR = "executor: state", ("navigation", "queue")
+_PHASES = {str(phase): phase for phase in Phase}
 _OF_NAVIGATION = {
     "driving": Phase.TRAM, "resting": Phase.TRAM, "backing": Phase.TRAM, "planning": Phase.ROUTE, "halted": Phase.PLACE,
     "assistance": Phase.ASSISTANCE, "arrived": Phase.IDLE, "idle": Phase.IDLE,
@@ -36,8 +39,8 @@ def cycles_of_journal(path: Path) -> list[Cycle]:
     """
     events = list(_events(path))
     if any(one["process"] == MISSION and one["event"] == "state" for one in events):
-        return _cycles(events, MISSION, {str(phase): phase for phase in Phase})
-    return _cycles(events, NAVIGATION, _OF_NAVIGATION)
+        return _cycles(events, _of_mission)
+    return _cycles(events, _Navigated())
 
 
 def _events(path: Path) -> Iterator[Mapping[str, Any]]:
@@ -57,20 +60,59 @@ def _events(path: Path) -> Iterator[Mapping[str, Any]]:
         yield event
 
 
-def _cycles(events: Sequence[Mapping[str, Any]], process: str, phases: Mapping[str, Phase]) -> list[Cycle]:
-    ledger, cycles, odometer_m, last = Ledger(), list[Cycle](), 0.0, (Phase.IDLE, "", "")
+Said = tuple[Phase, str, str]
+"""Phase, place, cause."""
+
+
+def _of_mission(one: Mapping[str, Any]) -> Said | None:
+    """Return what an event of a mission says of the phase; None: nothing."""
+    if one["process"] != MISSION or one["event"] != "state" or one["to"] not in _PHASES:
+        return None
+    return _PHASES[one["to"]], str(one["values"].get("place", "")), str(one["cause"])
+
+
+class _Navigated:
+    """The phases of a run without a mission: what navigation is at, and the stops of the executor that it did not ask for."""
+
+    def __init__(self) -> None:
+        self._drives: Said = (Phase.IDLE, "", "")
+        self._stop: Said | None = None
+
+    def __call__(self, one: Mapping[str, Any]) -> Said | None:
+        """Return the phase after an event; None: it says nothing of it."""
+        if one["process"] == NAVIGATION and one["event"] == "state" and one["to"] in _OF_NAVIGATION:
+            self._drives = _OF_NAVIGATION[one["to"]], "", str(one["cause"])
+        elif one["event"] == _EXECUTOR:
+            self._stop = self._stopped(one["values"], str(one["cause"]))
+        else:
+            return None
+        return self._stop if self._stop is not None and self._drives[0] == Phase.TRAM else self._drives
+
+    def _stopped(self, values: Mapping[str, Any], cause: str) -> Said | None:
+        """Return the stop after an event of the executor; one is what it was begun for, whatever is said while it lasts."""
+        if values.get("after") == "driving":
+            return None
+        if values.get("before") != "driving":
+            return self._stop
+        if cause in _ASKED_FOR:
+            return None
+        return Phase.OBSTACLE if cause.startswith("guard") else Phase.STOPPED, "", cause
+
+
+def _cycles(events: Sequence[Mapping[str, Any]], said: Callable[[Mapping[str, Any]], Said | None]) -> list[Cycle]:
+    ledger, cycles, odometer_m = Ledger(), list[Cycle](), math.nan
+    now: Said = (Phase.IDLE, "", "")
     for one in events:
-        mine, now_ns, values = one["process"] == process, one["t_ns"], one["values"]
-        if mine:
-            odometer_m = float(values.get("odometer_m", odometer_m))
-        if mine and one["event"] == "state" and one["to"] in phases:
-            last = phases[one["to"]], str(values.get("place", "")), str(one["cause"])
-            ledger.note(now_ns, *last, odometer_m)
-        elif mine and one["event"] == "cycle":
-            ledger.note(now_ns, *last, odometer_m)
-            cycles.append(_cycle(values, ledger, finished=True))
+        if one["process"] == MISSION:
+            odometer_m = float(one["values"].get("odometer_m", odometer_m))
+        following, ends = said(one), one["process"] == MISSION and one["event"] == "cycle"
+        if following is not None or ends:
+            now = following or now
+            ledger.note(one["t_ns"], *now, odometer_m)
+        if ends:
+            cycles.append(_cycle(one["values"], ledger, finished=True))
     if events:
-        ledger.note(events[-1]["t_ns"], *last, odometer_m)
+        ledger.note(events[-1]["t_ns"], *now, odometer_m)
     rest = _cycle({"number": len(cycles) + 1}, ledger, finished=False)
     return [*cycles, rest] if rest.intervals else cycles
 

@@ -57,11 +57,7 @@ def _cards(production: Production) -> Iterator[tuple[str, str, str]]:
     yield "attempts", _figure(values["attempts_mean"], "", 2), "of loading a bucket, mean"
     yield "assistance", _figure(values["assist_s_per_bucket"], "s", 1), "per bucket"
     yield "slip", _figure(values["slip_mean"], "", 2), "of the wheels while loading, mean share"
-    yield (
-        "driven",
-        f"{values['distance_m'] / 1000.0:.2f} km",
-        f"{values['distance_loaded_m'] / 1000.0:.2f} km of it loaded",
-    )
+    yield "driven", _km(values["distance_m"]), f"{_km(values['distance_loaded_m'])} of it loaded"
     yield "availability", _percent(production.stack.availability), "available time by scheduled time"
     yield "utilization", _percent(production.stack.utilization), "operating time by available time"
     yield "effectiveness", _percent(production.stack.effectiveness), "productive time by operating time"
@@ -112,7 +108,7 @@ def _buckets(production: Production) -> str:
             _figure(one.mass_t, "", 2),
             _figure(one.fill, "", 2),
             one.attempts,
-            f"{one.distance_m:.0f}",
+            _figure(one.distance_m, "", 0),
         )
         for one in production.finished[: 2 * _MOST_ROWS]
     ]
@@ -124,6 +120,10 @@ def _figure(value: float | None, unit: str, digits: int) -> str:
     if value is None or not math.isfinite(value):
         return _UNKNOWN
     return f"{value:.{digits}f} {unit}".rstrip()
+
+
+def _km(metres: float | None) -> str:
+    return _UNKNOWN if metres is None else f"{metres / 1000.0:.2f} km"
 
 
 def _percent(share: float) -> str:

@@ -9,10 +9,11 @@ from typing import Any
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from lhdmap.errors import UsageError
 from lhdmap.haulage.mission import MissionTask
 from lhdmap.haulage.mission_io import Buckets, MissionInput, Navigation, Report
 from lhdmap.haulage.of_map import layout_of_map
-from lhdmap.haulage.records import Phase
+from lhdmap.haulage.records import Cycle, Phase
 from lhdmap.haulage.states import Event, State
 
 from tests.haulage.drives import DUMP_S, LOAD_S, TICK_NS, Drive
@@ -280,3 +281,19 @@ def test_a_closed_tunnel_is_gone_round() -> None:
     assert last == State.DOCK
     assert closed not in nodes
     assert len(nodes) > len(shortest)
+
+
+def test_orders_are_named_in_their_cycles_and_must_be_on_the_map() -> None:
+    layout = layout_of_map(map_of_plan("level"), "level")
+    task, orders = MissionTask(layout), (Buckets("DP1", "OP1"), Buckets("DP5", "OP2"))
+    at = "DP1"
+    cycles: list[Cycle] = []
+    for now_ns in range(1, 12):
+        done = Report(task.update(MissionInput(now_ns, orders=orders)).task, "done")
+        output = task.update(
+            MissionInput(now_ns, navigation=Navigation("arrived", at), orders=orders, loading=done, dumping=done)
+        )
+        at, cycles = output.goal or at, cycles + ([output.cycle] if output.cycle else [])
+    assert [(one.load, one.dump) for one in cycles] == [("DP1", "OP1"), ("DP5", "OP2")]
+    with pytest.raises(UsageError, match="'DP11' is no point to load; did you mean"):
+        task.update(MissionInput(99, orders=(*orders, Buckets("DP11", "OP1"))))

@@ -5,8 +5,8 @@ from __future__ import annotations
 import csv
 import json
 import math
-from dataclasses import dataclass
 from pathlib import Path
+from xml.etree import ElementTree as ET
 
 import pyarrow.parquet as pq
 import pytest
@@ -14,6 +14,8 @@ from lhdmap.errors import InputError
 from lhdmap.haulage.records import Cycle, Ledger, Phase
 from lhdmap.production.figures import Production, production_of
 from lhdmap.production.files import cycle_rows, phase_rows, write_csv, write_parquet
+from lhdmap.production.iredes import iredes_xml
+from lhdmap.production.iredes_schema import faults_of
 from lhdmap.production.journal import cycle_values, cycles_of_journal
 from lhdmap.replay.journal import Journal
 from lhdmap.report.production_page import render, write_production_page
@@ -107,11 +109,6 @@ def test_the_page_is_one_file_that_names_the_stop(production: Production, tmp_pa
     assert "None was dumped." in render(production_of([]))
 
 
-@dataclass
-class Clock:
-    t_ns: int = 0
-
-
 def test_a_mission_that_was_driven_is_read_back_from_its_journal(tmp_path: Path) -> None:
     journal = Journal(tmp_path / "journal.jsonl")
     scribe, drive = journal.of("mission"), Drive(hejase())
@@ -133,18 +130,44 @@ def test_a_mission_that_was_driven_is_read_back_from_its_journal(tmp_path: Path)
         assert theirs.distance_m == pytest.approx(mine.distance_m, abs=1.0)
 
 
+def test_a_mission_is_at_the_pace_that_its_productive_time_allows() -> None:
+    drive = Drive(hejase())
+    drive.run(ORDER, 3000.0)
+    rest = drive.task.rest()
+    assert rest is not None
+    found = production_of([*drive.cycles, rest])
+    assert found.pace >= 0.95
+    assert found.stack.level_s("calendar") == pytest.approx(1e-9 * (rest.to_ns - drive.cycles[0].from_ns))
+
+
 def test_a_drive_without_a_mission_has_its_drives_and_waits(tmp_path: Path) -> None:
     journal = Journal(tmp_path / "journal.jsonl")
     scribe = journal.of("navigation")
+    executor = journal.of("executor")
     for seconds, state in ((0, "driving"), (40, "assistance"), (50, "driving"), (80, "arrived")):
         journal.now_ns = seconds * 1_000_000_000
         scribe.goes(state, "because")
+        if seconds == 50:
+            for at, cause, after in (
+                (55, "guard: wall", "braking"),
+                (57, "queue", "standing"),
+                (60, "queue", "driving"),
+            ):
+                journal.now_ns = at * 1_000_000_000
+                executor.event("executor: state", cause, before="driving" if at == 55 else "braking", after=after)
     journal.now_ns = 90_000_000_000
     journal.write("engine", "ended")
     journal.close()
     (only,) = cycles_of_journal(tmp_path / "journal.jsonl")
     assert not only.finished
-    assert (only.seconds(Phase.TRAM), only.seconds(Phase.ASSISTANCE), only.seconds(Phase.IDLE)) == (70.0, 10.0, 10.0)
+    assert {str(phase): only.seconds(phase) for phase in Phase if only.seconds(phase)} == {
+        "tram": 65.0, "assistance": 10.0, "obstacle": 5.0, "idle": 10.0,
+    }  # fmt: skip
+    found = production_of([only])
+    assert [(one.cause, one.seconds) for one in found.stops] == [("because", 10.0), ("guard: wall", pytest.approx(5.0))]
+    assert found.values()["distance_m"] is None
+    assert ">nan" not in render(found)
+    assert list(faults_of(ET.fromstring(iredes_xml([only]).encode()))) == []  # noqa: S314  # our own
 
 
 def test_a_journal_that_was_cut_is_read_and_one_that_is_none_refused(tmp_path: Path) -> None:
