@@ -16,14 +16,7 @@ from lhdmap.guidance.settings import GuidanceSettings
 from lhdmap.haulage.settings import HaulageSettings
 from lhdmap.integration.integrator import IntegrationSettings
 from lhdmap.landmarks.settings import LandmarkSettings
-from lhdmap.loading.digging_settings import (
-    AttemptSettings,
-    ChargingSettings,
-    ExcavationSettings,
-    PaperDigSettings,
-    TunedDigSettings,
-    WeighingSettings,
-)
+from lhdmap.loading.digging_settings import ChargingSettings, ExcavationSettings, PaperDigSettings, TunedDigSettings
 from lhdmap.loading.task_settings import LoadingSettings
 from lhdmap.loading.weighing_settings import AttemptSettings, WeighingSettings
 from lhdmap.localization.settings import LocalizationSettings
