@@ -258,6 +258,14 @@ class ExcavationSettings:
     boom_max_rad: float = setting(
         0.728, unit="rad", minimum=-1.0, maximum=2.0, source=_SEARCHED, doc="adaptive: stop β_max."
     )
+    lift_most_rad: float = setting(
+        0.5,
+        unit="rad",
+        minimum=0.0,
+        maximum=2.0,
+        source="autonomous_loading, Table 1: β_max",
+        doc="adaptive: the boom is lifted no higher; scanners that look ahead do not see the roof.",
+    )
     advance_max_m: float = setting(
         2.71, unit="m", minimum=0.1, maximum=10.0, source=_SEARCHED, doc="adaptive: stop d_max."
     )

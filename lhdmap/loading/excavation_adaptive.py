@@ -19,7 +19,7 @@ class AdaptiveDig:
     """An admittance: `tilt = (F - F_0) / F_1 + (v_0 - v) / v_1`, within 0 and 1; F is what the pile holds, without inertia.
 
     While the lip goes in easily, nothing is tilted; the more the rock resists and the slower the machine gets on, the more
-    the bucket turns. Slip lifts the boom (as in the paper) and takes pedal away. Where nothing moves, it backs out a little.
+    the bucket turns. Slip lifts the boom (as in the paper), no higher than the roof allows, and takes pedal away. Where nothing moves, it backs out a little.
     """
 
     def __init__(self, settings: ExcavationSettings) -> None:
@@ -58,7 +58,10 @@ class AdaptiveDig:
         slipping = self._lift.update(signals.now_ns, skid)
         pedal = one.pedal * (one.pedal_slipping if slipping else 1.0)
         tilt = self._tilt(force_kn, signals)
-        return Turn(Pedals(pedal, tilt=tilt, lift=float(slipping), full_rpm=True), values=values)
+        lifts = slipping and signals.boom_rad < one.lift_most_rad
+        if slipping and not lifts:
+            tilt = 1.0  # the boom is as high as it may be: the bucket is turned out of the rock instead
+        return Turn(Pedals(pedal, tilt=tilt, lift=float(lifts), full_rpm=True), values=values)
 
     def _smooth(self, skid: float, now_ns: int) -> float:
         """Return the low-passed skid; where it is not known, the one before."""

@@ -221,6 +221,7 @@ _SETTINGS = {
     "excavation.alpha_max_rad": Case("dug_as_printed", -0.6),
     "excavation.alpha_tolerance_rad": Case("dug_as_printed", 0.5),
     "excavation.boom_max_rad": Case("dug", -0.3),
+    "excavation.lift_most_rad": Case("dug", 0.02),
     "excavation.hysteresis": Case("dug", 0.5, _NOISY_SKID),
     "excavation.lift_least_s": Case("dug", 3.0, _NOISY_SKID),
     "excavation.stuck_rps": Case("dug", 1.0),

@@ -44,10 +44,13 @@ class LiftGauge:
         return known._replace(rocking=known.rocking + dt_s * rate, rocking_rate=rate, lifted=lifted)
 
     def bar(self, known: Digging, boom_rad: float, load_kg: float, lifting: float) -> float:
-        """Return the pressure; `lifting` is the share of the cylinder's force that the lip meets."""
+        """Return the pressure; `lifting` is the share of the cylinder's force that the lip meets.
+
+        Eq. (9) is calibrated with a boom that came from below: its friction shows where it came from above.
+        """
         vertical = lifting * 1e3 * self._machine.digging.lift_force_kn
         steady = lift_bar(self._machine, boom_rad, load_kg, vertical)
-        return max(steady * (1.0 + known.rocking) + self._zero_bar + _FRICTION_BAR * known.lifted, 0.1)
+        return max(steady * (1.0 + known.rocking) + self._zero_bar + _FRICTION_BAR * (known.lifted - 1.0), 0.1)
 
 
 def load_centre(seed: int, session: int) -> float:
