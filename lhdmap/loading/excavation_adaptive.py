@@ -19,7 +19,8 @@ class AdaptiveDig:
     """An admittance: `tilt = (F - F_0) / F_1 + (v_0 - v) / v_1`, within 0 and 1; F is what the pile holds, without inertia.
 
     While the lip goes in easily, nothing is tilted; the more the rock resists and the slower the machine gets on, the more
-    the bucket turns. Slip lifts the boom (as in the paper), no higher than the roof allows, and takes pedal away. Where nothing moves, it backs out a little.
+    the bucket turns. Slip lifts the boom (as in the paper), no higher than the roof allows, and takes pedal away. Where nothing
+    moves, it backs out a little.
     """
 
     def __init__(self, settings: ExcavationSettings) -> None:
