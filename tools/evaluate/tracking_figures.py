@@ -26,8 +26,8 @@ def draw_site(target: Path) -> None:
     """The site in plan, z0 + z1 of both methods and the joint along the way, truck at 30 km/h."""
     rows = site()
     model, _ = machine("truck")
-    figure, axes = plt.subplots(3, 1, figsize=(9.0, 8.5), height_ratios=[2.0, 1.0, 1.0], layout="constrained")
-    axes[0].plot(rows[:, 0], rows[:, 1], color="#999999", lw=5.0, alpha=0.4)
+    figure, axes = plt.subplots(3, 1, figsize=(9.0, 7.5), height_ratios=[1.3, 1.0, 1.0], layout="constrained")
+    axes[0].plot(rows[:, 1], -rows[:, 0], color="#999999", lw=5.0, alpha=0.4)
     for method, colour in _COLOURS.items():
         out, _ = followed(model, rows, 30.0, Errors(seed=1), TrackingSettings(method=method), rows[::10, :2])
         table, near, way = out.table(), 0.0, []
@@ -37,14 +37,16 @@ def draw_site(target: Path) -> None:
         axes[1].plot(way, table[:, 7] + table[:, 8], color=colour, lw=1.2, label=method)
         axes[2].plot(way, np.degrees(table[:, 4]), color=colour, lw=1.2, label=method)
         if method == "both":
-            axes[0].plot(table[:, 1], table[:, 2], color=colour, lw=1.0)
+            axes[0].plot(table[:, 2], -table[:, 1], color=colour, lw=1.0)
             axes[2].plot(way, 3.6 * table[:, 6], color="#777777", lw=1.0, label="speed, km/h")
-    axes[0].set(aspect="equal", xlabel="x, m", ylabel="y, m", title="The paper's site, truck, 30 km/h, slip and noise")
+    axes[0].set(aspect="equal", xlabel="y, m", ylabel="-x, m", title="The paper's site, truck, 30 km/h, slip and noise")
     axes[1].set(ylabel="z0 + z1, m")
+    axes[1].set_ylim(-0.4, 0.55)
+    axes[2].set_ylim(-26.0, 42.0)
     axes[1].axhspan(-0.3, 0.3, color="#0b6e99", alpha=0.08)
     axes[2].set(ylabel="joint, deg", xlabel="way of the rear axle, m")
     for one in axes[1:]:
-        one.legend(loc="upper right", ncols=3, frameon=False)
+        one.legend(loc="upper left", ncols=3, frameon=False)
         one.grid(alpha=0.3)
     target.parent.mkdir(exist_ok=True)
     figure.savefig(target, dpi=110)
