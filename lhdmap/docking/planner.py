@@ -21,6 +21,7 @@ from lhdmap.tracking.reference import Curve
 
 _ARCS_M = (2.5, 5.0, 7.5, 10.0, 13.0, 16.0, 20.0)
 _TRIES = 150
+_STAGES_M = (1.6, 0.6)  # of a search, and of the one after it, that gets out of corners
 _RATE_SHARE = 0.8
 _SAMPLED = 2
 """Changes of gear up to which ways are sampled; with more, and where these find none, they are searched."""
@@ -71,11 +72,12 @@ def plan_dock(
         moves = _sampled(start, goal, room, shape, gear, counts)
         if moves is not None:
             return _planned(start, moves, shape)
-    limits, told = (settings.cusps, settings.nodes), ""
-    for shape in dict.fromkeys((shapes[0], shapes[-1])):
-        moves, told = searched(start, goal, room, shape, gear, limits)
+    told = ""
+    for stage_m in _STAGES_M:
+        limits = (settings.cusps, settings.nodes, stage_m)
+        moves, told = searched(start, goal, room, shapes[-1], gear, limits)
         if moves is not None:
-            return _planned(start, moves, shape)
+            return _planned(start, moves, shapes[-1])
     return DockPlan((), f"no way with {settings.cusps} changes of gear or less has room for both bodies: {told}")
 
 

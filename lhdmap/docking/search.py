@@ -18,8 +18,7 @@ from lhdmap.messages import FloatArray
 
 CUSP_M = 12.0
 """Way that a change of gear is worth."""
-_PRIMITIVE_M = 1.6
-_CELL_M, _CELL_RAD, _CELL_BEND_RAD = 0.8, math.radians(12.0), math.radians(12.0)
+_CELL_SHARE, _CELL_RAD_PM = 0.5, math.radians(7.5)  # of a stage, and per metre of it
 _TRY_EACH, _TRY_WORDS = 5, 2
 _EDGE_WEIGHT = 1.3
 
@@ -34,13 +33,13 @@ class _Node(NamedTuple):
 
 
 def searched(
-    start: FloatArray, goal: FloatArray, room: Room, shape: Shape, gear: int, limits: tuple[int, int]
+    start: FloatArray, goal: FloatArray, room: Room, shape: Shape, gear: int, limits: tuple[int, int, float]
 ) -> tuple[FloatArray | None, str]:
     """Return moves (K, 3) from a configuration (4,) to a pose (3,) of the rear axle, or None and why.
 
-    `limits`: changes of gear at most, states that are visited at most.
+    `limits`: changes of gear at most, states that are visited at most, length of a stage (m).
     """
-    most_cusps, most_nodes = limits
+    most_cusps, most_nodes, stage_m = limits
     nodes = [_Node(start, 0, 0, 0.0, -1, (0.0, 0.0, 0.0))]
     queue = [(_least(start, goal, shape), 0)]
     closed: set[tuple[int, ...]] = set()
@@ -48,7 +47,7 @@ def searched(
     while queue and len(closed) < most_nodes:
         _, k = heapq.heappop(queue)
         node = nodes[k]
-        cell = _cell(node)
+        cell = _cell(node, stage_m)
         if cell in closed:
             continue
         closed.add(cell)
@@ -61,12 +60,10 @@ def searched(
             if cusps > most_cusps:
                 continue
             for bend in bends:
-                move = (float(signed), bend, _PRIMITIVE_M)
+                move = (float(signed), bend, stage_m)
                 way = states_of(node.state, np.array([move]), shape)
-                after = _Node(
-                    way[-1, :4], signed, cusps, node.gone + _PRIMITIVE_M + CUSP_M * (cusps - node.cusps), k, move
-                )
-                if _cell(after) in closed or not room.free(way):
+                after = _Node(way[-1, :4], signed, cusps, node.gone + stage_m + CUSP_M * (cusps - node.cusps), k, move)
+                if _cell(after, stage_m) in closed or not room.free(way):
                     continue
                 nodes.append(after)
                 heapq.heappush(queue, (after.gone + _EDGE_WEIGHT * _least(after.state, goal, shape), len(nodes) - 1))
@@ -94,9 +91,8 @@ def _least(state: FloatArray, goal: FloatArray, shape: Shape) -> float:
     return max(math.hypot(state[0] - goal[0], state[1] - goal[1]), float(turned) * shape.rear_radius_m)
 
 
-def _cell(node: _Node) -> tuple[int, ...]:
+def _cell(node: _Node, stage_m: float) -> tuple[int, ...]:
     x, y, heading, bend = node.state.tolist()
+    size, turn = _CELL_SHARE * stage_m, _CELL_RAD_PM * stage_m
     turned = heading % (2.0 * math.pi)
-    return (
-        round(x / _CELL_M), round(y / _CELL_M), int(turned / _CELL_RAD), round(bend / _CELL_BEND_RAD), node.gear, node.cusps,
-    )  # fmt: skip
+    return round(x / size), round(y / size), int(turned / turn), round(bend / turn), node.gear, node.cusps

@@ -42,4 +42,4 @@ class DockingSettings:
         0.4, unit="m", minimum=0.0, maximum=5.0, doc="Room between both bodies and what bounds them."
     )
     cusps: int = setting(3, minimum=0, maximum=8, doc="Changes of gear at most.")
-    nodes: int = setting(2500, minimum=100, maximum=200_000, doc="States that the search visits at most.")
+    nodes: int = setting(6000, minimum=100, maximum=200_000, doc="States that the search visits at most.")

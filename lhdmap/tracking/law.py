@@ -50,14 +50,3 @@ def errors_of_circle(
     rest = equilibrium(found.curvature_pm, lengths)
     turned = (heading - found.heading_rad + math.pi) % (2.0 * math.pi) - math.pi
     return np.array([found.offset_m - rest[1] - 0.5 * sum(lengths) * slip, turned + slip, bend - rest[4], rate])
-
-
-def both_offsets(path: Path, state: State, near_m: float, lengths: Lengths2) -> tuple[float, float]:
-    """Return z0 and z1 (m) of a state beside a path."""
-    x1, y1, back, bend, _ = state
-    front_m, rear_m = lengths
-    x0 = x1 + rear_m * math.cos(back) + front_m * math.cos(back + bend)
-    y0 = y1 + rear_m * math.sin(back) + front_m * math.sin(back + bend)
-    front = beside(path.points, x0, y0, near_m + sum(lengths), 8.0, 8.0)
-    rear = beside(path.points, x1, y1, near_m, 8.0, 8.0)
-    return front[1], rear[1]

@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 import numba as nb
 import numpy as np
+from scipy.interpolate import CubicSpline
 from scipy.linalg import solveh_banded
 
 from lhdmap.errors import InputError
@@ -48,8 +49,8 @@ def path_of(waypoints: FloatArray, smoothing_m: float, beyond_m: float) -> Path:
     body = _even(line)
     first, last = body[0], body[-1]
     count = math.ceil(beyond_m / STEP_M)
-    back = np.arange(count, 0, -1)[:, None] * -STEP_M
-    on = np.arange(1, count + 1)[:, None] * STEP_M
+    back: FloatArray = np.arange(count, 0, -1, dtype=np.float64)[:, None] * -STEP_M
+    on: FloatArray = np.arange(1, count + 1, dtype=np.float64)[:, None] * STEP_M
     whole = np.concatenate([_ahead(first, back), body, _ahead(last, on)])
     return Path(np.ascontiguousarray(whole), count * STEP_M, (count + len(body) - 1) * STEP_M)
 
@@ -114,8 +115,6 @@ def _placed(points: FloatArray, line: FloatArray) -> FloatArray:
 
 def _even(line: FloatArray) -> FloatArray:
     """Return x, y, heading, curvature (N, 4) each 0.1 m of the line's cubic spline."""
-    from scipy.interpolate import CubicSpline
-
     lengths = _lengths(line)
     for _ in range(2):  # chords are shorter than the curve
         curve = CubicSpline(lengths, line)

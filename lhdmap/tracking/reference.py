@@ -98,7 +98,7 @@ def _solved(
     q, u, near = start
     damping, found = 1e-4, merit(points, q, u, near, lengths)
     for _ in range(_ROUNDS):
-        tried_q, tried_u = improve(points, q, u, near, most, lengths, damping, True)
+        tried_q, tried_u = improve(points, q, u, near, most, lengths, damping)
         tried_near = near.copy()
         tried = merit(points, tried_q, tried_u, tried_near, lengths)
         if not tried[0] < found[0]:

@@ -81,60 +81,75 @@ def merit(
 @nb.njit(cache=True, nogil=True)
 def improve(
     points: FloatArray, q: FloatArray, u: FloatArray, near: FloatArray, most: FloatArray, lengths: tuple[float, float],
-    damping: float, free: bool,
+    damping: float,
 ) -> tuple[FloatArray, FloatArray]:  # fmt: skip
-    """Return states (N + 1, 4) and inputs (N,) after a step; |u| <= `most` (N,), the first state is free or held."""
+    """Return states (N + 1, 4) and inputs (N,) after a step; |u| <= `most` (N,), the first state is free but for its way."""
     count = len(u)
-    gain, step, after = np.zeros((count, 4)), np.zeros(count), np.zeros(4)
-    jac, rows = np.zeros((3, 3)), np.zeros((2, 4))
-    hess, grad, carried = np.zeros((4, 4)), np.zeros(4), np.zeros(4)
-    ha, at = np.zeros((4, 4)), np.zeros((4, 4))
+    gain, step = np.zeros((count, 4)), np.zeros(count)
+    jac, rows, after = np.zeros((3, 3)), np.zeros((2, 4)), np.zeros(4)
+    hess, grad = np.zeros((4, 4)), np.zeros(4)
+    ha, at, qux = np.zeros((4, 4)), np.zeros((4, 4)), np.zeros(4)
     _add_cost(points, q[count], near[count], lengths, rows, hess, grad)
     for k in range(count - 1, -1, -1):
         _stage(q[k], u[k], lengths[0], lengths[1], after, jac)
         for i in range(4):  # the gradient at the state that the stage leads to
-            carried[i] = grad[i]
             for j in range(4):
-                carried[i] += hess[i, j] * (after[j] - q[k + 1, j])
+                grad[i] += hess[i, j] * (after[j] - q[k + 1, j])
         _times(hess, jac, ha)
-        quu = INPUT + damping
-        qu = INPUT * u[k] + STEP_M * carried[3]
-        b = (jac[0, 2], jac[1, 2], jac[2, 2], STEP_M)
-        qux = np.zeros(4)
-        for i in range(4):
-            qu += b[i] * carried[i] if i < 3 else 0.0
-            for j in range(4):
-                qux[j] += b[i] * ha[i, j]
-                quu += b[i] * hess[i, j] * b[j]
-        want = -qu / quu
+        qu, quu = _by_input(u[k], grad, hess, ha, jac, damping, qux)
+        want = u[k] - qu / quu
         bound = most[k]
-        if abs(u[k] + want) > bound:
-            step[k] = math.copysign(bound, u[k] + want) - u[k]
-        else:
-            step[k] = want
+        step[k] = min(max(want, -bound), bound) - u[k]
+        if abs(want) <= bound:
             for j in range(4):
                 gain[k, j] = -qux[j] / quu
         _times_left(jac, ha, at)
-        held = carried.copy()
-        grad[0], grad[1], grad[3] = held[0], held[1], held[3]
-        grad[2] = jac[0, 0] * held[0] + jac[1, 0] * held[1] + held[2]
-        grad[3] += jac[0, 1] * held[0] + jac[1, 1] * held[1] + jac[2, 1] * held[2]
+        grad[3] += jac[0, 1] * grad[0] + jac[1, 1] * grad[1] + jac[2, 1] * grad[2]
+        grad[2] += jac[0, 0] * grad[0] + jac[1, 0] * grad[1]
         for i in range(4):
             grad[i] += qux[i] * step[k] + gain[k, i] * (qu + quu * step[k])
             for j in range(4):
                 hess[i, j] = at[i, j] + gain[k, i] * qux[j] + qux[i] * gain[k, j] + quu * gain[k, i] * gain[k, j]
         _add_cost(points, q[k], near[k], lengths, rows, hess, grad)
-    return _rolled(q, u, gain, step, most, lengths, _first(hess, grad, q[0], free))
+    return _rolled(q, u, gain, step, most, lengths, _first(hess, grad, q[0, 2]))
 
 
 @nb.njit(cache=True, nogil=True)
-def _first(hess: FloatArray, grad: FloatArray, q: FloatArray, free: bool) -> FloatArray:
-    """Return the change of the first state: none where it is held, none along the path."""
-    if not free:
-        return np.zeros(4)
-    along = np.array([math.cos(q[2]), math.sin(q[2]), 0.0, 0.0])
-    whole = hess + _START * np.outer(along, along) + 1e-6 * np.eye(4)
-    return np.linalg.solve(whole, -grad)
+def _by_input(
+    u: float, grad: FloatArray, hess: FloatArray, ha: FloatArray, jac: FloatArray, damping: float, qux: FloatArray
+) -> tuple[float, float]:
+    """Return first and second derivative by the input, and write the mixed one (4,)."""
+    b = (jac[0, 2], jac[1, 2], jac[2, 2], STEP_M)
+    qu, quu = INPUT * u, INPUT + damping
+    qux[:] = 0.0
+    for i in range(4):
+        qu += b[i] * grad[i]
+        for j in range(4):
+            qux[j] += b[i] * ha[i, j]
+            quu += b[i] * hess[i, j] * b[j]
+    return qu, quu
+
+
+@nb.njit(cache=True, nogil=True)
+def _first(hess: FloatArray, grad: FloatArray, heading: float) -> FloatArray:
+    """Return the change (4,) of the first state, hardly any of it along the path: elimination, the matrix is definite."""
+    along = (math.cos(heading), math.sin(heading), 0.0, 0.0)
+    m, x = hess.copy(), -grad
+    for i in range(4):
+        m[i, i] += 1e-6
+        for j in range(4):
+            m[i, j] += _START * along[i] * along[j]
+    for k in range(4):
+        for i in range(k + 1, 4):
+            share = m[i, k] / m[k, k]
+            x[i] -= share * x[k]
+            for j in range(k, 4):
+                m[i, j] -= share * m[k, j]
+    for k in range(3, -1, -1):
+        for j in range(k + 1, 4):
+            x[k] -= m[k, j] * x[j]
+        x[k] /= m[k, k]
+    return x
 
 
 @nb.njit(cache=True, nogil=True)
@@ -147,15 +162,22 @@ def _rolled(
     new_q, new_u = q.copy(), u.copy()
     for k in range(len(u)):
         _stage(q[k], u[k], lengths[0], lengths[1], after, jac)
-        new_q[k] = q[k] + change
-        wanted = u[k] + step[k] + gain[k] @ change
+        for i in range(4):
+            new_q[k, i] = q[k, i] + change[i]
+        wanted = u[k] + step[k]
+        for i in range(4):
+            wanted += gain[k, i] * change[i]
         new_u[k] = min(max(wanted, -most[k]), most[k])
         du = new_u[k] - u[k]
         x = change[0] + jac[0, 0] * change[2] + jac[0, 1] * change[3] + jac[0, 2] * du
         y = change[1] + jac[1, 0] * change[2] + jac[1, 1] * change[3] + jac[1, 2] * du
         t = change[2] + jac[2, 1] * change[3] + jac[2, 2] * du
-        change = np.array([x, y, t, change[3] + STEP_M * du]) + after - q[k + 1]
-    new_q[-1] = q[-1] + change
+        bend = change[3] + STEP_M * du
+        for i in range(4):
+            change[i] = after[i] - q[k + 1, i]
+        change[0], change[1], change[2], change[3] = change[0] + x, change[1] + y, change[2] + t, change[3] + bend
+    for i in range(4):
+        new_q[-1, i] = q[-1, i] + change[i]
     return new_q, new_u
 
 

@@ -134,9 +134,9 @@ class Tracker:
         x = found.x
         if self.settings.method == "circles" and leg.path is not None:
             x = errors_of_circle(leg.path, state, slip, found.along_m, self.settings.look_m, lengths)
-        return self._out(now_ns, motion, leg, state, Errors4(x, found.along_m, left))
+        return self._out(now_ns, motion, leg, state, Found(x, found.along_m, left))
 
-    def _out(self, now_ns: int, motion: Motion | None, leg: Leg, state: State, errors: Errors4) -> Step:
+    def _out(self, now_ns: int, motion: Motion | None, leg: Leg, state: State, errors: Found) -> Step:
         period = min(max((now_ns - self._step_ns) * 1e-9, 0.0), 0.2) if self._step_ns else 0.05
         speed = min(self._rear_mps + self.settings.accelerate_mps2 * period, abs(self.filter.rear_mps) + 1.0)
         if abs(errors.x[0]) > self.settings.clip_m:
@@ -156,7 +156,7 @@ class Tracker:
         self._note(points[0])
         return Step(points[0].speed_mps, points[0].steering_rate_rps, points, "tracking", "", errors.x, errors.left_m)
 
-    def _rolled(self, leg: Leg, state: State, errors: Errors4, speed: float) -> FloatArray:
+    def _rolled(self, leg: Leg, state: State, errors: Found, speed: float) -> FloatArray:
         """Return (K + 1, 3): speed of the front axle, rate, speed of the rear axle, of the closed loop from the state on."""
         one, gear, lengths = self.settings, leg.curve.gear, self.filter.lengths
         speed = min(speed, speed_at(leg.speeds.caps_mps, errors.along_m, errors.left_m, leg.speeds.brake_mps2))
@@ -197,7 +197,7 @@ class Tracker:
         del self.sent[:-_KEPT]
 
 
-class Errors4(NamedTuple):
+class Found(NamedTuple):
     """Errors (4,), where on the curve, way to its end (m)."""
 
     x: FloatArray

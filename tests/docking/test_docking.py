@@ -160,8 +160,8 @@ def test_who_cannot_says_why_before_moving(
 
 
 def test_where_nobody_turns_round_is_said_after_a_search() -> None:
-    room = room_of(apron(22.0, 5.0), MODELS["loader"], BODIES["loader"], 0.4)
-    plan = plan_dock(np.array([10.0, 2.5, 0.0, 0.0]), np.array([9.0, 2.5, math.pi]), room, MODELS["loader"], SETTINGS)
+    room = room_of(apron(17.0, 3.4), MODELS["loader"], BODIES["loader"], 0.4)
+    plan = plan_dock(np.array([10.0, 1.7, 0.0, 0.0]), np.array([8.0, 1.7, math.pi]), room, MODELS["loader"], SETTINGS)
     assert "all that can be reached was searched" in plan.reason
 
 

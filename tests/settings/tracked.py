@@ -56,7 +56,7 @@ def docks(settings: DockingSettings) -> list[Any]:
         (45.0, 40.0, (10.0, 12.0, 0.5, 0.1), (22.0, 32.95, -0.5 * math.pi), nothing),
         (30.0, 22.0, (10.0, 8.0, 2.5, 0.0), (15.0, 14.95, -0.5 * math.pi), nothing),
         (45.0, 40.0, (10.0, 12.0, 0.5, 0.0), (22.0, 32.9, -0.5 * math.pi), np.array([[22.0, 27.0]])),
-        (22.0, 5.0, (10.0, 2.5, 0.0, 0.0), (9.0, 2.5, math.pi), nothing),
+        (20.0, 4.0, (10.0, 2.0, 0.0, 0.0), (9.0, 2.0, math.pi), nothing),
     ):
         room = room_of(apron(width, height), MODEL, BODIES, settings.margin_m, blocked)
         told.append(plan_dock(np.array(start), np.array(dock), room, MODEL, settings))

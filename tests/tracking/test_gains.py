@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from lhdmap.messages import FloatArray
 from lhdmap.tracking.equations import reduced
 from lhdmap.tracking.gains import Gains, gain_of, held, riccati
 from lhdmap.tracking.settings import TrackingSettings
@@ -31,9 +32,9 @@ def test_gains_are_those_of_the_findings(which: tuple[str, float], gain: tuple[f
     assert gain_of(which[1], model, SETTINGS) == pytest.approx(gain, abs=0.006)
 
 
-def slowest(name: str, speed: float, gain: object) -> float:
+def slowest(name: str, speed: float, gain: FloatArray) -> float:
     a, b = reduced(speed, MODELS[name].steering_lag_s, LENGTHS[name])
-    return float(np.linalg.eigvals(a - b @ np.atleast_2d(gain)).real.max())
+    return float(np.linalg.eigvals(a - b @ gain[None]).real.max())
 
 
 @given(st.sampled_from(sorted(MODELS)), st.floats(0.3, 13.0), st.sampled_from([1, -1]), st.sampled_from([1, -1]))

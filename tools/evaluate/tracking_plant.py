@@ -121,7 +121,8 @@ def drive(tracker: Tracker, plant: Plant, truth: FloatArray, seconds: float, ste
 
     `stepper`: who is stepped, where it is not the tracker itself.
     """
-    out, queue, begun = Drive(), (), plant.now_ns
+    out, begun = Drive(), plant.now_ns
+    queue: Setpoints = ()
     near = nearest(truth, *plant.state[:3])
     fronts = near + sum(plant.lengths[:2])
     while plant.now_ns - begun < seconds * 1e9:
