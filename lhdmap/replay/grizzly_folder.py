@@ -56,14 +56,13 @@ def replay_grizzly(request: ReplayRequest) -> ReplayResult:
     interruption = Interruption()
     with RunFolderWriter(KIND, request.target, force=request.force, inputs=request.sources) as folder:
         run, journal = _made(request.scenario, folder.path / JOURNAL)
-        began = time.monotonic()
-        with interruption, interruption.comes_first():
-            _go(run, journal, interruption, request)
-        journal.close()
-        verdict = run.verdict(run.now_s / max(time.monotonic() - began, 1e-6))
-        _write(folder, request, verdict, run)
-        if interruption.asked:
-            raise KeyboardInterrupt
+        with interruption.comes_first():
+            began = time.monotonic()
+            with interruption:
+                _go(run, journal, interruption, request)
+            journal.close()
+            verdict = run.verdict(run.now_s / max(time.monotonic() - began, 1e-6))
+            _write(folder, request, verdict, run)
         path = folder.complete(run_info(request, verdict))
     return ReplayResult(path, verdict)
 

@@ -7,11 +7,13 @@ from typing import Any
 
 import numpy as np
 
+from lhdmap.messages import FloatArray
 from lhdmap.rockbreaker.order import best_order, order_s
 from lhdmap.rockbreaker.station import Station
 from lhdmap.rockbreaker.story import Story
 
 FREE = "free"
+_ONE_PLACE_M = 0.3
 _HINDSIGHT = 15  # places of blows up to which the best order is found afterwards
 
 
@@ -63,8 +65,14 @@ def verdict_of(reason: str, duration_s: float, counts: Counts, story: Story, sta
 
 
 def best_level_s(story: Story, station: Station) -> float | None:
-    """Return the least time of the level moves over the places of all blows, known afterwards; None: too many to be sure."""
-    places = list({id(one.rock): one.rock.top_m for one in story.stops}.values())
+    """Return the least time of the level moves over the places of all blows, known afterwards; None: too many to be sure.
+
+    Blows near each other count as one place, so that what was moved between them is over the best.
+    """
+    places: list[FloatArray] = []
+    for stop in story.stops:
+        if all(np.hypot(*(stop.rock.top_m - one)[:2]) > _ONE_PLACE_M for one in places):
+            places.append(stop.rock.top_m)
     if not places or len(places) > _HINDSIGHT:
         return None
     park_m = station.park_m

@@ -79,7 +79,7 @@ def plan_chart(machine: Rockbreaker, story: Story) -> Figure:
             axes.plot(move.way_m[:, 0], move.way_m[:, 1], color=charts.FINAL, linewidth=1.2)
     _draw_blows(axes, story)
     axes.plot(0.0, 0.0, "^", color=charts.INK, markersize=8, label="swing axis")
-    axes.plot(*machine.base.park_m[:2], "D", color=charts.INK, markersize=6, label="where the tip waits")
+    axes.plot(*machine.base.park_m[:2], "D", color=charts.INK, markersize=6, label="tip waits")
     axes.set(
         aspect="equal", xlabel="x, m", ylabel="y, m", xlim=(-0.5, high[0] + 0.8), ylim=(low[1] - 0.6, high[1] + 0.6)
     )

@@ -124,7 +124,8 @@ class Station:
 
     def _raise_plane(self, scene: Scene) -> None:
         """Raise the work plane where a rock stands higher than before; it never falls, so that times stay true."""
-        needed_m = max((float(one.top_m[2]) for one in scene.rocks), default=-math.inf) + self.settings.clearance_m
+        bars_m = scene.height_m(float(self.park_m[0]), float(self.park_m[1]))
+        needed_m = max((float(one.top_m[2]) for one in scene.rocks), default=bars_m) + self.settings.clearance_m
         if needed_m > self.work_plane_m:
             self.work_plane_m = needed_m
             self._times_s.clear()
@@ -198,5 +199,6 @@ def _end(moves: Sequence[Plan], at: Pose) -> Pose:
 
 def _thinned(points_m: FloatArray) -> FloatArray:
     finite = points_m[np.isfinite(points_m).all(axis=1)]
-    _, first = np.unique(np.floor(finite / _CUBE_M).astype(np.int64), axis=0, return_index=True)
+    cells = np.floor(finite / _CUBE_M).astype(np.int64)
+    _, first = np.unique(cells @ np.array([1 << 40, 1 << 20, 1]), return_index=True)  # each cube in 20 bits an axis
     return finite[np.sort(first)]

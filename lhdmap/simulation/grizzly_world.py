@@ -28,7 +28,7 @@ _LEAST_CHANCE = 0.3
 _ROLLS_FROM, _ROLL_CHANCE = 0.3, 0.5  # share of its half width beside the middle from which on a blow may roll a rock
 _ROLL_M = (0.15, 0.45)
 _PIECES = (0.45, 0.75)  # sizes of the two largest pieces over the rock's
-_TRIES = 400
+_SHAPES, _PLACES = 12, 40  # that are tried for a rock
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -156,12 +156,14 @@ class GrizzlyWorld:
 
     def _lay(self, place: np.random.Generator, least_m: float, most_m: float) -> None:
         low, high = np.array(self.machine.grizzly.min_m), np.array(self.machine.grizzly.max_m)
-        for _ in range(_TRIES):
+        for _ in range(_SHAPES):
             size_m = float(np.exp(place.uniform(np.log(least_m), np.log(most_m))))
-            one = _lying(rock(size_m, place), place.uniform(low, high), self.bars_m)
-            if one.middle_m > self.machine.grizzly.opening_m and self._is_free(one):
-                self.rocks.append(one)
-                return
+            mesh = rock(size_m, place)
+            for _ in range(_PLACES):
+                one = _lying(mesh, place.uniform(low, high), self.bars_m)
+                if one.middle_m > self.machine.grizzly.opening_m and self._is_free(one):
+                    self.rocks.append(one)
+                    return
         raise UsageError(f"no room on the grizzly for a rock besides {len(self.rocks)} others: fewer were wanted")
 
     def _arm(self, joints_m: FloatArray | None) -> list[Mesh]:
