@@ -77,6 +77,8 @@ def verdict_text(values: Mapping[str, Any]) -> str:
     """Return the verdict in words."""
     from lhdmap.report.text import duration
 
+    if values["kind"] == "grizzly":
+        return "\n".join(_grizzly_lines(values))
     near = values["min_clearance_m"]
     speed = f"mean {values['mean_speed_kmh']:.1f} km/h, {values['stops']} stops"
     lines = [
@@ -90,6 +92,21 @@ def verdict_text(values: Mapping[str, Any]) -> str:
         f"journal      {values['journal_sha256'][:16]}…, {values['realtime_factor']:.1f} x real time",
     ]
     return "\n".join(lines)
+
+
+def _grizzly_lines(values: Mapping[str, Any]) -> list[str]:
+    from lhdmap.report.text import duration
+
+    over = "" if values["over_best"] is None else f", {100.0 * (values['over_best'] - 1.0):.1f} % over the best order"
+    return [
+        f"verdict      {'ok' if values['ok'] else 'not ok'}: {values['reason']}",
+        f"run          {values['run']}",
+        f"report       {Path(values['run']) / 'report.html'}",
+        f"rocks        {values['rocks']} too large at first, {values['rocks_left']} left, {values['blows']} blows",
+        f"time         {duration(values['duration_s'])}{over}",
+        f"plans        {values['plans']}, {values['plans_invalid']} not valid, {len(values['contacts'])} contacts",
+        f"journal      {values['journal_sha256'][:16]}…, {values['realtime_factor']:.1f} x real time",
+    ]
 
 
 def _progress_of(console: Console) -> Any:

@@ -20,7 +20,7 @@ from lhdmap.replay.processes.film import Film
 from lhdmap.replay.processes.film_drive import DriveFilm
 from lhdmap.replay.processes.film_load import LoadFilm
 from lhdmap.replay.processes.recorder import Recorder
-from lhdmap.replay.scenario import Scenario, scenario_toml
+from lhdmap.replay.scenario import GRIZZLY, Scenario, scenario_toml
 from lhdmap.replay.series import Timeline
 from lhdmap.replay.stops import Stops
 from lhdmap.report.replay_data import ReplayData
@@ -31,6 +31,7 @@ from lhdmap.simulation.history import SECOND_NS, START_NS
 
 KIND = "replay"
 LOG, JOURNAL, VERDICT, REPORT, RECORDING = "run.mcap", "journal.jsonl", "verdict.json", "report.html", "recording.rrd"
+GRIZZLY_FRAMES = {"base": "origin on the swing axis, x along the grizzly's middle, y left, z up"}
 _GRACE_S = 60  # the monitor ends a run at its limit; this is for a monitor that sees nothing
 Progress = Callable[[Iterable[int], float], Iterable[int]]
 
@@ -70,12 +71,16 @@ def replay(request: ReplayRequest, parts: Parts | None = None) -> ReplayResult:
         ConfigError: a fault of the scenario has no target here.
         KeyboardInterrupt: Ctrl-C was pressed; what was finished is kept in the partial folder.
     """
+    if request.scenario.kind == GRIZZLY:
+        from lhdmap.replay.grizzly_folder import replay_grizzly  # it needs what is here
+
+        return replay_grizzly(request)
     interruption = Interruption()
     with RunFolderWriter(KIND, request.target, force=request.force, inputs=request.sources) as folder:
         made = parts_of(request.scenario, folder.path) if parts is None else parts
         with interruption.comes_first():
             verdict = _Replay(request, made, folder).run(interruption)
-        path = folder.complete(_info(request, verdict))
+        path = folder.complete(run_info(request, verdict))
     return ReplayResult(path, verdict)
 
 
@@ -181,9 +186,10 @@ class _Replay:
         )  # fmt: skip
 
 
-def _info(request: ReplayRequest, verdict: dict[str, Any]) -> RunInfo:
+def run_info(request: ReplayRequest, verdict: dict[str, Any]) -> RunInfo:
+    """Return what `run.json` says of a run."""
     counts = {key: value for key, value in verdict.items() if key not in ("contacts", "faults")}
     counts |= {"contacts": len(verdict["contacts"]), "faults": len(verdict["faults"])}
     asked = {"name": request.name, "truth": request.truth, "recording": request.recording}
-    frames = {"map": "the mine's own grid"}
+    frames = GRIZZLY_FRAMES if request.scenario.kind == GRIZZLY else {"map": "the mine's own grid"}
     return RunInfo(request.sources, {"scenario": asdict(request.scenario), "request": asked}, counts, (), frames)

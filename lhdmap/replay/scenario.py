@@ -17,7 +17,8 @@ from lhdmap.settings import REQUIRED, nearest, setting
 from lhdmap.settings_tree import load_tree, part, tree_toml
 from lhdmap.simulation.sensing.faults import FaultSettings
 
-KINDS = ("tram", "loading", "mission", "haulage", "grizzly")
+GRIZZLY = "grizzly"
+KINDS = ("tram", "loading", "mission", "haulage", GRIZZLY)
 AUTONOMOUS, OPERATOR, TELEOPERATOR = "autonomous", "operator", "teleoperator"
 MODES = ("idle", "autonomous", "assisted", "teleoperated", "manual")
 FOLDER = "pipelines/scenarios"
@@ -92,13 +93,31 @@ class LoadingPlan:
 
 
 @dataclass(frozen=True, slots=True)
+class GrizzlyPlan:
+    """How the rockbreaker works on a grizzly, and the pile that its boulders come from."""
+
+    pile: str = setting("", doc="A pile.json or the folder with it: each boulder in it lies on the grizzly.")
+    timing: str = setting("smooth", choices=("paper", "paper-best", "smooth"), doc="Timing of the moves.")
+    margin_m: float = setting(
+        0.05,
+        unit="m",
+        minimum=0.0,
+        maximum=1.0,
+        doc="A rock is broken that is so much smaller than an opening as seen.",
+    )
+    look_s: float = setting(1.0, unit="s", minimum=0.0, maximum=60.0, doc="Time that the scanners take to look.")
+    blow_s: float = setting(3.0, unit="s", minimum=0.0, maximum=60.0, doc="Time of hammering before the next look.")
+    most_blows: int = setting(12, minimum=1, maximum=1000, doc="After so many at a rock in its place it is given up.")
+
+
+@dataclass(frozen=True, slots=True)
 class Scenario:
     """A replay: where, what machine, what it is to do, and what goes wrong."""
 
     kind: str = setting("tram", choices=KINDS, doc="What the machine does.")
-    mine: str = setting(REQUIRED, doc="Mine plan: a file, or the name of one that ships.")
+    mine: str = setting("", doc="Mine plan: a file, or the name of one that ships; a grizzly alone has none.")
     seed: int = setting(0, minimum=0, doc="Seed of all chance; same seed, same journal to the bit.")
-    machine: str = setting("", doc="Machine file; empty for the default.")
+    machine: str = setting("", doc="Machine file (grizzly: the rockbreaker's); empty for the default.")
     map: str = setting("", doc="Map folder; built from a teaching drive first where it is absent.")
     start: str = setting("", doc="Place or drift where it stands at first; empty: where the plan parks.")
     goal: str = setting("", doc="Place to drive to.")
@@ -114,6 +133,10 @@ class Scenario:
     wander_m: float = setting(0.0, unit="m", minimum=0.0, maximum=1.0, doc="The operator's lateral wandering, rms.")
     perception: bool = setting(True, doc="Whether odometry runs on what the sensors say.")
     mission: tuple[Errand, ...] = part(tuple)
+    rocks: int = setting(
+        0, minimum=0, maximum=100, doc="Rocks on the grizzly that do not fall through, besides the pile's."
+    )
+    grizzly: GrizzlyPlan = part(GrizzlyPlan)
     rearm_s: float = setting(
         5.0,
         unit="s",
@@ -135,6 +158,12 @@ class Scenario:
 
     def __post_init__(self) -> None:
         """Check what a key alone cannot; raises ConfigError."""
+        if self.kind != GRIZZLY and not self.mine:
+            raise ConfigError("mine is missing: the name of a plan that ships or a file was wanted")
+        if (self.kind == GRIZZLY) != bool(self.rocks or self.grizzly.pile):
+            raise ConfigError(
+                f"kind = '{self.kind}' and rocks = {self.rocks}: a grizzly wants rocks, and nothing else does"
+            )
         if self.goal and self.mission:
             raise ConfigError(f"goal = '{self.goal}' and mission: one of them was wanted")
         if self.driver == AUTONOMOUS and not self.goal:
@@ -215,6 +244,8 @@ def load_scenario(path: Path, **over: Any) -> Scenario:
     scenario = load_tree(Scenario, path, "scenario file")
     beside: dict[str, Any] = {key: _beside(path, getattr(scenario, key)) for key in ("mine", "machine")}
     beside["map"] = _beside(path, scenario.map, folder=True)
+    if scenario.grizzly.pile:
+        beside["grizzly"] = replace(scenario.grizzly, pile=str(path.parent / scenario.grizzly.pile))
     return replace(scenario, **(beside | over))
 
 

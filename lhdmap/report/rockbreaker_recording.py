@@ -40,7 +40,7 @@ def write_plan_recording(
     machine = trajectories[0].path.machine
     with RecordingWriter(path, "Rockbreaker", 0) as writer:
         writer.curves = CURVES
-        _add_arm(writer, machine, rows)
+        add_arm(writer, machine, rows)
         _add_surroundings(writer, machine, scene, obstacles, trajectories[-1].way_m()[-1])
         for number, one in enumerate(trajectories):
             _add_way(writer, number, one.way_m())
@@ -54,7 +54,7 @@ def write_plan_recording(
                 writer.add_curve(f"{group}/{name}", stamps, rows[:, COLUMNS.index(name)], colour, name)
 
 
-def _add_arm(writer: RecordingWriter, machine: Rockbreaker, rows: FloatArray) -> None:
+def add_arm(writer: RecordingWriter, machine: Rockbreaker, rows: FloatArray) -> None:
     """Add the links as capsules, and their joints over time."""
     stamps = np.round(1e9 * rows[:, 0]).astype(np.int64)
     half = 0.5 * np.radians(rows[:, 3:7])
@@ -95,7 +95,7 @@ def _add_surroundings(
     import rerun as rr
 
     writer.widen(np.array([[0.0, 0.0, machine.base.height_m]]))
-    writer.add_shape("map/grizzly", rr.LineStrips3D(_bars(machine, scene), colors=0x8A949EFF, radii=0.03))
+    writer.add_shape("map/grizzly", rr.LineStrips3D(bar_lines(machine, scene), colors=0x8A949EFF, radii=0.03))
     if scene is not None and scene.rocks:
         large = [rock.passing_m > machine.grizzly.opening_m for rock in scene.rocks]
         half = [[0.5 * rock.length_m, 0.5 * rock.length_m, 0.5 * rock.height_m] for rock in scene.rocks]
@@ -126,7 +126,7 @@ def _near_grizzly(points_m: FloatArray, scene: Scene | None) -> FloatArray:
     return np.asarray(points_m[(above_m > -0.6) & (above_m < 1.6)])
 
 
-def _bars(machine: Rockbreaker, scene: Scene | None) -> list[FloatArray]:
+def bar_lines(machine: Rockbreaker, scene: Scene | None) -> list[FloatArray]:
     """Return the bars of the grizzly as lines: at the height that was seen, else 1 m below the paper's work plane."""
     low, high = np.array(machine.grizzly.min_m), np.array(machine.grizzly.max_m)
     x = np.linspace(low[0], high[0], max(round((high[0] - low[0]) / _BAR_M), 1) + 1)

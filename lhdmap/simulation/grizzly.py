@@ -51,17 +51,17 @@ def simulate_grizzly(machine: Rockbreaker, seed: int, rocks: int | None = None) 
     """Return a scene with `rocks` rocks (default: 2 to 6) that do not touch each other."""
     rng = np.random.default_rng(seed)
     bars_m = float(rng.uniform(-2.4, -1.9))
-    meshes = [*_bars(machine, bars_m), *_walls(machine, bars_m)]
+    meshes = [*bar_meshes(machine, bars_m), *wall_meshes(machine, bars_m)]
     placed: list[PlacedRock] = []
     for _ in range(int(rng.integers(2, 7)) if rocks is None else rocks):
         found = _place(machine, bars_m, placed, rng)
         if found is not None:
             meshes.append(found[0])
             placed.append(found[1])
-    return GrizzlyScene(_seen(meshes, rng), bars_m, tuple(placed))
+    return GrizzlyScene(seen_points(meshes, rng), bars_m, tuple(placed))
 
 
-def _bars(machine: Rockbreaker, top_m: float) -> list[Mesh]:
+def bar_meshes(machine: Rockbreaker, top_m: float) -> list[Mesh]:
     """Return bars along x and y, their openings as wide as the machine's grizzly says."""
     low, high = np.array(machine.grizzly.min_m), np.array(machine.grizzly.max_m)
     pitch = machine.grizzly.opening_m + _BAR_M
@@ -77,7 +77,7 @@ def _bars(machine: Rockbreaker, top_m: float) -> list[Mesh]:
     return across + along
 
 
-def _walls(machine: Rockbreaker, bars_m: float) -> list[Mesh]:
+def wall_meshes(machine: Rockbreaker, bars_m: float) -> list[Mesh]:
     """Return the walls of the chamber around the grizzly and the bottom of the ore pass."""
     low, high = np.array(machine.grizzly.min_m), np.array(machine.grizzly.max_m)
     top, bottom = bars_m + 6.0, bars_m - 5.0
@@ -107,7 +107,7 @@ def _place(
     return None
 
 
-def _seen(meshes: list[Mesh], rng: np.random.Generator) -> FloatArray:
+def seen_points(meshes: list[Mesh], rng: np.random.Generator) -> FloatArray:
     """Return the points (N, 3) that the scanners see, with noise."""
     from lhdmap.simulation.raycast import Surface
 

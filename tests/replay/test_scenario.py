@@ -76,11 +76,13 @@ def test_what_is_wrong_is_refused_with_its_place(tmp_path: Path, text: str, told
 def test_those_that_ship_are_found_by_name_and_are_whole() -> None:
     assert {"ring_manual", "ring_faults"} <= set(shipped_scenarios())
     for name in shipped_scenarios():
-        assert load_scenario(find_scenario(name)).mine
+        found = load_scenario(find_scenario(name))
+        assert bool(found.mine) != (found.kind == "grizzly")
     with pytest.raises(UsageError, match="did you mean 'ring_manual'"):
         find_scenario("ring_manul")
 
 
 def test_kinds_that_are_not_replayed_yet_are_told() -> None:
     with pytest.raises(UsageError, match=r"kind = .haulage.: this version replays"):
+    with pytest.raises(UsageError, match="kind = 'haulage': this version replays"):
         parts_of(Scenario(kind="haulage", mine="ring"), Path())
