@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from lhdmap.cli.console import Console
-from lhdmap.cli.options import add_output, suggest
+from lhdmap.cli.options import add_output, add_settings, suggest
 from lhdmap.cli.viewer import started, viewer
 from lhdmap.errors import EvaluationShortfall
 from lhdmap.resources import resource
@@ -32,6 +32,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "files",
     )
     add_output(parser, "folder to make (default: SCENARIO_run here)", "RUN")
+    add_settings(parser)
     parser.add_argument("--seed", type=int, metavar="N", help="over the scenario's; same seed, same journal to the bit")
     parser.add_argument("--view", action="store_true", help="follow the run in Rerun: a window, or a page without one")
     parser.add_argument("--no-truth", action="store_true", help="no /ground_truth/odometry in run.mcap")
@@ -40,6 +41,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace, console: Console) -> int:
     """Run the scenario; exit code 1 where the verdict is not ok."""
+    from lhdmap.config import load_settings
     from lhdmap.errors import UsageError
     from lhdmap.outputs import free_folder
     from lhdmap.replay.run import ReplayRequest, replay
@@ -64,6 +66,7 @@ def run(arguments: argparse.Namespace, console: Console) -> int:
         force=arguments.force,
         sources=[path],
         progress=_progress_of(console),
+        settings=load_settings(arguments.config, arguments.set),
     )
     with _viewer(port, console):
         result = replay(request)

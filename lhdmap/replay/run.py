@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from lhdmap import __version__
+from lhdmap.config import Settings
 from lhdmap.logs.writer import LogWriter
 from lhdmap.pipeline.interruption import Interruption
 from lhdmap.replay.assemble import Run, Watchers, assemble, parts_of
@@ -41,7 +42,8 @@ class ReplayRequest:
     """What is to be replayed, and what is to be written.
 
     `truth`: the true pose in the log; `recording`: a Rerun recording; `live_port`: where it can be followed meanwhile;
-    `sources`: files that the run is made from; `progress` shows the simulated times that it is given with their end (s).
+    `sources`: files that the run is made from; `settings`: of perception
+    and control; `progress` shows the simulated times that it is given with their end (s).
     """
 
     scenario: Scenario
@@ -53,6 +55,7 @@ class ReplayRequest:
     force: bool = False
     sources: Sequence[Path] = ()
     progress: Progress | None = None
+    settings: Settings | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,7 +80,7 @@ def replay(request: ReplayRequest, parts: Parts | None = None) -> ReplayResult:
         return replay_grizzly(request)
     interruption = Interruption()
     with RunFolderWriter(KIND, request.target, force=request.force, inputs=request.sources) as folder:
-        made = parts_of(request.scenario, folder.path) if parts is None else parts
+        made = parts_of(request.scenario, folder.path, request.settings) if parts is None else parts
         with interruption.comes_first():
             verdict = _Replay(request, made, folder).run(interruption)
         path = folder.complete(run_info(request, verdict))
@@ -192,4 +195,9 @@ def run_info(request: ReplayRequest, verdict: dict[str, Any]) -> RunInfo:
     counts |= {"contacts": len(verdict["contacts"]), "faults": len(verdict["faults"])}
     asked = {"name": request.name, "truth": request.truth, "recording": request.recording}
     frames = GRIZZLY_FRAMES if request.scenario.kind == GRIZZLY else {"map": "the mine's own grid"}
-    return RunInfo(request.sources, {"scenario": asdict(request.scenario), "request": asked}, counts, (), frames)
+    options = {
+        "scenario": asdict(request.scenario),
+        "settings": asdict(request.settings or Settings()),
+        "request": asked,
+    }
+    return RunInfo(request.sources, options, counts, (), frames)
