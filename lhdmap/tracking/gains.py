@@ -11,6 +11,7 @@ from lhdmap.tracking.settings import TrackingSettings
 
 PERIOD_S = 0.05
 _FASTEST_MPS, _COUNT = 14.0, 9
+_ROLLS_MPS = 0.15
 
 
 class Gains:
@@ -26,10 +27,16 @@ class Gains:
 
     def at(self, rear_mps: float, gear: int) -> FloatArray:
         """Return K (4,) for a signed speed of the rear axle; `gear` decides the sign where the machine stands."""
-        sign = gear if abs(rear_mps) < 0.5 * self._slow else (1 if rear_mps > 0.0 else -1)
         at = np.log(max(abs(rear_mps), self._slow))
-        table = self._table[sign]
+        table = self._table[direction(rear_mps, gear)]
         return np.array([np.interp(at, self._log, table[:, k]) for k in range(4)])
+
+
+def direction(rear_mps: float, gear: int) -> int:
+    """Return which way the machine goes: by its speed, whatever gear is in; by the gear where it stands."""
+    if abs(rear_mps) < _ROLLS_MPS:
+        return gear
+    return 1 if rear_mps > 0.0 else -1
 
 
 def gain_of(rear_mps: float, model: DriveModel, settings: TrackingSettings) -> FloatArray:

@@ -14,7 +14,7 @@ from lhdmap.errors import InputError
 from lhdmap.messages import FloatArray
 from lhdmap.tracking.equations import reduced
 from lhdmap.tracking.filter import Filter
-from lhdmap.tracking.gains import Gains
+from lhdmap.tracking.gains import Gains, direction
 from lhdmap.tracking.kernel import State, front_axle
 from lhdmap.tracking.law import errors_of_circle, errors_of_curve
 from lhdmap.tracking.path import STEP_M, Path, nearest, path_of
@@ -160,7 +160,7 @@ class Tracker:
         """Return (K + 1, 3): speed of the front axle, rate, speed of the rear axle, of the closed loop from the state on."""
         one, gear, lengths = self.settings, leg.curve.gear, self.filter.lengths
         speed = min(speed, speed_at(leg.speeds.caps_mps, errors.along_m, errors.left_m, leg.speeds.brake_mps2))
-        design = gear * max(speed, one.slow_mps)
+        design = direction(self.filter.rear_mps, gear) * max(speed, one.slow_mps)
         a, b = reduced(design, lengths[2], lengths[:2])
         feed = 1.0 if one.method == "both" or leg.path is None else 0.0
         loop = Loop(self.gains.at(design, gear), a, b[:, 0], gear, lengths, feed)

@@ -40,7 +40,10 @@ def slowest(name: str, speed: float, gain: FloatArray) -> float:
 @given(st.sampled_from(sorted(MODELS)), st.floats(0.3, 13.0), st.sampled_from([1, -1]), st.sampled_from([1, -1]))
 def test_no_gain_of_the_wrong_sign_can_be_had(name: str, speed: float, sign: int, gear: int) -> None:
     """Whatever gear is told: a machine that rolls the other way gets the gain of how it moves."""
-    assert slowest(name, sign * speed, GAINS[name].at(sign * speed, gear)) < -0.05
+    gain = GAINS[name].at(sign * speed, gear)
+    share = min(speed / SETTINGS.slow_mps, 1.0)  # the joint comes to rest with the machine
+    assert slowest(name, sign * speed, share * gain) < -0.03
+    assert gain[1] * sign > 0.0
 
 
 @given(st.sampled_from(sorted(MODELS)), st.floats(-0.14, 0.14), st.sampled_from([1, -1]))

@@ -185,3 +185,17 @@ def test_slip_and_the_joints_offset_are_found() -> None:
     assert np.degrees(out.table()[-60:, 10].mean()) == pytest.approx(1.0, abs=0.35)
     assert math.degrees(tracker.filter.state[6]) == pytest.approx(0.5, abs=0.25)
     assert np.abs(both(out)[-40:]).mean() < 0.12
+
+
+@pytest.mark.parametrize("gear", [1, -1])
+def test_a_machine_that_rolls_the_other_way_is_steered_for_how_it_moves(gear: int) -> None:
+    """Beside the path by 0.5 m: forward the joint turns towards it, backwards the heading has to turn the other way."""
+    rates = {}
+    for moves in (1.0, -1.0):
+        tracker = Tracker(MODELS["truck"], SETTINGS)
+        tracker.follow(LINE[::20, :2] if gear > 0 else LINE[::-20, :2], gear * 2.0)
+        for k in range(3):
+            motion = Motion(k * 50_000_000, 50.0 + 0.05 * moves * k, 0.0, 0.06, 0.0, 0.0, moves)
+            step = tracker.step(motion.stamp_ns, motion)
+        rates[moves] = step.steering_rate_rps
+    assert rates[1.0] < 0.0 < rates[-1.0]

@@ -147,7 +147,7 @@ def dead_times() -> Iterator[Row]:
 
 
 def disturbed() -> Iterator[Row]:
-    """Slip of 1° on 30 m; waypoints with 2 cm of noise; uneven ones; a steering gain that is off; no slip."""
+    """Slip of 1° on 30 m; waypoints with 2 cm of noise; uneven ones; a machine that is not as told; no slip."""
 
     def slipping(way_m: float) -> float:
         return math.radians(1.0) if 50.0 < way_m < 80.0 else 0.0
@@ -164,6 +164,9 @@ def disturbed() -> Iterator[Row]:
                 "1 deg of slip on 30 m": (Errors(slip_of=slipping), exact),
                 "waypoints off by 2 cm": (Errors(), exact + 0.02 * rng.standard_normal(exact.shape)),
                 "waypoints 0.3 to 4 m apart": (Errors(), uneven),
+                "front slips three times the rear": (Errors(front_more=0.5), exact),
+                "rear slips three times the front": (Errors(front_more=-0.5), exact),
+                "rear body 3 % longer than told": (Errors(longer=0.03), exact),
                 "steering 5 % weak": (Errors(gain=0.95), exact),
                 "steering 5 % strong": (Errors(gain=1.05), exact),
             }

@@ -23,7 +23,8 @@ GRAVITY = 9.81
 class Errors:
     """What the machine is other than its model, and what its sensors add; the findings' noise by default.
 
-    `slip_per_g`: drift of both axles to the outside, rad per g of lateral acceleration; `slip_of`: one more by the way, rad.
+    `slip_per_g`: drift of both axles to the outside, rad per g of lateral acceleration; `slip_of`: one more by the way, rad;
+    `front_more`: share by which the front axle slips more, and the rear one less; `longer`: share by which the rear body is.
     """
 
     pose_m: float = 0.05
@@ -34,6 +35,8 @@ class Errors:
     slip_of: Callable[[float], float] | None = None
     dead_s: float = 0.0
     gain: float = 1.0
+    front_more: float = 0.0
+    longer: float = 0.0
     seed: int = 0
 
 
@@ -63,7 +66,7 @@ class Plant:
         self.state, self.speed, self.slip, self.way, self.now_ns = state, 0.0, 0.0, 0.0, 0
         self._model, self._errors = model, errors
         self._rng = np.random.default_rng(errors.seed)
-        self.lengths = (model.front_m, model.rear_m, model.steering_lag_s)
+        self.lengths = (model.front_m, (1.0 + errors.longer) * model.rear_m, model.steering_lag_s)
         self.sent: list[Setpoint] = [Setpoint(-2_000_000_000, 0.0, 0.0)]
         self._k = 0
 
@@ -83,7 +86,7 @@ class Plant:
             rate = 0.0
             self.state = (*self.state[:3], math.copysign(stop, self.state[3]), 0.0)
         rear = self.rear_mps
-        slips = (self.slip, self.slip)
+        slips = ((1.0 + errors.front_more) * self.slip, (1.0 - errors.front_more) * self.slip)
         after = moved(self.state, rear, rate, dt, self.lengths, slips)
         lateral = rear * (after[2] - self.state[2]) / dt
         extra = errors.slip_of(self.way) if errors.slip_of else 0.0
