@@ -52,7 +52,7 @@ FLOORS = [
     {"report"},
     {"config"},
     {"pipeline"},
-    {"front", "replay"},
+    {"front", "replay", "batch"},
     {"cli"},
     {"__main__"},
 ]
