@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
 from lhdmap.batch.pool import RETRIES
-from lhdmap.batch.work import Job, Ran, Work
+from lhdmap.batch.work import Job, Outcome, Ran, Work
 from lhdmap.errors import InputError, UsageError
 
 _CONNECT_S = 10.0
@@ -41,40 +41,47 @@ def run_on_cluster(
     except (OSError, ValueError) as error:
         raise InputError(f"--cluster {address}: no scheduler answers there: {error}") from error
     with client:
-        began_s = time.monotonic()
         futures = {
             client.submit(
-                work, job.words, key=f"lhdmap-{number}-{job.key}-{time.time_ns()}", retries=RETRIES, pure=False
+                _timed, work, job.words, key=f"lhdmap-{number}-{job.key}-{time.time_ns()}", retries=RETRIES, pure=False
             ): job
             for number, job in enumerate(jobs)
         }
-        ended = distributed.as_completed(futures)
-        yield from _collected(client, ended, futures, told, patience_s, began_s)
+        pending, seen_s = set(futures), time.monotonic()
+        while pending:
+            try:
+                ended, pending = distributed.wait(pending, timeout=_LOOK_S, return_when="FIRST_COMPLETED")
+            except TimeoutError:
+                seen_s = _seen(client, seen_s, patience_s, len(pending), told)
+                continue
+            seen_s = time.monotonic()
+            for future in ended:
+                yield _ended(future, futures[future])
 
 
-def _collected(
-    client: Any, ended: Any, futures: dict[Any, Job], told: Callable[[str], None], patience_s: float, began_s: float
-) -> Iterator[Ran]:
-    left, seen_s = len(futures), time.monotonic()
-    while left:
-        try:
-            ended.timeout = time.time() + _LOOK_S
-            future = next(ended)
-        except TimeoutError:
-            if client.scheduler_info().get("workers"):
-                seen_s = time.monotonic()
-            elif time.monotonic() - seen_s > patience_s:
-                raise InputError(
-                    f"the cluster has had no workers for {patience_s:.0f} s: {left} rows are left"
-                ) from None
-            else:
-                told("the cluster has no workers: waiting for some")
-            continue
-        left, seen_s = left - 1, time.monotonic()
-        job, wall_s = futures[future], time.monotonic() - began_s
-        if future.status == "finished":
-            yield Ran(job.key, future.result(), "", 0, wall_s)
-        else:
-            error = future.exception()
-            killed = RETRIES + 1 if type(error).__name__ == "KilledWorker" else 0
-            yield Ran(job.key, None, f"{type(error).__name__}: {error}", killed, wall_s)
+def _seen(client: Any, seen_s: float, patience_s: float, left: int, told: Callable[[str], None]) -> float:
+    """Return when there were workers last; raise InputError where that is too long ago."""
+    if client.scheduler_info().get("workers"):
+        return time.monotonic()
+    if time.monotonic() - seen_s > patience_s:
+        raise InputError(f"the cluster has had no workers for {patience_s:.0f} s: {left} rows are left")
+    told("the cluster has no workers: waiting for some")
+    return seen_s
+
+
+def _ended(future: Any, job: Job) -> Ran:
+    if future.status == "finished":
+        outcome, wall_s = future.result()
+        return Ran(job.key, outcome, "", 0, wall_s)
+    if future.status == "cancelled":
+        return Ran(job.key, None, "the scheduler has given it up", 0, 0.0)
+    error = future.exception()
+    if type(error).__name__ == "KilledWorker":
+        return Ran(job.key, None, "its workers were killed (out of memory?)", RETRIES + 1, 0.0)
+    return Ran(job.key, None, f"{type(error).__name__}: {error}", 0, 0.0)
+
+
+def _timed(work: Work, words: Sequence[str]) -> tuple[Outcome, float]:
+    """Run on a worker: the outcome and the seconds it took there."""
+    began_s = time.monotonic()
+    return work(words), time.monotonic() - began_s

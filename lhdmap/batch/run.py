@@ -9,12 +9,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from lhdmap.batch.ledger import Ledger, RowResult
+from lhdmap.batch.ledger import ROWS, Ledger, RowResult
 from lhdmap.batch.manifest import Task, read_manifest
 from lhdmap.batch.table import write_table
 from lhdmap.batch.work import Job, Runner, Work
 from lhdmap.descriptions import SOFTWARE, description_name, kind_of
 from lhdmap.errors import UsageError
+from lhdmap.interrupts import before_interrupt
 from lhdmap.json_files import write_json
 from lhdmap.outputs import MARK, locked
 from lhdmap.provenance import source_entry
@@ -70,6 +71,7 @@ def run_batch(request: BatchRequest) -> BatchResult:
         if not locked(lock.fileno()):
             raise UsageError(f"{request.target}: another batch is writing it; wait for that one, or -o OTHER")
         _describe(request, {})
+        held.enter_context(before_interrupt(lambda: _kept(request.target)))
         rows = _run(request, tasks, Ledger(request.target))
         result = BatchResult(request.target, rows)
         write_table(request.target / TABLE, rows)
@@ -77,6 +79,11 @@ def run_batch(request: BatchRequest) -> BatchResult:
         told = result.to_json()
         _describe(request, {key: told[key] for key in ("total", "done", "failed", "skipped", "retried")})
     return result
+
+
+def _kept(target: Path) -> Path | None:
+    """Return where rows that are over are kept, None where there are none."""
+    return target if any((target / ROWS).glob("*.json")) else None
 
 
 def _check_folder(target: Path) -> None:

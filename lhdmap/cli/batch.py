@@ -7,6 +7,7 @@ import contextlib
 import io
 import json
 import os
+import threading
 from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
@@ -20,6 +21,7 @@ from lhdmap.names import beside
 if TYPE_CHECKING:
     from lhdmap.batch.work import Outcome, Runner
 
+_ONE = threading.Lock()  # standard output is the process's: a worker with several threads takes one row at a time
 _SAID = 50_000  # characters of what a command said that are kept
 
 
@@ -69,7 +71,7 @@ def run_words(words: Sequence[str]) -> Outcome:
     from lhdmap.cli.main import main
 
     printed, said = io.StringIO(), io.StringIO()
-    with contextlib.redirect_stdout(printed), contextlib.redirect_stderr(said):
+    with _ONE, contextlib.redirect_stdout(printed), contextlib.redirect_stderr(said):
         exit_code = main(list(words))
     try:
         values = json.loads(printed.getvalue() or "{}")
