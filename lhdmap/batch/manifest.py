@@ -16,6 +16,7 @@ LOG, COMMAND, NAME = "log", "command", "name"
 OPTIONS = ("map", "machine", "config")
 COLUMNS = (LOG, *OPTIONS, COMMAND, NAME)
 DEFAULT = "build-map"
+RESERVED = ("rows", "batch.parquet", "report.html", "run.json")
 
 
 class Kind(NamedTuple):
@@ -119,15 +120,17 @@ def _task(path: Path, number: int, row: Mapping[str, str]) -> Task:
     for name in sorted(kind.wants - set(options)):
         raise UsageError(f"{where}: '{command}' wants a {name}")
     log, name = (path.parent / row[LOG]).absolute(), row.get(NAME, "")
-    if name and (Path(name).name != name or name.startswith(".")):
-        raise UsageError(f"{where}: name = '{name}': the name of a folder was wanted, without a path")
+    if name and (Path(name).name != name or name.startswith(".") or name in RESERVED):
+        raise UsageError(
+            f"{where}: name = '{name}': a name for a folder was wanted, without a path, none of {RESERVED}"
+        )
     return Task(row[LOG], log, command, tuple(options.items()), name or beside(log, kind.what).name)
 
 
 def _named(tasks: Sequence[Task]) -> list[Task]:
     """Return the tasks with a name each: of the same ones the second has `_2` behind it."""
     used: Counter[str] = Counter()
-    taken = {task.name for task in tasks} | {"rows"}
+    taken = {task.name for task in tasks}
     named = []
     for task in tasks:
         name = task.name

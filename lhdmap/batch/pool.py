@@ -39,6 +39,13 @@ class _Worker:
         """Begin a job."""
         if self._jobs >= _JOBS_A_PROCESS:
             self.end()
+        try:
+            return self._submitted(work, job)
+        except BrokenProcessPool:  # it died between two jobs
+            self.end()
+            return self._submitted(work, job)
+
+    def _submitted(self, work: Work, job: Job) -> Future[Outcome]:
         with undisturbed():  # the process must not hear Ctrl-C before it can ignore it
             if self._pool is None:
                 spawn = multiprocessing.get_context("spawn")  # a fork would copy locks of threads

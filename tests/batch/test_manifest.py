@@ -50,6 +50,7 @@ def test_results_of_the_same_name_are_told_apart(tmp_path: Path) -> None:
         ("log,command\n,pile\n", UsageError, "log is empty"),
         ("log\na,b\n", UsageError, "more cells"),
         ("log,name\na,../x\n", UsageError, "without a path"),
+        ("log,name\na,rows\n", UsageError, "none of"),
     ],
 )
 def test_what_is_wrong_is_refused(tmp_path: Path, text: str, kind: type[LhdmapError], told: str) -> None:

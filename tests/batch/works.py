@@ -6,6 +6,8 @@ import json
 import os
 import shutil
 import signal
+import threading
+import time
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -26,6 +28,10 @@ def work(words: Sequence[str]) -> Outcome:
         (partial / ".lhdmap").touch()
     if log.stem.startswith("killed") or (log.stem.startswith("once") and tries == 1):
         os.kill(os.getpid(), signal.SIGKILL)
+    if log.stem.startswith("late"):
+        threading.Timer(0.1, os.kill, (os.getpid(), signal.SIGKILL)).start()
+    if log.stem.startswith("slow"):
+        time.sleep(0.5)
     if log.stem.startswith("raises"):
         raise ValueError("odd")
     if log.stem.startswith("fails"):
