@@ -60,3 +60,21 @@ def undisturbed() -> Iterator[None]:
         signal.signal(signal.SIGINT, signal.SIG_DFL if handler is None else handler)
         if heard:
             signal.raise_signal(signal.SIGINT)
+
+
+def obey() -> None:
+    """In a worker: leave Ctrl-C to the process that gives the orders, and end with it.
+
+    Nothing else would tell a worker that the other one is gone.
+    """
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    threading.Thread(target=_end_with_parent, name="parent", daemon=True).start()
+
+
+def _end_with_parent() -> None:
+    import multiprocessing  # only where there are workers
+
+    parent = multiprocessing.parent_process()
+    if parent is not None:
+        parent.join()
+        signal.raise_signal(signal.SIGKILL)

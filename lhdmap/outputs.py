@@ -22,7 +22,7 @@ from lhdmap.interrupts import before_interrupt, undisturbed
 
 PARTIAL_SUFFIX = ".partial"
 _FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
-_MARK = ".lhdmap"  # in a folder that grows: whose it is; locked as long as its run goes on
+MARK = ".lhdmap"  # in a folder that grows: whose it is; locked as long as its run goes on
 
 
 def free_folder(target: Path, *, force: bool = False, inputs: Sequence[Path] = ()) -> None:
@@ -131,7 +131,7 @@ class OutputFolder:
         old = self.target.with_name(f"{self.target.name}.replaced-{os.getpid()}")
         try:
             with undisturbed():
-                (self.path / _MARK).unlink(missing_ok=True)
+                (self.path / MARK).unlink(missing_ok=True)
                 replaces = self.target.is_dir()
                 if replaces:
                     self.target.rename(old)
@@ -157,21 +157,21 @@ class OutputFolder:
             if self.path.is_dir() and not self.path.is_symlink():
                 self._take_over(resumed=resumed)
             self.path.mkdir(parents=True, exist_ok=resumed)
-            lock = self._end.enter_context((self.path / _MARK).open("w", encoding="ascii"))
+            lock = self._end.enter_context((self.path / MARK).open("w", encoding="ascii"))
         except OSError as error:
             raise InputError(f"{self.path}: the output folder cannot be made: {error.strerror}") from error
-        if not _locked(lock.fileno()):
+        if not locked(lock.fileno()):
             raise UsageError(f"{self.path}: another run is writing it; wait for that one, or -o OTHER")
         self._mine = True
 
     def _take_over(self, *, resumed: bool) -> None:
         """Remove the partial folder of a run that was interrupted; raises UsageError where it may be something else."""
-        mark = self.path / _MARK
+        mark = self.path / MARK
         if any(self.path.iterdir()):
             if not mark.is_file():
                 raise UsageError(f"{self.path}: is in the way and may not be lhdmap's; move it away, or -o OTHER")
             with mark.open("a", encoding="ascii") as lock:
-                if not _locked(lock.fileno()):
+                if not locked(lock.fileno()):
                     raise UsageError(f"{self.path}: another run is writing it; wait for that one, or -o OTHER")
             verb = "gone on with" if resumed else "replaced"
             warnings.warn(f"{self.path}, left over from an interrupted run, is {verb}", LhdmapWarning, stacklevel=5)
@@ -196,8 +196,11 @@ def _name_place(error: BaseException | None, path: Path) -> None:
         error.filename = str(path)
 
 
-def _locked(descriptor: int) -> bool:
-    """Return whether the lock was free, or there is no such thing here; it is given back with the file, by a crash too."""
+def locked(descriptor: int) -> bool:
+    """Take the lock of an open file and return whether it was free, or there is no such thing here.
+
+    It is given back with the file, by a crash too.
+    """
     try:
         import fcntl
 

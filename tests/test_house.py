@@ -53,7 +53,7 @@ FLOORS = [
     {"report"},
     {"config"},
     {"pipeline"},
-    {"front", "replay"},
+    {"front", "replay", "batch"},
     {"cli"},
     {"__main__"},
 ]

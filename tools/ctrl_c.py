@@ -41,6 +41,8 @@ def commands(work: Path) -> dict[str, list[str]]:
     (work / "s.toml").write_text('[[scenes]]\nvariant = "wall"\ncount = 2\n', encoding="utf-8")
     (work / "t.geojson").write_text(json.dumps(to_geojson(ladder())), encoding="utf-8")
     (work / "w.csv").write_text("pressure_bar,fill\n52,0\n64,0.25\n76,0.5\n88,0.75\n100,1\n", encoding="utf-8")
+    (work / "grizzly.toml").write_text('kind = "grizzly"\nrocks = 1\n', encoding="utf-8")
+    (work / "batch.csv").write_text("log,command\nroom.mcap,pile\nroom.mcap,doctor\n", encoding="utf-8")
     write_loading(work / "loading.mcap", [[0.6, 0.8, 0.9]])
     first_map = str(_built(work))
     return {
@@ -67,6 +69,8 @@ def commands(work: Path) -> dict[str, list[str]]:
         "check-map": ["check-map", str(work / "t.geojson")],
         "export": ["export", str(map_folder(work / "map")), "--format", "dxf", "-o", "{out}.dxf"],
         "localize": ["localize", str(work / "later.mcap"), "--map", first_map, "-o", "{out}"],
+        "batch": ["batch", str(work / "batch.csv"), "-o", "{out}", "--jobs", "2"],
+        "replay-grizzly": ["replay", str(work / "grizzly.toml"), "-o", "{out}"],
         "demo": ["demo", "-o", "{out}"],
     }
 

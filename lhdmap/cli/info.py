@@ -19,6 +19,7 @@ _WHAT = {
     "localization": "localization",
     "navigation": "tables of drives",
     "production": "production of replays",
+    "batch": "batch of logs",
 }
 
 

@@ -38,6 +38,7 @@ COMMANDS = {
     "check-map": "is the map ready to run on, and if not, why",
     "production": "what replays produced, and what their time went into",
     "export": "a map in a format that other tools read",
+    "batch": "many logs, on all cores or on a cluster: one table, one page",
     "eval": "compare results with ground truth",
     "config": "print the settings with unit and source",
     "completion": "print the tab completion for bash, zsh or fish",

@@ -160,10 +160,7 @@ class Scenario:
         """Check what a key alone cannot; raises ConfigError."""
         if self.kind != GRIZZLY and not self.mine:
             raise ConfigError("mine is missing: the name of a plan that ships or a file was wanted")
-        if (self.kind == GRIZZLY) != bool(self.rocks or self.grizzly.pile):
-            raise ConfigError(
-                f"kind = '{self.kind}' and rocks = {self.rocks}: a grizzly wants rocks, and nothing else does"
-            )
+        _check_grizzly(self)
         if self.goal and self.mission:
             raise ConfigError(f"goal = '{self.goal}' and mission: one of them was wanted")
         if self.driver == AUTONOMOUS and not self.goal:
@@ -188,6 +185,18 @@ class Scenario:
     def who(self) -> str:
         """Who drives."""
         return self.driver or (AUTONOMOUS if self.goal or self.kind != "tram" else OPERATOR)
+
+
+def _check_grizzly(scenario: Scenario) -> None:
+    """Refuse a grizzly without rocks, rocks elsewhere, and what a machine that stands does not do."""
+    if (scenario.kind == GRIZZLY) != bool(scenario.rocks or scenario.grizzly.pile):
+        raise ConfigError(
+            f"kind = '{scenario.kind}' and rocks = {scenario.rocks}: a grizzly wants rocks, and nothing else does"
+        )
+    if scenario.kind == GRIZZLY:
+        for key in ("mine", "map", "start", "goal", "route", "driver", "mission", "modes", "faults"):
+            if getattr(scenario, key):
+                raise ConfigError(f"{key} is given: a grizzly has none")
 
 
 def _check_target(fault: FaultSettings) -> None:

@@ -17,11 +17,12 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 PLAN = (
-    "The grizzly from above: rocks as they were seen at first, the level ways of the tip, and the blows, numbered by the "
-    "rocks that they went to, in the order of the work."
+    "The grizzly from above: rocks as they were seen at first, the level ways of the tip, and the blows, numbered by "
+    "their places in the order of the work."
 )
 TIME = "Rocks that are too large, as seen at each look, and the height of the tip; crosses are blows."
 SIMULATED = "All of this is simulated: how rock breaks is assumed, and the figures are those of a model."
+_APART_M = 0.25  # blows nearer to each other have one number
 _OUTCOMES = {"broke": charts.TRUTH, "cracked": charts.ODOMETRY, "rolled": charts.WHEELS, "missed": charts.FLAGGED}
 
 
@@ -89,15 +90,15 @@ def plan_chart(machine: Rockbreaker, story: Story) -> Figure:
 
 def _draw_blows(axes: Axes, story: Story) -> None:
     named: set[str] = set()
-    last, number = None, 0
+    numbered: list[tuple[float, float]] = []
     for stop in story.stops:
         x, y = float(stop.rock.top_m[0]), float(stop.rock.top_m[1])
         label = None if stop.outcome in named else stop.outcome
         named.add(stop.outcome)
         axes.plot(x, y, "o", color=_OUTCOMES.get(stop.outcome, charts.INK), markersize=6, label=label)
-        if stop.rock is not last:
-            number, last = number + 1, stop.rock
-            axes.annotate(str(number), (x, y), (5.0, 4.0), textcoords="offset points", fontsize=9.0)
+        if all(np.hypot(x - u, y - v) > _APART_M for u, v in numbered):
+            numbered.append((x, y))
+            axes.annotate(str(len(numbered)), (x, y), (5.0, 4.0), textcoords="offset points", fontsize=9.0)
 
 
 def time_chart(story: Story) -> Figure:

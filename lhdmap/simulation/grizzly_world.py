@@ -28,7 +28,7 @@ _LEAST_CHANCE = 0.3
 _ROLLS_FROM, _ROLL_CHANCE = 0.3, 0.5  # share of its half width beside the middle from which on a blow may roll a rock
 _ROLL_M = (0.15, 0.45)
 _PIECES = (0.45, 0.75)  # sizes of the two largest pieces over the rock's
-_SHAPES, _PLACES = 12, 40  # that are tried for a rock
+_SHAPES, _PLACES = 40, 40  # that are tried for a rock
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -156,8 +156,8 @@ class GrizzlyWorld:
 
     def _lay(self, place: np.random.Generator, least_m: float, most_m: float) -> None:
         low, high = np.array(self.machine.grizzly.min_m), np.array(self.machine.grizzly.max_m)
-        for _ in range(_SHAPES):
-            size_m = float(np.exp(place.uniform(np.log(least_m), np.log(most_m))))
+        for k in range(_SHAPES):  # where it is crowded, smaller ones find room
+            size_m = float(np.exp(place.uniform(np.log(least_m), np.log(most_m + (least_m - most_m) * k / _SHAPES))))
             mesh = rock(size_m, place)
             for _ in range(_PLACES):
                 one = _lying(mesh, place.uniform(low, high), self.bars_m)

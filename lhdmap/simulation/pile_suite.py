@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import multiprocessing
-import signal
-import threading
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
@@ -12,6 +9,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from lhdmap.errors import ConfigError
+from lhdmap.interrupts import obey
 from lhdmap.runfolder import RunFolderWriter, RunInfo
 from lhdmap.settings import setting
 from lhdmap.settings_tree import load_tree, part
@@ -112,24 +110,11 @@ def _written(scenes: list[SuiteScene], folder: Path, jobs: int) -> Iterator[str]
         for one in scenes:
             yield _write(one, folder)
         return
-    with ProcessPoolExecutor(jobs, initializer=_obey) as pool:
+    with ProcessPoolExecutor(jobs, initializer=obey) as pool:
         try:
             yield from pool.map(_write, scenes, [folder] * len(scenes))
         finally:
             pool.shutdown(wait=False, cancel_futures=True)
-
-
-def _obey() -> None:
-    """Leave Ctrl-C to the process that gives the orders, and end with it: nothing else would tell this one that it is gone."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    threading.Thread(target=_end_with_parent, name="parent", daemon=True).start()
-
-
-def _end_with_parent() -> None:
-    parent = multiprocessing.parent_process()
-    if parent is not None:
-        parent.join()
-        signal.raise_signal(signal.SIGKILL)
 
 
 def _write(one: SuiteScene, folder: Path) -> str:

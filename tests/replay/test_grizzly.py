@@ -85,7 +85,12 @@ def test_boulders_of_a_pile_are_handed_over(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(
     ("table", "told"),
-    [({}, "wants rocks"), ({"kind": "tram", "mine": "ring", "rocks": 2}, "nothing else"), ({"rocks": -1}, "range")],
+    [
+        ({"rocks": 1, "goal": "DP1"}, "goal is given"),
+        ({}, "wants rocks"),
+        ({"kind": "tram", "mine": "ring", "rocks": 2}, "nothing else"),
+        ({"rocks": -1}, "range"),
+    ],
 )
 def test_what_is_wrong_is_refused(table: dict[str, Any], told: str) -> None:
     with pytest.raises(ConfigError, match=told):

@@ -1,0 +1,37 @@
+"""What a worker does and says: one command line, its exit code, its JSON object, what it printed besides."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from typing import Any, NamedTuple
+
+
+class Outcome(NamedTuple):
+    """What came of a command line: exit code, the object of `--json`, what it said on standard error."""
+
+    exit_code: int
+    values: Mapping[str, Any]
+    said: str = ""
+
+
+class Job(NamedTuple):
+    """A command line with a key of its own."""
+
+    key: str
+    words: tuple[str, ...]
+
+
+class Ran(NamedTuple):
+    """A job that is over: its outcome, or why there is none; how often a worker died of it; seconds it took."""
+
+    key: str
+    outcome: Outcome | None
+    reason: str
+    killed: int
+    wall_s: float
+
+
+Work = Callable[[Sequence[str]], Outcome]
+"""A function that can be sent to another process."""
+Runner = Callable[[Sequence[Job], Work], Iterator[Ran]]
+"""Yields each job once, as it ends, in any order."""
