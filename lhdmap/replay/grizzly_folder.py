@@ -75,7 +75,7 @@ def _made(scenario: Scenario, journal_path: Path) -> tuple[GrizzlyRun, Journal]:
     world = GrizzlyWorld(machine, scenario.seed, scenario.rocks, sizes_m)
     station = Station(
         machine,
-        Settings().rockbreaker,
+        (request.settings or Settings()).rockbreaker,
         cast("Timing", given.timing),
         margin_m=given.margin_m,
         most_blows=given.most_blows,

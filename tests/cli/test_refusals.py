@@ -103,7 +103,7 @@ REFUSALS = [
     Refusal("simulate pile --suite {missing} -o {folder}/suite", 3, ("missing.mcap",)),
     Refusal("eval pile --truth {missing}", 3, ("missing.mcap",)),
     Refusal("eval pile", 2, ("--truth",)),
-    Refusal("eval loading {tum}", 2, ("loading",)),
+    Refusal("eval loading {tum}", 3, ("path.tum",)),
     Refusal("view {missing} --web", 3, ("missing.mcap",)),
     Refusal("demo --set odometry.metod=1", 2, ("did you mean 'method'",)),
     Refusal("demo -o {log}/demo", 3, ("room.mcap",)),

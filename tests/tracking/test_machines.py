@@ -17,7 +17,7 @@ def test_the_truck_has_the_sections_and_keys_of_the_loader() -> None:
         tomllib.loads(resource(f"pipelines/machines/{name}.toml").read_text(encoding="utf-8"))
         for name in ("truck_28t", "lhd_11t")
     )
-    assert truck.keys() == loader.keys()
+    assert truck.keys() == loader.keys() - {"digging"}  # it has no bucket
     for section in ("dimensions", "drive", "steering", "brakes", "linkage", "spread"):
         assert truck[section].keys() == loader[section].keys()
 
