@@ -55,7 +55,7 @@ def replay_grizzly(request: ReplayRequest) -> ReplayResult:
         raise UsageError("a grizzly is not followed live: run it without --view, then lhdmap view RUN")
     interruption = Interruption()
     with RunFolderWriter(KIND, request.target, force=request.force, inputs=request.sources) as folder:
-        run, journal = _made(request.scenario, folder.path / JOURNAL)
+        run, journal = _made(request.scenario, request.settings or Settings(), folder.path / JOURNAL)
         with interruption.comes_first():
             began = time.monotonic()
             with interruption:
@@ -67,7 +67,7 @@ def replay_grizzly(request: ReplayRequest) -> ReplayResult:
     return ReplayResult(path, verdict)
 
 
-def _made(scenario: Scenario, journal_path: Path) -> tuple[GrizzlyRun, Journal]:
+def _made(scenario: Scenario, settings: Settings, journal_path: Path) -> tuple[GrizzlyRun, Journal]:
     """Return the run with world and station."""
     machine = load_rockbreaker(Path(scenario.machine) if scenario.machine else None)
     given, opening_m = scenario.grizzly, machine.grizzly.opening_m
@@ -75,7 +75,7 @@ def _made(scenario: Scenario, journal_path: Path) -> tuple[GrizzlyRun, Journal]:
     world = GrizzlyWorld(machine, scenario.seed, scenario.rocks, sizes_m)
     station = Station(
         machine,
-        (request.settings or Settings()).rockbreaker,
+        settings.rockbreaker,
         cast("Timing", given.timing),
         margin_m=given.margin_m,
         most_blows=given.most_blows,
