@@ -17,11 +17,12 @@ from lhdmap.settings import REQUIRED, nearest, setting
 from lhdmap.settings_tree import load_tree, part, tree_toml
 from lhdmap.simulation.sensing.faults import FaultSettings
 
-GRIZZLY = "grizzly"
-KINDS = ("tram", "loading", "mission", "haulage", GRIZZLY)
+GRIZZLY, HAULAGE = "grizzly", "haulage"
+KINDS = ("tram", "loading", "mission", HAULAGE, GRIZZLY)
 AUTONOMOUS, OPERATOR, TELEOPERATOR = "autonomous", "operator", "teleoperator"
 MODES = ("idle", "autonomous", "assisted", "teleoperated", "manual")
 FOLDER = "pipelines/scenarios"
+_NOISE = "haulage findings: noise of the prototype"
 _NO_MEASUREMENTS = ("/tf_static", "/ground_truth/odometry")
 
 
@@ -111,6 +112,43 @@ class GrizzlyPlan:
 
 
 @dataclass(frozen=True, slots=True)
+class HaulagePlan:
+    """How a machine works on a surface site, and what it is other than its model."""
+
+    keeps: str = setting("", choices=("", "left", "right"), doc="Side that traffic keeps to; empty: as the site says.")
+    load_s: float = setting(
+        25.0,
+        unit="s",
+        minimum=1.0,
+        maximum=3600.0,
+        source="haulage findings, section 5",
+        doc="Time until the body is full.",
+    )
+    dump_s: float = setting(
+        18.0,
+        unit="s",
+        minimum=1.0,
+        maximum=3600.0,
+        source="haulage findings, section 5",
+        doc="Time until it is empty.",
+    )
+    pose_m: float = setting(0.05, unit="m", minimum=0.0, maximum=5.0, source=_NOISE, doc="Noise of the front axle's place.")
+    heading_deg: float = setting(0.3, unit="deg", minimum=0.0, maximum=10.0, source=_NOISE, doc="The same of its heading.")
+    joint_deg: float = setting(0.3, unit="deg", minimum=0.0, maximum=10.0, source=_NOISE, doc="The same of the joint.")
+    joint_offset_deg: float = setting(
+        0.5, unit="deg", minimum=-10.0, maximum=10.0, source=_NOISE, doc="Offset of the joint's sensor."
+    )
+    slip_rad_per_g: float = setting(
+        0.12,
+        unit="rad/g",
+        minimum=0.0,
+        maximum=1.0,
+        source="haulage findings, section 2",
+        doc="Drift of both axles to the outside of bends, by lateral acceleration.",
+    )
+
+
+@dataclass(frozen=True, slots=True)
 class Scenario:
     """A replay: where, what machine, what it is to do, and what goes wrong."""
 
@@ -137,6 +175,9 @@ class Scenario:
         0, minimum=0, maximum=100, doc="Rocks on the grizzly that do not fall through, besides the pile's."
     )
     grizzly: GrizzlyPlan = part(GrizzlyPlan)
+    site: str = setting("", doc="Surface site: a file, or the name of one that ships; only of kind haulage.")
+    cycles: int = setting(1, minimum=1, maximum=10_000, doc="Loads that are hauled on a site.")
+    haulage: HaulagePlan = part(HaulagePlan)
     rearm_s: float = setting(
         5.0,
         unit="s",
@@ -158,7 +199,9 @@ class Scenario:
 
     def __post_init__(self) -> None:
         """Check what a key alone cannot; raises ConfigError."""
-        if self.kind != GRIZZLY and not self.mine:
+        if (self.kind == HAULAGE) != bool(self.site):
+            raise ConfigError(f"kind = '{self.kind}' and site = '{self.site}': haulage wants a site, and nothing else does")
+        if self.kind not in (GRIZZLY, HAULAGE) and not self.mine:
             raise ConfigError("mine is missing: the name of a plan that ships or a file was wanted")
         if (self.kind == GRIZZLY) != bool(self.rocks or self.grizzly.pile):
             raise ConfigError(
@@ -242,7 +285,7 @@ def load_scenario(path: Path, **over: Any) -> Scenario:
         ConfigError: a key or a value in it is wrong.
     """
     scenario = load_tree(Scenario, path, "scenario file")
-    beside: dict[str, Any] = {key: _beside(path, getattr(scenario, key)) for key in ("mine", "machine")}
+    beside: dict[str, Any] = {key: _beside(path, getattr(scenario, key)) for key in ("mine", "machine", "site")}
     beside["map"] = _beside(path, scenario.map, folder=True)
     if scenario.grizzly.pile:
         beside["grizzly"] = replace(scenario.grizzly, pile=str(path.parent / scenario.grizzly.pile))

@@ -1,0 +1,82 @@
+"""Ways over a site as they are driven: edges one after the other, their corners drawn with curvature that grows and falls."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from lhdmap.errors import InputError
+from lhdmap.haulage.layout import Layout
+from lhdmap.haulage.states import State
+from lhdmap.messages import FloatArray
+
+_SAME_M = 1e-3
+_CREEP_KMH = 10.0
+LANES = frozenset({State.ROAD, State.THROUGH, State.JUNCTION_ON, State.JUNCTION_OFF})
+"""Kinds of edges on which a machine has a lane to keep; in an area it has an apron."""
+
+
+class Way(NamedTuple):
+    """Waypoints (N, 2) in the order in which they are driven, speed (m/s) and edge (N,) of each, the kinds of the edges.
+
+    `dock`: edge at whose end it backs in after it, from the last waypoint on; -1: none.
+    """
+
+    points_m: FloatArray
+    speeds_mps: FloatArray
+    edges: FloatArray
+    dock: int = -1
+
+
+def way_of(layout: Layout, edges: Sequence[int]) -> Way:
+    """Return the way along edges that follow each other, up to the end of the last, or to where it backs in.
+
+    Raises:
+        InputError: an edge does not begin where the one before ends, or has no line.
+    """
+    points, speeds, numbers = [], [], []
+    dock = -1
+    for place, k in enumerate(edges):
+        edge = layout.edges[k]
+        if edge.line_m is None or (place and layout.edges[edges[place - 1]].end != edge.start):
+            raise InputError(f"edge {edge.start} to {edge.end}: it has no line, or does not follow the one before")
+        line = edge.line_m[:, :2]
+        if np.isfinite(edge.reverse_from_m):
+            line, dock = _up_to(line, edge.reverse_from_m), k
+        points.append(line)
+        speeds.append(np.full(len(line), (edge.speed_kmh or _CREEP_KMH) / 3.6))
+        numbers.append(np.full(len(line), float(k)))
+    if not points:
+        raise InputError("a way has at least one edge")
+    whole = np.concatenate(points)
+    keep = np.append(np.hypot(*np.diff(whole, axis=0).T) > _SAME_M, True)
+    return Way(whole[keep], np.concatenate(speeds)[keep], np.concatenate(numbers)[keep], dock)
+
+
+def _up_to(line: FloatArray, length_m: float) -> FloatArray:
+    """Return the points of a line up to a length."""
+    along = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(line, axis=0).T))])
+    return line[: int(np.searchsorted(along, length_m - _SAME_M)) + 1]
+
+
+def heading_at_end(line_m: FloatArray) -> float:
+    """Return the heading of the last piece of a line, rad."""
+    x, y = line_m[-1] - line_m[-2]
+    return float(np.arctan2(y, x))
+
+
+def apron_of(layout: Layout, area: str, room_m: float) -> FloatArray:
+    """Return the ground of an area (4, 2): the rectangle around all ways in it, along the last one's heading, and so much more."""
+    lines = [one.line_m for one in layout.edges if one.area == area and one.line_m is not None and one.kind not in LANES]
+    points = np.concatenate([line[:, :2] for line in lines])
+    queue = next(one for one in layout.edges if one.area == area and one.kind == State.AREA_IN and one.line_m is not None)
+    assert queue.line_m is not None  # noqa: S101  # asked for in the line before
+    heading = heading_at_end(queue.line_m)
+    c, s = np.cos(heading), np.sin(heading)
+    turned = points @ np.array([[c, -s], [s, c]])
+    low, high = turned.min(axis=0) - room_m, turned.max(axis=0) + room_m
+    corners = np.array([[low[0], low[1]], [high[0], low[1]], [high[0], high[1]], [low[0], high[1]]])
+    found: FloatArray = corners @ np.array([[c, s], [-s, c]])
+    return found
