@@ -61,6 +61,19 @@ def _up_to(line: FloatArray, length_m: float) -> FloatArray:
     return line[: int(np.searchsorted(along, length_m - _SAME_M)) + 1]
 
 
+def pose_at_end(layout: Layout, k: int) -> FloatArray:
+    """Return x, y and heading of the front axle at the end of an edge (3,); who backs in looks the other way.
+
+    Raises:
+        InputError: the edge has no line.
+    """
+    edge = layout.edges[k]
+    if edge.line_m is None:
+        raise InputError(f"edge {edge.start} to {edge.end} has no line")
+    turned = np.pi if np.isfinite(edge.reverse_from_m) else 0.0
+    return np.array([*edge.line_m[-1, :2], heading_at_end(edge.line_m[:, :2]) + turned])
+
+
 def heading_at_end(line_m: FloatArray) -> float:
     """Return the heading of the last piece of a line, rad."""
     x, y = line_m[-1] - line_m[-2]

@@ -7,6 +7,7 @@ from typing import Any
 
 from lhdmap.messages import Text
 from lhdmap.replay.journal import Scribe
+from lhdmap.replay.lane_tally import LaneTally
 from lhdmap.replay.load_tally import LoadTally
 from lhdmap.replay.process import (
     CONTACT,
@@ -15,6 +16,7 @@ from lhdmap.replay.process import (
     MILLISECOND_NS,
     MISSION,
     STATE,
+    WAY,
     Outgoing,
     Process,
     Received,
@@ -28,10 +30,10 @@ class Monitor(Process):
     """Has the last turn of all at a time."""
 
     name, period_ns, priority, site = MONITOR, 100 * MILLISECOND_NS, 90, EVERYWHERE
-    reads = (STATE, CONTACT, MISSION, LOADING)
+    reads = (STATE, CONTACT, MISSION, LOADING, WAY)
 
-    def __init__(self, tally: Tally, scribe: Scribe, load: LoadTally | None = None) -> None:
-        self.tally, self._scribe, self.load = tally, scribe, load
+    def __init__(self, tally: Tally, scribe: Scribe, load: LoadTally | None = None, lane: LaneTally | None = None) -> None:
+        self.tally, self._scribe, self.load, self._lane = tally, scribe, load, lane
 
     @property
     def ended(self) -> bool:
@@ -40,7 +42,8 @@ class Monitor(Process):
 
     def verdict(self) -> dict[str, Any]:
         """Return what is said of the kind alone."""
-        return {} if self.load is None else self.load.verdict()
+        counted = {} if self.load is None else self.load.verdict()
+        return counted | ({} if self._lane is None else self._lane.verdict())
 
     def step(self, now_ns: int, inbox: Sequence[Received]) -> Iterable[Outgoing]:
         """Take what has come and judge."""
@@ -50,6 +53,10 @@ class Monitor(Process):
                 self.tally.at(received.message)
                 if self.load is not None:
                     self.load.at(received.message)
+                if self._lane is not None and (nearness := self._lane.at(received.message)) is not None:
+                    self.tally.near(received.sent_ns, nearness)
+            elif received.topic == WAY and self._lane is not None:
+                self._lane.way(received.message)
             elif received.topic == LOADING and self.load is not None:
                 self.load.said(received.message)
             elif received.topic == CONTACT:
