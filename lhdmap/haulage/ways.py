@@ -11,8 +11,11 @@ from lhdmap.errors import InputError
 from lhdmap.haulage.layout import Layout
 from lhdmap.haulage.states import State
 from lhdmap.messages import FloatArray
+from lhdmap.tracking.path import STEP_M, path_of
 
-_SAME_M = 1e-3
+SMOOTHING_M = 1.5
+"""Over so much the curvature of corners grows and falls."""
+_SAME_M, _SPACING_M, _BEYOND_M = 1e-3, 1.0, 10.0
 _CREEP_KMH = 10.0
 LANES = frozenset({State.ROAD, State.THROUGH, State.JUNCTION_ON, State.JUNCTION_OFF})
 """Kinds of edges on which a machine has a lane to keep; in an area it has an apron."""
@@ -30,8 +33,10 @@ class Way(NamedTuple):
     dock: int = -1
 
 
-def way_of(layout: Layout, edges: Sequence[int]) -> Way:
+def way_of(layout: Layout, edges: Sequence[int], smoothing_m: float = SMOOTHING_M) -> Way:
     """Return the way along edges that follow each other, up to the end of the last, or to where it backs in.
+
+    The edges' lines are of straights and arcs; over `smoothing_m` the curvature of one becomes that of the next (0: as a step).
 
     Raises:
         InputError: an edge does not begin where the one before ends, or has no line.
@@ -52,7 +57,36 @@ def way_of(layout: Layout, edges: Sequence[int]) -> Way:
         raise InputError("a way has at least one edge")
     whole = np.concatenate(points)
     keep = np.append(np.hypot(*np.diff(whole, axis=0).T) > _SAME_M, True)
-    return Way(whole[keep], np.concatenate(speeds)[keep], np.concatenate(numbers)[keep], dock)
+    drawn = Way(whole[keep], np.concatenate(speeds)[keep], np.concatenate(numbers)[keep], dock)
+    return drawn if smoothing_m <= 0.0 else _smoothed(drawn, smoothing_m)
+
+
+def _smoothed(way: Way, smoothing_m: float) -> Way:
+    """Return a way with rounded curvature, waypoints about each metre; beyond both ends it is taken to go on straight."""
+    line = way.points_m
+    on = np.arange(1.0, _BEYOND_M + 0.5)[:, None]
+    before = line[0] - on[::-1] * _unit(line[1] - line[0])
+    after = line[-1] + on * _unit(line[-1] - line[-2])
+    rows = path_of(np.concatenate([before, line, after]), smoothing_m, 0.0).points
+    first, last = (_place_on(rows, end) for end in (line[0], line[-1]))
+    at = np.linspace(first, last, max(round(STEP_M * (last - first) / _SPACING_M), 3) + 1)
+    points = np.column_stack([np.interp(at, np.arange(len(rows)), rows[:, k]) for k in range(2)])
+    along = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(line, axis=0).T))])
+    share = np.linspace(0.0, along[-1], len(points))
+    index = np.clip(np.searchsorted(along, share, side="right") - 1, 0, len(along) - 1)
+    return Way(points, way.speeds_mps[index], way.edges[index], way.dock)
+
+
+def _place_on(rows: FloatArray, point_m: FloatArray) -> float:
+    """Return the index, with its fraction, of where a point is beside rows of a path."""
+    k = int(np.argmin(np.hypot(*(rows[:, :2] - point_m).T)))
+    gap = point_m - rows[k, :2]
+    return k + float(gap[0] * np.cos(rows[k, 2]) + gap[1] * np.sin(rows[k, 2])) / STEP_M
+
+
+def _unit(step_m: FloatArray) -> FloatArray:
+    found: FloatArray = step_m / np.hypot(*step_m)
+    return found
 
 
 def _up_to(line: FloatArray, length_m: float) -> FloatArray:
@@ -82,9 +116,13 @@ def heading_at_end(line_m: FloatArray) -> float:
 
 def apron_of(layout: Layout, area: str, room_m: float) -> FloatArray:
     """Return the ground of an area (4, 2): the rectangle around all ways in it, along the last one's heading, and so much more."""
-    lines = [one.line_m for one in layout.edges if one.area == area and one.line_m is not None and one.kind not in LANES]
+    lines = [
+        one.line_m for one in layout.edges if one.area == area and one.line_m is not None and one.kind not in LANES
+    ]
     points = np.concatenate([line[:, :2] for line in lines])
-    queue = next(one for one in layout.edges if one.area == area and one.kind == State.AREA_IN and one.line_m is not None)
+    queue = next(
+        one for one in layout.edges if one.area == area and one.kind == State.AREA_IN and one.line_m is not None
+    )
     assert queue.line_m is not None  # noqa: S101  # asked for in the line before
     heading = heading_at_end(queue.line_m)
     c, s = np.cos(heading), np.sin(heading)

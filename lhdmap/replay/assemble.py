@@ -93,7 +93,9 @@ def assemble(
     faults = Faults(scenario.faults, journal, parts.places)
     link = Link(scenario.link, faults, scenario.seed)
     load = LoadTally(parts.machine.drive.payload_kg) if parts.loading is not None or scenario.mission else None
-    monitor = Monitor(Tally(scenario.kind, scenario.limits, parts.goal_m), journal.of(Monitor.name), load, lane_of(parts))
+    monitor = Monitor(
+        Tally(scenario.kind, scenario.limits, parts.goal_m), journal.of(Monitor.name), load, lane_of(parts)
+    )
     processes: list[Process] = [Plant(parts, faults, link, journal.of(Plant.name), scenario.seed)]
     if parts.haulage is not None:
         processes += haulage_processes(scenario, parts, parts.haulage, journal)

@@ -8,8 +8,9 @@ from lhdmap.replay.journal import Journal
 from lhdmap.replay.lane_tally import LaneTally
 from lhdmap.replay.parts import Haulage, Parts
 from lhdmap.replay.process import Process
+from lhdmap.replay.processes.executive import EXECUTIVE
 from lhdmap.replay.processes.site_driver import SITE_DRIVER, SiteDriver
-from lhdmap.replay.processes.site_executive import EXECUTIVE, SiteExecutive
+from lhdmap.replay.processes.site_executive import SiteExecutive
 from lhdmap.replay.processes.site_work import SITE_WORK, SiteWork
 from lhdmap.replay.scenario import Scenario
 from lhdmap.replay.site_drive import SiteDrive

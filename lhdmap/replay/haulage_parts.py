@@ -14,15 +14,16 @@ from lhdmap.driving.bodies import bodies_of
 from lhdmap.driving.model import drive_model
 from lhdmap.errors import UsageError
 from lhdmap.haulage.layout import Layout, checked
-from lhdmap.haulage.site import Site, find_site, load_site
+from lhdmap.haulage.site import find_site, load_site
 from lhdmap.haulage.site_layout import layout_of_site
-from lhdmap.haulage.ways import pose_at_end
+from lhdmap.haulage.ways import LANES, apron_of, pose_at_end
 from lhdmap.machine import Machine, load_machine
 from lhdmap.messages import Float32Array, FloatArray, Joints, Tachometer, WheelPose
+from lhdmap.replay.haulage_plan import HaulagePlan
 from lhdmap.replay.parts import Haulage, Parts
 from lhdmap.replay.process import SITE_POSE
-from lhdmap.replay.scenario import HaulagePlan, Scenario
-from lhdmap.replay.site_drive import SiteGround
+from lhdmap.replay.scenario import Scenario
+from lhdmap.replay.site_drive import APRON_M, SiteGround
 from lhdmap.resources import resource
 from lhdmap.settings import nearest
 from lhdmap.simulation.history import Column
@@ -70,7 +71,7 @@ def haulage_parts(scenario: Scenario, settings: Settings) -> Parts:
         operator=None,
         places={name: (float(pose[0]), float(pose[1]), 0.0) for name, pose in places.items()},
         goal_m=(x, y, 0.0),
-        lines_m=_lines(layout, site),
+        lines_m=_lines(layout, 0.5 * site.road.lane_m),
         expected_s=_CYCLE_S * scenario.cycles,
         settings=settings,
         haulage=Haulage(ground, park, 0.5 * site.road.lane_m),
@@ -91,10 +92,19 @@ def find_machine(word: str) -> Machine:
     return load_machine(shipped[word])
 
 
-def _lines(layout: Layout, site: Site) -> list[FloatArray]:
-    """Return the lines of all edges (N, 3), to draw."""
-    lines = [edge.line_m for edge in layout.edges if edge.line_m is not None]
-    return [np.column_stack([line[:, :2], np.zeros(len(line))]) for line in lines]
+def _lines(layout: Layout, half_lane_m: float) -> list[FloatArray]:
+    """Return lines (N, 3) to draw: both sides of lanes, ways in areas, aprons."""
+    flat: list[FloatArray] = []
+    for edge in layout.edges:
+        if edge.line_m is not None:
+            line = edge.line_m[:, :2]
+            step = np.gradient(line, axis=0)
+            aside = np.column_stack([-step[:, 1], step[:, 0]]) / np.hypot(*step.T)[:, None]
+            flat += [line + side * half_lane_m * aside for side in (-1, 1)] if edge.kind in LANES else [line]
+    for area in layout.roles:
+        corners = apron_of(layout, area, APRON_M)
+        flat.append(np.vstack([corners, corners[:1]]))
+    return [np.column_stack([line, np.zeros(len(line))]) for line in flat]
 
 
 class Open:
@@ -102,7 +112,7 @@ class Open:
 
     origin_m = np.zeros(3)
 
-    def near(self, position_m: FloatArray) -> Open:
+    def near(self, _position_m: FloatArray) -> Open:
         """Return itself."""
         return self
 
@@ -110,7 +120,7 @@ class Open:
         """Return that no ray meets anything."""
         return np.full(len(rays), np.inf, dtype=np.float32)
 
-    def dust(self, position_m: FloatArray) -> float:
+    def dust(self, _position_m: FloatArray) -> float:
         """Return that none hangs anywhere."""
         return 0.0
 
@@ -136,7 +146,9 @@ class SiteSenses(NamedTuple):
 
     def speed(self, stamp_ns: int, state: FloatArray, rng: np.random.Generator) -> Tachometer:
         """Return the speed of the front axle."""
-        return Tachometer(stamp_ns, float(state[Column.WHEEL_SPEED]) * (1.0 + _SPEED_NOISE * float(rng.standard_normal())))
+        return Tachometer(
+            stamp_ns, float(state[Column.WHEEL_SPEED]) * (1.0 + _SPEED_NOISE * float(rng.standard_normal()))
+        )
 
 
 def _sensors(plan: HaulagePlan, seed: int) -> list[Sensor]:

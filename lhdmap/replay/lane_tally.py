@@ -16,7 +16,7 @@ from lhdmap.replay.parts import Nearness, Touch
 from lhdmap.replay.processes.told import WayNow
 from lhdmap.replay.site_drive import SiteGround
 from lhdmap.simulation.vehicle.kinematic import KinematicState
-from lhdmap.tracking.path import beside, path_of
+from lhdmap.tracking.path import STEP_M, beside, path_of
 
 _EVERY, _LOOK = 5, 2  # states of 10 ms: both axles at 20 Hz, bodies at 10 Hz
 _STILL_MPS = 0.3
@@ -25,9 +25,10 @@ _NEAR_M = 6.0
 
 
 class Truth(NamedTuple):
-    """The way that is driven, as rows of `beside`, the edge at each of them, and where both axles and bodies were on it."""
+    """The way that is driven and the middle of its lane, as rows of `beside`; the edge at each row of the way."""
 
     rows: FloatArray
+    lane: FloatArray
     edges: FloatArray
 
 
@@ -50,7 +51,7 @@ class LaneTally:
         self._near = np.zeros(2)
         self._count = 0
         self._state: KinematicState | None = None
-        self._sums: list[float] = []
+        self._sums: tuple[list[float], list[float]] = [], []  # in areas, in lanes
         self._most = np.zeros(3)  # |z0|, |z1|, half of the lane that is used
         self._rooms: dict[str, Room] = {}
         self.docks: list[Docked] = []
@@ -60,12 +61,13 @@ class LaneTally:
         self._note_dock()
         self._way, self._truth = told, None
         if not told.dock:
-            way = way_of(self._ground.layout, told.edges)
+            layout = self._ground.layout
+            way, lane = way_of(layout, told.edges), way_of(layout, told.edges, 0.0)
             path = path_of(way.points_m, 0.0, _BEYOND_M)
-            on = np.arange(len(path.points)) * 0.1 - path.begin_m
+            on = np.arange(len(path.points)) * STEP_M - path.begin_m
             along = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(way.points_m, axis=0).T))])
             index = np.clip(np.searchsorted(along, on, side="right") - 1, 0, len(along) - 1)
-            self._truth = Truth(path.points, way.edges[index])
+            self._truth = Truth(path.points, path_of(lane.points_m, 0.0, _BEYOND_M).points, way.edges[index])
             self._near = np.full(2, math.nan)
 
     def at(self, state: KinematicState) -> Nearness | None:
@@ -91,14 +93,16 @@ class LaneTally:
         places = ((state.x_m, state.y_m), (x1, y1))
         if math.isnan(self._near[0]):
             for k, place in enumerate(places):
-                self._near[k] = 0.1 * float(np.argmin(np.hypot(*(rows[: len(rows) // 2, :2] - place).T)))
+                self._near[k] = STEP_M * float(np.argmin(np.hypot(*(rows[: len(rows) // 2, :2] - place).T)))
         z = [0.0, 0.0]
         for k, (x, y) in enumerate(places):
             self._near[k], z[k], _, _ = beside(rows, x, y, float(self._near[k]), _NEAR_M, _NEAR_M)
+        edge = int(self._truth.edges[min(max(round(float(self._near[0]) / STEP_M), 0), len(rows) - 1)])
         if abs(state.speed_mps) > _STILL_MPS:
-            self._sums.append(z[0] + z[1])
+            in_lane = self._ground.layout.edges[edge].kind in LANES
+            self._sums[in_lane].append(z[0] + z[1])
             self._most[:2] = np.maximum(self._most[:2], np.abs(z))
-        return int(self._truth.edges[min(max(round(10.0 * float(self._near[0])), 0), len(rows) - 1)])
+        return edge
 
     def _in_lane(self, state: KinematicState, rear: tuple[float, float, float]) -> Nearness:
         assert self._truth is not None  # noqa: S101  # asked for by the caller
@@ -111,13 +115,15 @@ class LaneTally:
             c, s = math.cos(pose[2]), math.sin(pose[2])
             points = outline @ np.array([[c, s], [-s, c]]) + pose[:2]
             off = [
-                abs(beside(self._truth.rows, x, y, float(self._near[k]) + ahead, 4.0, 4.0)[1])
+                abs(beside(self._truth.lane, x, y, float(self._near[k]) + ahead, 6.0, 6.0)[1])
                 for (x, y), ahead in zip(points.tolist(), outline[:, 0].tolist(), strict=True)
             ]
             worst = int(np.argmax(off))
             widest = max(widest, off[worst])
             if off[worst] > self._half_m:
-                touches.append(Touch(f"{name} beside the lane", (*points[worst].tolist(), 0.0), off[worst] - self._half_m))
+                touches.append(
+                    Touch(f"{name} beside the lane", (*points[worst].tolist(), 0.0), off[worst] - self._half_m)
+                )
         self._most[2] = max(self._most[2], widest)
         return Nearness(tuple(touches), max(self._half_m - widest, 0.0))
 
@@ -138,7 +144,9 @@ class LaneTally:
             return
         layout, state, edge = self._ground.layout, self._state, self._way.edges[-1]
         name = layout.edges[edge].end
-        if layout.point[name].purpose not in GOALS or (np.isfinite(layout.edges[edge].reverse_from_m) and not self._way.dock):
+        if layout.point[name].purpose not in GOALS or (
+            np.isfinite(layout.edges[edge].reverse_from_m) and not self._way.dock
+        ):
             return
         x, y, heading = pose_at_end(layout, edge).tolist()
         gap = state.x_m - x, state.y_m - y
@@ -150,10 +158,10 @@ class LaneTally:
         """Return what `verdict.json` says of lane and docks."""
         self._note_dock()
         self._way = None
-        both = np.array(self._sums or [math.nan])
+        inside, lanes = self._sums
         return {
-            "sum_rms_m": _known(float(np.sqrt(np.mean(both**2)))),
-            "sum_max_m": _known(float(np.abs(both).max())),
+            **_told("sum", inside + lanes),
+            **_told("lane_sum", lanes),
             "front_max_m": float(self._most[0]),
             "rear_max_m": float(self._most[1]),
             "half_lane_used_m": float(self._most[2]),
@@ -162,5 +170,9 @@ class LaneTally:
         }
 
 
-def _known(value: float) -> float | None:
-    return value if math.isfinite(value) else None
+def _told(name: str, values: list[float]) -> dict[str, float | None]:
+    """Return rms and largest of values, None of none."""
+    if not values:
+        return {f"{name}_rms_m": None, f"{name}_max_m": None}
+    both = np.array(values)
+    return {f"{name}_rms_m": float(np.sqrt(np.mean(both**2))), f"{name}_max_m": float(np.abs(both).max())}

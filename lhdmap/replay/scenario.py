@@ -10,7 +10,9 @@ from pathlib import Path
 from typing import Any
 
 from lhdmap.errors import ConfigError, InputError, UsageError
+from lhdmap.replay.haulage_plan import HaulagePlan
 from lhdmap.replay.link import LINK, LinkSettings
+from lhdmap.replay.process import SITE_POSE
 from lhdmap.resources import resource
 from lhdmap.roles import ROLES
 from lhdmap.settings import REQUIRED, nearest, setting
@@ -22,7 +24,6 @@ KINDS = ("tram", "loading", "mission", HAULAGE, GRIZZLY)
 AUTONOMOUS, OPERATOR, TELEOPERATOR = "autonomous", "operator", "teleoperator"
 MODES = ("idle", "autonomous", "assisted", "teleoperated", "manual")
 FOLDER = "pipelines/scenarios"
-_NOISE = "haulage findings: noise of the prototype"
 _NO_MEASUREMENTS = ("/tf_static", "/ground_truth/odometry")
 
 
@@ -112,43 +113,6 @@ class GrizzlyPlan:
 
 
 @dataclass(frozen=True, slots=True)
-class HaulagePlan:
-    """How a machine works on a surface site, and what it is other than its model."""
-
-    keeps: str = setting("", choices=("", "left", "right"), doc="Side that traffic keeps to; empty: as the site says.")
-    load_s: float = setting(
-        25.0,
-        unit="s",
-        minimum=1.0,
-        maximum=3600.0,
-        source="haulage findings, section 5",
-        doc="Time until the body is full.",
-    )
-    dump_s: float = setting(
-        18.0,
-        unit="s",
-        minimum=1.0,
-        maximum=3600.0,
-        source="haulage findings, section 5",
-        doc="Time until it is empty.",
-    )
-    pose_m: float = setting(0.05, unit="m", minimum=0.0, maximum=5.0, source=_NOISE, doc="Noise of the front axle's place.")
-    heading_deg: float = setting(0.3, unit="deg", minimum=0.0, maximum=10.0, source=_NOISE, doc="The same of its heading.")
-    joint_deg: float = setting(0.3, unit="deg", minimum=0.0, maximum=10.0, source=_NOISE, doc="The same of the joint.")
-    joint_offset_deg: float = setting(
-        0.5, unit="deg", minimum=-10.0, maximum=10.0, source=_NOISE, doc="Offset of the joint's sensor."
-    )
-    slip_rad_per_g: float = setting(
-        0.12,
-        unit="rad/g",
-        minimum=0.0,
-        maximum=1.0,
-        source="haulage findings, section 2",
-        doc="Drift of both axles to the outside of bends, by lateral acceleration.",
-    )
-
-
-@dataclass(frozen=True, slots=True)
 class Scenario:
     """A replay: where, what machine, what it is to do, and what goes wrong."""
 
@@ -200,7 +164,9 @@ class Scenario:
     def __post_init__(self) -> None:
         """Check what a key alone cannot; raises ConfigError."""
         if (self.kind == HAULAGE) != bool(self.site):
-            raise ConfigError(f"kind = '{self.kind}' and site = '{self.site}': haulage wants a site, and nothing else does")
+            raise ConfigError(
+                f"kind = '{self.kind}' and site = '{self.site}': haulage wants a site, and nothing else does"
+            )
         if self.kind not in (GRIZZLY, HAULAGE) and not self.mine:
             raise ConfigError("mine is missing: the name of a plan that ships or a file was wanted")
         if (self.kind == GRIZZLY) != bool(self.rocks or self.grizzly.pile):
@@ -238,6 +204,7 @@ def _check_target(fault: FaultSettings) -> None:
     topics = [role.topic for role in ROLES.values()]
     if fault.of_sensor:
         topics = [topic for topic in topics if topic not in _NO_MEASUREMENTS and topic != ROLES["command"].topic]
+        topics.append(SITE_POSE)
     elif fault.kind in ("link_lost", "link_degraded"):
         topics = [LINK, *topics]
     elif fault.kind == "overrun":

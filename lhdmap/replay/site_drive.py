@@ -24,7 +24,7 @@ from lhdmap.tracking.tracker import Step, Tracker
 
 APRON_M = 12.0
 """Around all ways in an area there is so much ground."""
-IDLE, DRIVING, ARRIVED, MISSED, ASSISTANCE = "idle", "driving", "arrived", "missed", "assistance"
+IDLE, DRIVING, HALTED, ARRIVED, MISSED, ASSISTANCE = "idle", "driving", "halted", "arrived", "missed", "assistance"
 _DOCK_M, _DOCK_RAD = 0.3, math.radians(3.0)
 
 
@@ -72,10 +72,13 @@ class SiteDrive:
     def step(self, now_ns: int, motion: Motion, sent: Sequence[Setpoint]) -> Step:
         """Return what to do now."""
         step = (self._legs or self._tracker).step(now_ns, motion, sent)
+        if self.state == HALTED and step.state != "stopped":
+            self.state, self.reason = DRIVING, ""
         if self.state != DRIVING:
             return step
         if step.state == "stopped":
-            self.state, self.reason = ASSISTANCE, step.reason
+            late = now_ns - motion.stamp_ns > self._tracker.settings.age_s * 1e9
+            self.state, self.reason = HALTED if late else ASSISTANCE, step.reason
         elif step.state == "arrived":
             self._arrived()
         return step

@@ -61,9 +61,7 @@ class SiteDriver(Process):
             self._told = told
             self._scribe.event("dock" if drive.docks else "way", drive.goal, edges=len(drive.edges))
             yield Outgoing(WAY, WayNow(now_ns, drive.edges, drive.docks))
-        yield Outgoing(
-            NAVIGATING, Navigating(now_ns, drive.state, self._number, drive.goal, drive.reason, step.left_m)
-        )
+        yield Outgoing(NAVIGATING, Navigating(now_ns, drive.state, self._number, drive.goal, drive.reason, step.left_m))
 
     def _command(self, now_ns: int) -> Command:
         """Return the command of now, the drive's lag fed forward; the brakes hold a machine that is to stand."""

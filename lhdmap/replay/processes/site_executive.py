@@ -68,7 +68,9 @@ class SiteExecutive(Process):
         loading = dumping = Report()
         if work is not None and work.task in (orders.loading, orders.dumping):
             state: str = "done" if work.state == "done" else "busy"
-            report = Report(work.task, "done" if state == "done" else "busy", work.mass_t, work.mass_t / self._full_t, 1)
+            report = Report(
+                work.task, "done" if state == "done" else "busy", work.mass_t, work.mass_t / self._full_t, 1
+            )
             loading, dumping = (report, Report()) if orders.loading else (Report(), report)
         return MissionInput(
             now_ns,

@@ -78,7 +78,7 @@ class DumpingNow(NamedTuple):
 
 
 class WayNow(NamedTuple):
-    """What a machine drives on a site: the edges of its way, or `dock`: it goes to the end of the last of them by a planned way."""
+    """What a machine drives on a site: the edges of its way; `dock`: by a planned way to the end of the last of them."""
 
     stamp_ns: int
     edges: tuple[int, ...]
