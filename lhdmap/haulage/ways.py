@@ -16,6 +16,7 @@ from lhdmap.tracking.path import STEP_M, path_of
 SMOOTHING_M = 1.5
 """Over so much the curvature of corners grows and falls."""
 _SAME_M, _SPACING_M, _BEYOND_M = 1e-3, 1.0, 10.0
+_MORE = 0.2  # of a step
 _CREEP_KMH = 10.0
 LANES = frozenset({State.ROAD, State.THROUGH, State.JUNCTION_ON, State.JUNCTION_OFF})
 """Kinds of edges on which a machine has a lane to keep; in an area it has an apron."""
@@ -69,6 +70,10 @@ def _smoothed(way: Way, smoothing_m: float) -> Way:
     after = line[-1] + on * _unit(line[-1] - line[-2])
     rows = path_of(np.concatenate([before, line, after]), smoothing_m, 0.0).points
     first, last = (_place_on(rows, end) for end in (line[0], line[-1]))
+    first = last - np.ceil(
+        last - first
+    )  # a path is cut to whole steps from its start: its end is where the machine stops
+    last += _MORE
     at = np.linspace(first, last, max(round(STEP_M * (last - first) / _SPACING_M), 3) + 1)
     points = np.column_stack([np.interp(at, np.arange(len(rows)), rows[:, k]) for k in range(2)])
     along = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(line, axis=0).T))])

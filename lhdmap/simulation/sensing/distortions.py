@@ -26,7 +26,7 @@ Change = Callable[[FloatArray], FloatArray]
 
 
 def shifted(message: Message, size: float) -> Message:
-    """Return a message with `size` added to each of its figures: ranges (m), angles (rad), place (m), speed (m/s) …"""
+    """Return a message with `size` added to each of its figures: ranges and places (m), angles (rad), speed (m/s), pressure."""
     return _changed(message, lambda values: values + size)
 
 
