@@ -77,7 +77,7 @@ def test_those_that_ship_are_found_by_name_and_are_whole() -> None:
     assert {"ring_manual", "ring_faults"} <= set(shipped_scenarios())
     for name in shipped_scenarios():
         found = load_scenario(find_scenario(name))
-        assert bool(found.mine) != (found.kind == "grizzly")
+        assert bool(found.mine) != (found.kind in ("grizzly", "haulage"))
     with pytest.raises(UsageError, match="did you mean 'ring_manual'"):
         find_scenario("ring_manul")
 
