@@ -14,6 +14,7 @@ from lhdmap.replay.processes.site_executive import SiteExecutive
 from lhdmap.replay.processes.site_work import SITE_WORK, SiteWork
 from lhdmap.replay.scenario import Scenario
 from lhdmap.replay.site_drive import SiteDrive
+from lhdmap.replay.site_sight import SiteSight
 from lhdmap.tracking.tracker import Tracker
 
 
@@ -28,7 +29,7 @@ def haulage_processes(scenario: Scenario, parts: Parts, given: Haulage, journal:
     top_mps = machine.dimensions.max_speed_kmh / 3.6
     return [
         SiteExecutive(mission, orders, full_t, journal.of(EXECUTIVE)),
-        SiteDriver(drive, tracker, top_mps, journal.of(SITE_DRIVER)),
+        SiteDriver(drive, tracker, SiteSight(given.ground.bodies), top_mps, journal.of(SITE_DRIVER)),
         SiteWork(plan.load_s, plan.dump_s, full_t, journal.of(SITE_WORK)),
     ]
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
@@ -18,23 +19,27 @@ from lhdmap.haulage.site import find_site, load_site
 from lhdmap.haulage.site_layout import layout_of_site
 from lhdmap.haulage.ways import LANES, apron_of, pose_at_end
 from lhdmap.machine import Machine, load_machine
-from lhdmap.messages import Float32Array, FloatArray, Joints, Tachometer, WheelPose
+from lhdmap.messages import FloatArray, Joints, Tachometer, WheelPose
+from lhdmap.replay.faults import THINGS
 from lhdmap.replay.haulage_plan import HaulagePlan
 from lhdmap.replay.parts import Haulage, Parts
 from lhdmap.replay.process import SITE_POSE
 from lhdmap.replay.scenario import Scenario
 from lhdmap.replay.site_drive import APRON_M, SiteGround
+from lhdmap.replay.yard_parts import Eyes, YardBumper
 from lhdmap.resources import resource
 from lhdmap.settings import nearest
 from lhdmap.simulation.history import Column
 from lhdmap.simulation.sensing.encoders import true_pose
 from lhdmap.simulation.sensing.sensor import Beat, Sampled, Sensor
 from lhdmap.simulation.vehicle.kinematic import KinematicVehicle, Loader
+from lhdmap.simulation.yard import Yard
 
 _MACHINE, _MACHINES = "truck_28t", "pipelines/machines"
 _RATE_HZ = 20.0
 _SPEED_NOISE = 0.005  # of the speed, as in the evaluation of path tracking
 _CYCLE_S = 400.0
+_EYES_HZ = 10.0
 
 
 def haulage_parts(scenario: Scenario, settings: Settings) -> Parts:
@@ -62,13 +67,17 @@ def haulage_parts(scenario: Scenario, settings: Settings) -> Parts:
         layout, bodies_of(machine), (drive_model(machine), drive_model(machine, full_kg)), settings.docking
     )
     x, y, heading = places[park].tolist()
+    yard, things = Yard(), any(one.kind in THINGS for one in scenario.faults)
+    eyes = [Sampled("points", Beat(_EYES_HZ), Eyes(yard), scenario.seed)] if things else []
     return Parts(
         machine=machine,
-        world=Open(),
+        world=yard,
         vehicle=vehicle,
         start=vehicle.at_rest(x, y, heading),
-        sensors=_sensors(plan, scenario.seed),
+        sensors=_sensors(plan, scenario.seed, eyes),
         operator=None,
+        bumper=YardBumper(ground, yard) if things else None,
+        changing=yard,
         places={name: (float(pose[0]), float(pose[1]), 0.0) for name, pose in places.items()},
         goal_m=(x, y, 0.0),
         lines_m=_lines(layout, 0.5 * site.road.lane_m),
@@ -107,24 +116,6 @@ def _lines(layout: Layout, half_lane_m: float) -> list[FloatArray]:
     return [np.column_stack([line, np.zeros(len(line))]) for line in flat]
 
 
-class Open:
-    """Open ground: nothing is around, and no dust."""
-
-    origin_m = np.zeros(3)
-
-    def near(self, _position_m: FloatArray) -> Open:
-        """Return itself."""
-        return self
-
-    def cast(self, rays: Float32Array) -> Float32Array:
-        """Return that no ray meets anything."""
-        return np.full(len(rays), np.inf, dtype=np.float32)
-
-    def dust(self, _position_m: FloatArray) -> float:
-        """Return that none hangs anywhere."""
-        return 0.0
-
-
 class SiteSenses(NamedTuple):
     """What the sensors add: the findings' noise."""
 
@@ -151,7 +142,7 @@ class SiteSenses(NamedTuple):
         )
 
 
-def _sensors(plan: HaulagePlan, seed: int) -> list[Sensor]:
+def _sensors(plan: HaulagePlan, seed: int, more: Sequence[Sensor]) -> list[Sensor]:
     """Return the sensors, all read at the same stamps: the pose last, so that joint and speed of its time are there."""
     senses = SiteSenses(plan)
     return [
@@ -159,4 +150,5 @@ def _sensors(plan: HaulagePlan, seed: int) -> list[Sensor]:
         Sampled("tachometer", Beat(_RATE_HZ), senses.speed, seed),
         Sampled("site_pose", Beat(_RATE_HZ), senses.pose, seed, topic=SITE_POSE),
         Sampled("ground_truth", Beat(_RATE_HZ), true_pose, seed),
+        *more,
     ]

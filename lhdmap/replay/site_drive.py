@@ -19,6 +19,7 @@ from lhdmap.errors import InputError
 from lhdmap.haulage.layout import GOALS, Layout
 from lhdmap.haulage.ways import apron_of, pose_at_end, way_of
 from lhdmap.messages import FloatArray
+from lhdmap.replay.site_sight import SiteSight
 from lhdmap.tracking.kernel import State, front_axle
 from lhdmap.tracking.tracker import Step, Tracker
 
@@ -82,6 +83,13 @@ class SiteDrive:
         elif step.state == "arrived":
             self._arrived()
         return step
+
+    def blocked(self, sight: SiteSight) -> bool:
+        """Return whether something that is seen stands in the way of what is driven."""
+        leg, state = self._tracker.leg, self._tracker.filter
+        if self.state != DRIVING or leg is None:
+            return False
+        return sight.blocked(leg.curve, state.state[:3], state.front_mps, self._tracker.model)
 
     def errors_of(self, edge: int) -> tuple[float, float]:
         """Return how far (m, rad) the machine, as it believes, stands from the end of an edge."""

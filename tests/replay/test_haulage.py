@@ -123,6 +123,22 @@ def test_a_receiver_that_is_silent_for_a_while_stops_the_machine_and_it_goes_on(
     assert result.verdict["time_by_phase_s"]["place not known"] == pytest.approx(3.5, abs=0.3)
 
 
+def test_a_thing_on_the_way_is_waited_for_and_not_touched(tmp_path: Path) -> None:
+    """A box of 1 m stands on the queue point of A1 from the start on, for 40 s."""
+    fault = {"kind": "obstacle", "at": "A1 queue", "duration_s": 40.0, "size": 1.0}
+    told = _scenario(seed=1, limits={"time_s": 62.0}, fault=[fault])
+    fault_at = parts_of(told, Path()).places["A1 queue"]
+    result = replay(ReplayRequest(told, tmp_path / "run", recording=False))
+    verdict, events = result.verdict, _events(result.folder)
+    states = [one for one in events if one["process"] == "driver" and one["event"] == "state"]
+    blocked = next(one for one in states if one["to"] == "blocked")
+    after = states[states.index(blocked) + 1]
+    assert verdict["contacts"] == []
+    assert 40.0e9 <= after["t_ns"] - START_NS <= 40.5e9
+    assert verdict["time_by_phase_s"]["obstacle"] > 5.0
+    assert 2.0 < verdict["min_clearance_m"] < 8.0, fault_at
+
+
 @pytest.mark.parametrize(
     ("table", "told"),
     [({"site": ""}, "wants a site"), ({"kind": "tram", "mine": "ring"}, "nothing else"), ({"cycles": 0}, "range")],

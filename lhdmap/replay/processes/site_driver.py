@@ -11,11 +11,13 @@ from lhdmap.replay.process import MILLISECOND_NS, NAVIGATING, ORDERS, WAY, Outgo
 from lhdmap.replay.processes.site_feed import SITE_TOPICS, SiteFeed
 from lhdmap.replay.processes.told import Navigating, Orders, WayNow
 from lhdmap.replay.site_drive import DRIVING, SiteDrive
+from lhdmap.replay.site_sight import SiteSight
 from lhdmap.roles import ROLES
 from lhdmap.tracking.tracker import Tracker
 
 SITE_DRIVER = "driver"
-COMMAND = ROLES["command"].topic
+COMMAND, POINTS = ROLES["command"].topic, ROLES["points"].topic
+BLOCKED = "blocked"
 _TRACK_NS = 50 * MILLISECOND_NS
 _AHEAD_NS = 100 * MILLISECOND_NS
 _KEPT = 120
@@ -25,10 +27,10 @@ class SiteDriver(Process):
     """Commands each 25 ms, the tracker each 50 ms."""
 
     name, period_ns, latency_ns, priority = SITE_DRIVER, 25 * MILLISECOND_NS, 2 * MILLISECOND_NS, 20
-    reads = (*SITE_TOPICS, ORDERS)
+    reads = (*SITE_TOPICS, POINTS, ORDERS)
 
-    def __init__(self, drive: SiteDrive, tracker: Tracker, top_mps: float, scribe: Scribe) -> None:
-        self._drive, self._tracker, self._top_mps, self._scribe = drive, tracker, top_mps, scribe
+    def __init__(self, drive: SiteDrive, tracker: Tracker, sight: SiteSight, top_mps: float, scribe: Scribe) -> None:
+        self._drive, self._tracker, self._sight, self._top_mps, self._scribe = drive, tracker, sight, top_mps, scribe
         self._feed, self._orders, self._number = SiteFeed(), Orders(0, 0, "", loaded=False), 0
         self._sent: list[Setpoint] = []
         self._points: Setpoints = ()
@@ -39,6 +41,9 @@ class SiteDriver(Process):
         for received in inbox:
             if received.topic == ORDERS:
                 self._orders = received.message
+            elif received.topic == POINTS:
+                if self._feed.motion is not None:
+                    self._sight.take(received.message, self._feed.motion)
             else:
                 self._feed.take(received)
         if now_ns - self._stepped_ns >= _TRACK_NS and self._feed.motion is not None:
@@ -55,19 +60,20 @@ class SiteDriver(Process):
             drive.begin(orders.goal, loaded=orders.loaded)
         step = drive.step(now_ns, motion, self._sent)
         self._points = step.setpoints
-        self._scribe.goes(drive.state, drive.reason, goal=drive.goal)
+        state = BLOCKED if drive.blocked(self._sight) else drive.state
+        self._scribe.goes(state, drive.reason, goal=drive.goal)
         told = self._number, drive.docks
         if told != self._told and drive.state == DRIVING:
             self._told = told
             self._scribe.event("dock" if drive.docks else "way", drive.goal, edges=len(drive.edges))
             yield Outgoing(WAY, WayNow(now_ns, drive.edges, drive.docks))
-        yield Outgoing(NAVIGATING, Navigating(now_ns, drive.state, self._number, drive.goal, drive.reason, step.left_m))
+        yield Outgoing(NAVIGATING, Navigating(now_ns, state, self._number, drive.goal, drive.reason, step.left_m))
 
     def _command(self, now_ns: int) -> Command:
         """Return the command of now, the drive's lag fed forward; the brakes hold a machine that is to stand."""
         speed, rate = _at(self._points, now_ns)
         later, _ = _at(self._points, now_ns + _AHEAD_NS)
-        orders, stands = self._orders, not self._orders.goal or (speed == 0.0 and later == 0.0)
+        orders, stands = self._orders, self._stops() or (speed == 0.0 and later == 0.0)
         speed += self._tracker.model.drive_lag_s * (later - speed) / (_AHEAD_NS * 1e-9)
         if stands:
             speed, rate = 0.0, 0.0
@@ -75,6 +81,10 @@ class SiteDriver(Process):
         del self._sent[:-_KEPT]
         tilt, lift = -1.0 if orders.dumping and stands else 0.0, 1.0 if orders.loading and stands else 0.0
         return Command(now_ns, speed / self._top_mps, rate, tilt, lift, False, stands)
+
+    def _stops(self) -> bool:
+        """Return whether the machine is to stand whatever the tracker says."""
+        return not self._orders.goal or self._sight.stops
 
 
 def _at(points: Setpoints, at_ns: int) -> tuple[float, float]:

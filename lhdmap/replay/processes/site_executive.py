@@ -23,6 +23,7 @@ from lhdmap.replay.process import (
     Received,
 )
 from lhdmap.replay.processes.executive import EXECUTIVE
+from lhdmap.replay.processes.site_driver import BLOCKED
 from lhdmap.replay.processes.told import Navigating, Orders, WorkNow
 
 _STEP_M = 0.5  # of the odometer: less is noise of the pose
@@ -63,7 +64,8 @@ class SiteExecutive(Process):
     def _told(self, now_ns: int) -> MissionInput:
         told, orders, work = self._navigating, self._orders, self._work
         navigation = Navigation()
-        if told is not None and told.number == orders.number:
+        blocked = told is not None and told.state == BLOCKED
+        if told is not None and told.number == orders.number and not blocked:
             navigation = Navigation(told.state, told.goal, told.reason)
         loading = dumping = Report()
         if work is not None and work.task in (orders.loading, orders.dumping):
@@ -79,6 +81,7 @@ class SiteExecutive(Process):
             navigation=navigation,
             loading=loading,
             dumping=dumping,
+            obstacle=blocked,
             orders=self._buckets,
         )
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 
 import numpy as np
@@ -41,7 +42,7 @@ def test_with_the_joint_held_the_front_axle_drives_its_circle() -> None:
     radius = (L0 * math.cos(bend) + L1) / math.sin(bend)
     late = states[3000:]
     turned = late[-1].yaw_rad - late[0].yaw_rad
-    way = sum(math.dist((a.x_m, a.y_m), (b.x_m, b.y_m)) for a, b in zip(late, late[1:], strict=False))
+    way = sum(math.dist((a.x_m, a.y_m), (b.x_m, b.y_m)) for a, b in itertools.pairwise(late))
     assert way / turned == pytest.approx(radius, rel=1e-3)
 
 
