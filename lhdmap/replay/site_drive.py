@@ -64,7 +64,8 @@ class SiteDrive:
             if goal == self.at:
                 self.state = ARRIVED
             elif back is not None and layout.point[goal].purpose == "queue":  # a dock was missed: it is tried again
-                self._lay(back, pose_at_end(layout, layout.entering[goal][0]), gear=1)
+                to_queue = layout.entering[goal][0]
+                self._lay(to_queue, pose_at_end(layout, to_queue), gear=1)
             else:
                 self._follow(layout.route(self.at, goal))
         except InputError as error:
@@ -111,7 +112,7 @@ class SiteDrive:
     def _arrived(self) -> None:
         """Go on with the dock at the end of a way, or say how the drive ended."""
         layout = self._ground.layout
-        if self._dock >= 0 and not self.docks:
+        if self._dock >= 0 and not self.docks:  # the way up to the backup point
             try:
                 self._lay(self._dock, pose_at_end(layout, self._dock), gear=-1)
             except InputError as error:

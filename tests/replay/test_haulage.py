@@ -139,6 +139,19 @@ def test_a_thing_on_the_way_is_waited_for_and_not_touched(tmp_path: Path) -> Non
     assert 2.0 < verdict["min_clearance_m"] < 8.0, fault_at
 
 
+def test_a_dock_that_is_missed_is_tried_again_from_the_queue_point(tmp_path: Path) -> None:
+    """For the last metres before L1 the receiver is 1 m off, and stays so until the machine has stood."""
+    fault = {"kind": "biased", "target": "/site/pose", "at_s": 50.0, "duration_s": 6.0, "size": 1.0}
+    told = _scenario(seed=1, limits={"time_s": 200.0}, fault=[fault])
+    result = replay(ReplayRequest(told, tmp_path / "run", recording=False))
+    events = _events(result.folder)
+    happened = [one["cause"] for one in events if one["process"] == "mission" and one["event"] == "event"]
+    assert "dock missed" in happened
+    assert "loaded" in happened[happened.index("dock missed") :]
+    docks = [one for one in result.verdict["docks"] if one["place"] == "L1"]
+    assert docks[-1]["off_m"] <= DOCK_M
+
+
 @pytest.mark.parametrize(
     ("table", "told"),
     [({"site": ""}, "wants a site"), ({"kind": "tram", "mine": "ring"}, "nothing else"), ({"cycles": 0}, "range")],
