@@ -60,6 +60,12 @@ def test_both_bodies_stay_in_the_lane(run: Path) -> None:
     assert 1.45 < verdict["half_lane_used_m"] < verdict["half_lane_m"] == 2.1  # no body is narrower than itself
 
 
+def test_the_page_tells_of_lane_and_docks(run: Path) -> None:
+    page = (run / "report.html").read_text()
+    assert "half a lane used" in page
+    assert "the edge of its lane" in page
+
+
 def test_each_dock_is_in_tolerance(run: Path) -> None:
     docks = json.loads((run / "verdict.json").read_text())["docks"]
     assert [one["place"] for one in docks] == ["L1", "D1", "P1"]
@@ -142,12 +148,13 @@ def test_a_thing_on_the_way_is_waited_for_and_not_touched(tmp_path: Path) -> Non
 def test_a_dock_that_is_missed_is_tried_again_from_the_queue_point(tmp_path: Path) -> None:
     """For the last metres before L1 the receiver is 1 m off, and stays so until the machine has stood."""
     fault = {"kind": "biased", "target": "/site/pose", "at_s": 50.0, "duration_s": 6.0, "size": 1.0}
-    told = _scenario(seed=1, limits={"time_s": 200.0}, fault=[fault])
+    told = _scenario(seed=1, limits={"time_s": 168.0}, fault=[fault])
     result = replay(ReplayRequest(told, tmp_path / "run", recording=False))
     events = _events(result.folder)
     happened = [one["cause"] for one in events if one["process"] == "mission" and one["event"] == "event"]
     assert "dock missed" in happened
-    assert "loaded" in happened[happened.index("dock missed") :]
+    assert "end of the edge crossed" in happened[happened.index("dock missed") :]
+    assert [one["to"] for one in events if one["process"] == "work"] == ["loads"]
     docks = [one for one in result.verdict["docks"] if one["place"] == "L1"]
     assert docks[-1]["off_m"] <= DOCK_M
 
