@@ -15,7 +15,7 @@ from lhdmap.driving.bodies import bodies_of
 from lhdmap.driving.model import drive_model
 from lhdmap.errors import UsageError
 from lhdmap.haulage.layout import Layout, checked
-from lhdmap.haulage.site import find_site, load_site
+from lhdmap.haulage.site import Site, find_site, load_site
 from lhdmap.haulage.site_layout import layout_of_site
 from lhdmap.haulage.ways import LANES, apron_of, pose_at_end
 from lhdmap.machine import Machine, load_machine
@@ -51,9 +51,7 @@ def haulage_parts(scenario: Scenario, settings: Settings) -> Parts:
         UsageError: there is no such site, machine or park.
     """
     machine = find_machine(scenario.machine or _MACHINE)
-    site = load_site(find_site(scenario.site))
-    plan = scenario.haulage
-    site = replace(site, keeps=plan.keeps) if plan.keeps else site
+    plan, site = scenario.haulage, site_of(scenario)
     layout = checked(layout_of_site(site))
     full_kg = machine.drive.payload_kg
     parks = layout.of("park")
@@ -85,6 +83,17 @@ def haulage_parts(scenario: Scenario, settings: Settings) -> Parts:
         settings=settings,
         haulage=Haulage(ground, park, 0.5 * site.road.lane_m),
     )
+
+
+def site_of(scenario: Scenario) -> Site:
+    """Return the site of a scenario, with the side that its traffic keeps to.
+
+    Raises:
+        InputError: the file cannot be read.
+        UsageError: there is no such site.
+    """
+    site, keeps = load_site(find_site(scenario.site)), scenario.haulage.keeps
+    return replace(site, keeps=keeps) if keeps else site
 
 
 def find_machine(word: str) -> Machine:
