@@ -163,10 +163,7 @@ class Scenario:
 
     def __post_init__(self) -> None:
         """Check what a key alone cannot; raises ConfigError."""
-        if (self.kind == HAULAGE) != bool(self.site):
-            raise ConfigError(
-                f"kind = '{self.kind}' and site = '{self.site}': haulage wants a site, and nothing else does"
-            )
+        _check_site(self)
         if self.kind not in (GRIZZLY, HAULAGE) and not self.mine:
             raise ConfigError("mine is missing: the name of a plan that ships or a file was wanted")
         if (self.kind == GRIZZLY) != bool(self.rocks or self.grizzly.pile):
@@ -197,6 +194,16 @@ class Scenario:
     def who(self) -> str:
         """Who drives."""
         return self.driver or (AUTONOMOUS if self.goal or self.kind != "tram" else OPERATOR)
+
+
+def _check_site(told: Scenario) -> None:
+    """Refuse haulage without a site, a site with anything else, and what a site does not have."""
+    if (told.kind == HAULAGE) != bool(told.site):
+        raise ConfigError(f"kind = '{told.kind}' and site = '{told.site}': haulage wants a site, and nothing else does")
+    if told.kind == HAULAGE:
+        for key in ("mine", "map", "goal", "route", "driver"):
+            if value := getattr(told, key):
+                raise ConfigError(f"{key} = '{value}': a site has none, of kind haulage are site and cycles")
 
 
 def _check_target(fault: FaultSettings) -> None:

@@ -11,12 +11,13 @@ import pytest
 from lhdmap.cli.main import main
 from lhdmap.errors import ConfigError, UsageError
 from lhdmap.haulage.records import Phase
+from lhdmap.haulage.site import find_site
 from lhdmap.haulage.stages import stage_of
 from lhdmap.haulage.states import State
 from lhdmap.production.journal import cycles_of_journal
 from lhdmap.replay.assemble import parts_of
 from lhdmap.replay.run import ReplayRequest, replay
-from lhdmap.replay.scenario import Scenario
+from lhdmap.replay.scenario import Scenario, load_scenario
 from lhdmap.replay.verdict import KEYS
 from lhdmap.settings_tree import tree_from
 from lhdmap.simulation.history import START_NS
@@ -161,7 +162,13 @@ def test_a_dock_that_is_missed_is_tried_again_from_the_queue_point(tmp_path: Pat
 
 @pytest.mark.parametrize(
     ("table", "told"),
-    [({"site": ""}, "wants a site"), ({"kind": "tram", "mine": "ring"}, "nothing else"), ({"cycles": 0}, "range")],
+    [
+        ({"site": ""}, "wants a site"),
+        ({"kind": "tram", "mine": "ring"}, "nothing else"),
+        ({"cycles": 0}, "range"),
+        ({"mine": "ring"}, "a site has none"),
+        ({"goal": "D1"}, "a site has none"),
+    ],
 )
 def test_what_is_wrong_is_refused(table: dict[str, Any], told: str) -> None:
     with pytest.raises(ConfigError, match=told):
@@ -174,3 +181,10 @@ def test_what_is_wrong_is_refused(table: dict[str, Any], told: str) -> None:
 def test_names_that_are_not_there_are_refused_with_the_nearest(table: dict[str, Any], told: str) -> None:
     with pytest.raises(UsageError, match=told):
         parts_of(_scenario(**table), Path())
+
+
+def test_a_site_beside_the_scenario_is_found(tmp_path: Path) -> None:
+    shipped = find_site("hejase").read_text(encoding="utf-8")
+    (tmp_path / "own.toml").write_text(shipped.replace('name = "L1"', 'name = "North"'), encoding="utf-8")
+    (tmp_path / "one.toml").write_text('kind = "haulage"\nsite = "own.toml"\n', encoding="utf-8")
+    assert "North" in parts_of(load_scenario(tmp_path / "one.toml"), tmp_path).places
