@@ -176,9 +176,12 @@ def _plan_line(found: Mapping[str, Any]) -> str:
 
 
 def _scenario_line(told: Mapping[str, Any]) -> str:
-    """Say who drove where, or what lay on the grizzly."""
+    """Say who drove where, what was hauled, or what lay on the grizzly."""
     if told.get("kind") == "grizzly":
         return f"scenario     rockbreaker, {told.get('rocks')} rocks on the grizzly, seed {told.get('seed')}"
+    if told.get("kind") == "haulage":
+        site = Path(str(told.get("site"))).stem
+        return f"scenario     haulage, {told.get('cycles')} loads; site {site}, seed {told.get('seed')}"
     who = told.get("driver") or ("autonomous" if told.get("goal") else "operator")
     way = f"route {told['route']}" if told.get("route") else f"to {told['goal']}" if told.get("goal") else "all drifts"
     start = f"from {told['start']} " if told.get("start") else ""

@@ -89,12 +89,23 @@ def verdict_text(values: Mapping[str, Any]) -> str:
         f"run          {values['run']}",
         f"report       {Path(values['run']) / 'report.html'}",
         f"drive        {values['distance_m']:.1f} m in {duration(values['duration_s'])}, {speed}",
-        f"walls        {len(values['contacts'])} contacts"
+        f"{'lane ' if values['kind'] == 'haulage' else 'walls'}        {len(values['contacts'])} contacts"
         + ("" if near is None else f", never nearer than {near:.2f} m"),
+        *_haulage_lines(values),
         *([f"faults       {len(values['faults'])} injected"] if values["faults"] else []),
         f"journal      {values['journal_sha256'][:16]}…, {values['realtime_factor']:.1f} x real time",
     ]
     return "\n".join(lines)
+
+
+def _haulage_lines(values: Mapping[str, Any]) -> list[str]:
+    if values["kind"] != "haulage" or values["sum_rms_m"] is None:
+        return []
+    used = f"half a lane used {values['half_lane_used_m']:.2f} of {values['half_lane_m']:.2f} m"
+    return [
+        f"loads        {values['cycles']}, {values['tonnes']:.1f} t",
+        f"both bodies  off by {values['sum_rms_m']:.3f} m rms, {values['sum_max_m']:.2f} m at most; {used}",
+    ]
 
 
 def _grizzly_lines(values: Mapping[str, Any]) -> list[str]:

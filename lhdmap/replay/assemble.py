@@ -13,6 +13,7 @@ from lhdmap.errors import ConfigError, UsageError
 from lhdmap.executor.control import Control
 from lhdmap.movement.routes import RoutePlanner
 from lhdmap.navigation.control import NavigationControl
+from lhdmap.replay.assemble_haulage import haulage_processes, lane_of
 from lhdmap.replay.assemble_loading import guidance_of, loading_processes
 from lhdmap.replay.assemble_mission import mission_processes
 from lhdmap.replay.engine import Engine, overrun_targets
@@ -33,7 +34,7 @@ from lhdmap.replay.processes.perception import PERCEPTION, Perception
 from lhdmap.replay.processes.plant import Plant
 from lhdmap.replay.processes.recorder import Recorder
 from lhdmap.replay.processes.station import Station
-from lhdmap.replay.scenario import TELEOPERATOR, Scenario
+from lhdmap.replay.scenario import HAULAGE, TELEOPERATOR, Scenario
 from lhdmap.replay.verdict import Tally
 from lhdmap.settings import nearest
 
@@ -49,6 +50,10 @@ def parts_of(scenario: Scenario, folder: Path, settings: Settings | None = None)
         raise UsageError(f"kind = '{scenario.kind}': this version replays {', '.join(map(repr, _REPLAYED))}")
     if bool(scenario.mission) != (scenario.kind == "mission"):
         raise UsageError(f"kind = '{scenario.kind}': kind = 'mission' wants a mission, and no other does")
+    if scenario.kind == HAULAGE:
+        from lhdmap.replay.haulage_parts import haulage_parts
+
+        return haulage_parts(scenario, settings or Settings())
     from lhdmap.replay.loading_parts import loading_parts  # what a mine needs takes a second to load
     from lhdmap.replay.mine_parts import mine_parts
 
@@ -57,7 +62,7 @@ def parts_of(scenario: Scenario, folder: Path, settings: Settings | None = None)
     return mine_parts(scenario, folder, settings or Settings())
 
 
-_REPLAYED = ("tram", "loading", "mission")
+_REPLAYED = ("tram", "loading", "mission", HAULAGE)
 
 
 class Watchers(NamedTuple):
@@ -88,9 +93,13 @@ def assemble(
     faults = Faults(scenario.faults, journal, parts.places)
     link = Link(scenario.link, faults, scenario.seed)
     load = LoadTally(parts.machine.drive.payload_kg) if parts.loading is not None or scenario.mission else None
-    monitor = Monitor(Tally(scenario.kind, scenario.limits, parts.goal_m), journal.of(Monitor.name), load)
+    monitor = Monitor(
+        Tally(scenario.kind, scenario.limits, parts.goal_m), journal.of(Monitor.name), load, lane_of(parts)
+    )
     processes: list[Process] = [Plant(parts, faults, link, journal.of(Plant.name), scenario.seed)]
-    if parts.loading is not None:
+    if parts.haulage is not None:
+        processes += haulage_processes(scenario, parts, parts.haulage, journal)
+    elif parts.loading is not None:
         processes += loading_processes(scenario, parts, parts.loading, journal)
     elif parts.autonomous is not None and scenario.mission:
         processes += mission_processes(scenario, parts, parts.autonomous, journal)

@@ -15,6 +15,7 @@ from lhdmap.pipeline.localize import KnownMap
 from lhdmap.replay.faults import Position
 from lhdmap.replay.processes.navigator import Errand
 from lhdmap.replay.processes.told import ModeNow
+from lhdmap.replay.site_drive import SiteGround
 from lhdmap.simulation.drift import Mesh
 from lhdmap.simulation.sensing.sensor import Sensor
 from lhdmap.simulation.surroundings import View
@@ -124,6 +125,14 @@ class Autonomous(NamedTuple):
     mode: ModeNow
 
 
+class Haulage(NamedTuple):
+    """A surface site: what is known of it, where the machine is parked, half the width of a lane."""
+
+    ground: SiteGround
+    park: str
+    half_lane_m: float
+
+
 @dataclass(frozen=True, slots=True)
 class Parts:
     """All that is simulated, and what is known of it beforehand.
@@ -145,6 +154,7 @@ class Parts:
         settings: of perception and control.
         loading: what a machine that loads is given; None: it does not.
         autonomous: what a machine that drives itself is given; None: nobody does, or the operator.
+        haulage: what a machine on a surface site is given; None: it is in a mine.
     """
 
     machine: Machine
@@ -163,3 +173,4 @@ class Parts:
     settings: Settings = field(default_factory=Settings)
     loading: Loading | None = None
     autonomous: Autonomous | None = None
+    haulage: Haulage | None = None

@@ -21,7 +21,7 @@ from lhdmap.replay.processes.film import Film
 from lhdmap.replay.processes.film_drive import DriveFilm
 from lhdmap.replay.processes.film_load import LoadFilm
 from lhdmap.replay.processes.recorder import Recorder
-from lhdmap.replay.scenario import GRIZZLY, Scenario, scenario_toml
+from lhdmap.replay.scenario import GRIZZLY, HAULAGE, Scenario, scenario_toml
 from lhdmap.replay.series import Timeline
 from lhdmap.replay.stops import Stops
 from lhdmap.report.replay_data import ReplayData
@@ -106,7 +106,7 @@ class _Replay:
             run = assemble(
                 self._request.scenario, self._parts, journal, Watchers(film, Recorder(log, truth=self._request.truth))
             )
-            missions = MissionTally() if self._request.scenario.mission else None
+            missions = MissionTally() if self._request.scenario.kind in ("mission", HAULAGE) else None
             journal.listeners += [] if missions is None else [missions]
             started = time.monotonic()
             with interruption:
@@ -137,7 +137,7 @@ class _Replay:
     def _go(self, run: Run, journal: Journal, interruption: Interruption) -> None:
         """Run until the monitor has seen enough, or somebody wants it to end."""
         scenario = self._request.scenario
-        settings = {"kind": scenario.kind, "mine": Path(scenario.mine).stem, "seed": scenario.seed}
+        settings = {"kind": scenario.kind, "mine": Path(scenario.mine or scenario.site).stem, "seed": scenario.seed}
         journal.write("engine", "started", values=settings)
         for _ in self._shown(run.engine.run(START_NS + round((scenario.limits.time_s + _GRACE_S) * SECOND_NS))):
             if run.monitor.ended or interruption.asked:
@@ -173,7 +173,7 @@ class _Replay:
         scenario = self._request.scenario
         made = {
             "software": f"lhdmap {__version__}",
-            "mine": scenario.mine,
+            "mine": scenario.mine or scenario.site,
             "machine": self._parts.machine.name,
             "seed": str(scenario.seed),
             "speed of the run": f"{verdict['realtime_factor']:.1f} × real time",

@@ -10,15 +10,17 @@ from pathlib import Path
 from typing import Any
 
 from lhdmap.errors import ConfigError, InputError, UsageError
+from lhdmap.replay.haulage_plan import HaulagePlan
 from lhdmap.replay.link import LINK, LinkSettings
+from lhdmap.replay.process import SITE_POSE
 from lhdmap.resources import resource
 from lhdmap.roles import ROLES
 from lhdmap.settings import REQUIRED, nearest, setting
 from lhdmap.settings_tree import load_tree, part, tree_toml
 from lhdmap.simulation.sensing.faults import FaultSettings
 
-GRIZZLY = "grizzly"
-KINDS = ("tram", "loading", "mission", "haulage", GRIZZLY)
+GRIZZLY, HAULAGE = "grizzly", "haulage"
+KINDS = ("tram", "loading", "mission", HAULAGE, GRIZZLY)
 AUTONOMOUS, OPERATOR, TELEOPERATOR = "autonomous", "operator", "teleoperator"
 MODES = ("idle", "autonomous", "assisted", "teleoperated", "manual")
 FOLDER = "pipelines/scenarios"
@@ -137,6 +139,9 @@ class Scenario:
         0, minimum=0, maximum=100, doc="Rocks on the grizzly that do not fall through, besides the pile's."
     )
     grizzly: GrizzlyPlan = part(GrizzlyPlan)
+    site: str = setting("", doc="Surface site: a file, or the name of one that ships; only of kind haulage.")
+    cycles: int = setting(1, minimum=1, maximum=10_000, doc="Loads that are hauled on a site.")
+    haulage: HaulagePlan = part(HaulagePlan)
     rearm_s: float = setting(
         5.0,
         unit="s",
@@ -158,7 +163,8 @@ class Scenario:
 
     def __post_init__(self) -> None:
         """Check what a key alone cannot; raises ConfigError."""
-        if self.kind != GRIZZLY and not self.mine:
+        _check_site(self)
+        if self.kind not in (GRIZZLY, HAULAGE) and not self.mine:
             raise ConfigError("mine is missing: the name of a plan that ships or a file was wanted")
         _check_grizzly(self)
         if self.goal and self.mission:
@@ -199,11 +205,22 @@ def _check_grizzly(scenario: Scenario) -> None:
                 raise ConfigError(f"{key} is given: a grizzly has none")
 
 
+def _check_site(told: Scenario) -> None:
+    """Refuse haulage without a site, a site with anything else, and what a site does not have."""
+    if (told.kind == HAULAGE) != bool(told.site):
+        raise ConfigError(f"kind = '{told.kind}' and site = '{told.site}': haulage wants a site, and nothing else does")
+    if told.kind == HAULAGE:
+        for key in ("mine", "map", "goal", "route", "driver"):
+            if value := getattr(told, key):
+                raise ConfigError(f"{key} = '{value}': a site has none, of kind haulage are site and cycles")
+
+
 def _check_target(fault: FaultSettings) -> None:
     """Refuse a fault without something that could have it; names of processes are known later."""
     topics = [role.topic for role in ROLES.values()]
     if fault.of_sensor:
         topics = [topic for topic in topics if topic not in _NO_MEASUREMENTS and topic != ROLES["command"].topic]
+        topics.append(SITE_POSE)
     elif fault.kind in ("link_lost", "link_degraded"):
         topics = [LINK, *topics]
     elif fault.kind == "overrun":
@@ -251,7 +268,7 @@ def load_scenario(path: Path, **over: Any) -> Scenario:
         ConfigError: a key or a value in it is wrong.
     """
     scenario = load_tree(Scenario, path, "scenario file")
-    beside: dict[str, Any] = {key: _beside(path, getattr(scenario, key)) for key in ("mine", "machine")}
+    beside: dict[str, Any] = {key: _beside(path, getattr(scenario, key)) for key in ("mine", "machine", "site")}
     beside["map"] = _beside(path, scenario.map, folder=True)
     if scenario.grizzly.pile:
         beside["grizzly"] = replace(scenario.grizzly, pile=str(path.parent / scenario.grizzly.pile))

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from lhdmap.report import charts, loading_section, markup, replay_charts, replay_drive_charts
+from lhdmap.report import charts, haulage_section, loading_section, markup, replay_charts, replay_drive_charts
 from lhdmap.report.replay_data import DriveData, ReplayData, StopRow
 
 if TYPE_CHECKING:
@@ -50,6 +50,7 @@ def render(data: ReplayData) -> str:
         *pictures,
         markup.section("What navigation decided", _decided(data)),
         markup.section("Stops", _stops(data.stops)),
+        markup.section("Docks", haulage_section.docks(data.verdict)),
         markup.section("Contacts", _contacts(data.verdict["contacts"])),
         markup.section("Faults and what followed", _faults(data.verdict["faults"])),
         markup.section("Where the time went", _phases(data.verdict)),
@@ -66,16 +67,18 @@ def _cards(data: ReplayData) -> Iterator[tuple[str, str, str]]:
     yield "driven", f"{verdict['distance_m']:.1f} m", f"in {verdict['duration_s']:.1f} s of simulated time"
     fastest = f"mean of the whole run; at most {verdict['max_speed_kmh']:.1f} km/h"
     yield "speed", f"{verdict['mean_speed_kmh']:.1f} km/h", fastest
-    yield "contacts", str(len(verdict["contacts"])), "of a body of the machine with a wall or a thing"
+    wall = "the edge of its lane" if verdict["kind"] == "haulage" else "a wall"
+    yield "contacts", str(len(verdict["contacts"])), f"of a body of the machine with {wall} or a thing"
     if verdict["min_clearance_m"] is not None:
         yield (
             "clearance",
             f"{verdict['min_clearance_m']:.2f} m",
-            "least distance of a body from a wall, looked at each 0.1 s",
+            f"least distance of a body from {wall}, looked at each 0.1 s",
         )
     yield "stops", str(verdict["stops"]), "rests on the way, without those of start and end"
     yield "assistance", str(verdict["assists"]), f"requests; {verdict['assist_s']:.0f} s until they were answered"
     yield "faults", str(len(verdict["faults"])), "injected by the scenario"
+    yield from haulage_section.cards(verdict)
     if "cycles" in verdict:
         yield "cycles", str(verdict["cycles"]), f"{verdict['tonnes']:.1f} t to the dump"
     elif verdict.get("fill") is not None:
@@ -174,7 +177,9 @@ def _phases(verdict: Mapping[str, Any]) -> str:
 
 def _verdict(verdict: Mapping[str, Any]) -> str:
     rows = [
-        (key, _said(value)) for key, value in verdict.items() if key not in ("contacts", "faults", "time_by_phase_s")
+        (key, _said(value))
+        for key, value in verdict.items()
+        if key not in ("contacts", "docks", "faults", "time_by_phase_s")
     ]
     return markup.table(("figure of verdict.json", "value"), rows)
 

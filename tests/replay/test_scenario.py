@@ -77,11 +77,11 @@ def test_those_that_ship_are_found_by_name_and_are_whole() -> None:
     assert {"ring_manual", "ring_faults"} <= set(shipped_scenarios())
     for name in shipped_scenarios():
         found = load_scenario(find_scenario(name))
-        assert bool(found.mine) != (found.kind == "grizzly")
+        assert bool(found.mine) != (found.kind in ("grizzly", "haulage"))
     with pytest.raises(UsageError, match="did you mean 'ring_manual'"):
         find_scenario("ring_manul")
 
 
-def test_kinds_that_are_not_replayed_yet_are_told() -> None:
-    with pytest.raises(UsageError, match=r"kind = .haulage.: this version replays"):
-        parts_of(Scenario(kind="haulage", mine="ring"), Path())
+def test_a_kind_without_a_vehicle_has_no_parts() -> None:
+    with pytest.raises(UsageError, match=r"kind = .grizzly.: this version replays"):
+        parts_of(Scenario(kind="grizzly", rocks=1), Path())

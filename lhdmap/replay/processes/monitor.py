@@ -7,6 +7,7 @@ from typing import Any
 
 from lhdmap.messages import Text
 from lhdmap.replay.journal import Scribe
+from lhdmap.replay.lane_tally import LaneTally
 from lhdmap.replay.load_tally import LoadTally
 from lhdmap.replay.process import (
     CONTACT,
@@ -15,6 +16,7 @@ from lhdmap.replay.process import (
     MILLISECOND_NS,
     MISSION,
     STATE,
+    WAY,
     Outgoing,
     Process,
     Received,
@@ -28,10 +30,12 @@ class Monitor(Process):
     """Has the last turn of all at a time."""
 
     name, period_ns, priority, site = MONITOR, 100 * MILLISECOND_NS, 90, EVERYWHERE
-    reads = (STATE, CONTACT, MISSION, LOADING)
+    reads = (STATE, CONTACT, MISSION, LOADING, WAY)
 
-    def __init__(self, tally: Tally, scribe: Scribe, load: LoadTally | None = None) -> None:
-        self.tally, self._scribe, self.load = tally, scribe, load
+    def __init__(
+        self, tally: Tally, scribe: Scribe, load: LoadTally | None = None, lane: LaneTally | None = None
+    ) -> None:
+        self.tally, self._scribe, self.load, self._lane = tally, scribe, load, lane
 
     @property
     def ended(self) -> bool:
@@ -40,25 +44,35 @@ class Monitor(Process):
 
     def verdict(self) -> dict[str, Any]:
         """Return what is said of the kind alone."""
-        return {} if self.load is None else self.load.verdict()
+        counted = {} if self.load is None else self.load.verdict()
+        return counted | ({} if self._lane is None else self._lane.verdict())
 
     def step(self, now_ns: int, inbox: Sequence[Received]) -> Iterable[Outgoing]:
         """Take what has come and judge."""
         before = len(self.tally.contacts)
         for received in inbox:
-            if received.topic == STATE:
-                self.tally.at(received.message)
-                if self.load is not None:
-                    self.load.at(received.message)
-            elif received.topic == LOADING and self.load is not None:
-                self.load.said(received.message)
-            elif received.topic == CONTACT:
-                self.tally.near(received.sent_ns, received.message)
-            elif isinstance(received.message, Text):
-                self.tally.said(received.sent_ns, received.message.text)
+            self._take(received)
         for contact in self.tally.contacts[before:]:
             self._scribe.event("contact", contact["body"], **contact)
         self.tally.judge(now_ns)
         if self.tally.ended:
             self._scribe.goes("ended", self.tally.reason, ok=self.tally.ok)
         return ()
+
+    def _take(self, received: Received) -> None:
+        topic, sent_ns, message = received
+        if topic == STATE:
+            self.tally.at(message)
+            if self.load is not None:
+                self.load.at(message)
+            nearness = None if self._lane is None else self._lane.at(message)
+            if nearness is not None:
+                self.tally.near(sent_ns, nearness)
+        elif topic == WAY and self._lane is not None:
+            self._lane.way(message)
+        elif topic == LOADING and self.load is not None:
+            self.load.said(message)
+        elif topic == CONTACT:
+            self.tally.near(sent_ns, message)
+        elif isinstance(message, Text):
+            self.tally.said(sent_ns, message.text)

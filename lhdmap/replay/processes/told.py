@@ -77,6 +77,23 @@ class DumpingNow(NamedTuple):
     reason: str = ""
 
 
+class WayNow(NamedTuple):
+    """What a machine drives on a site: the edges of its way; `dock`: by a planned way to the end of the last of them."""
+
+    stamp_ns: int
+    edges: tuple[int, ...]
+    dock: bool = False
+
+
+class WorkNow(NamedTuple):
+    """A timed task: its number, `busy` or `done`, what is in the body then (t)."""
+
+    stamp_ns: int
+    task: int
+    state: str
+    mass_t: float
+
+
 class LoadingNow(NamedTuple):
     """What the loading task does: number of its mission, state, phase, attempts, the last fill (NaN: none), the open request."""
 

@@ -17,15 +17,16 @@ from lhdmap.messages import (
     PointCloud,
     Pressure,
     Tachometer,
+    WheelPose,
 )
 
-MEASURED = (LaserScan, PointCloud, Inclination, Joints, Tachometer, Pressure)
+MEASURED = (LaserScan, PointCloud, Inclination, Joints, Tachometer, WheelPose, Pressure)
 """Messages with figures that can be wrong."""
 Change = Callable[[FloatArray], FloatArray]
 
 
 def shifted(message: Message, size: float) -> Message:
-    """Return a message with `size` added to each of its figures: ranges (m), angles (rad), speed (m/s), pressure (Pa)."""
+    """Return a message with `size` added to each of its figures: ranges and places (m), angles (rad), speed (m/s), pressure."""
     return _changed(message, lambda values: values + size)
 
 
@@ -53,6 +54,9 @@ def _changed(message: Message, change: Change) -> Message:
             return message._replace(positions_rad=dict(zip(message.positions_rad, angles, strict=True)))
         case Tachometer():
             return message._replace(speed_mps=float(change(np.array(message.speed_mps))))
+        case WheelPose():
+            x, y = change(np.array([message.x_m, message.y_m])).tolist()
+            return message._replace(x_m=x, y_m=y)
         case Pressure():
             return message._replace(pressure_pa=float(change(np.array(message.pressure_pa))))
     return message
