@@ -106,7 +106,7 @@ def test_plot(tmp_path: Path, files: tuple[str, str], suffix: str) -> None:
 @pytest.mark.parametrize(
     ("words", "code", "text"),
     [
-        (["eval", "picnic"], 2, "known: localization, navigation, pile"),
+        (["eval", "picnic"], 2, "known: loading, localization, navigation, pile"),
         (["eval"], 2, "SUBJECT"),
         (["eval", "trajectory", "a.tum"], 2, "--truth"),
         (["eval", "trajectory", "a.tum", "--truth", "b.tum"], 3, "a.tum"),

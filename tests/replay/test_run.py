@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from lhdmap.cli.main import main
+from lhdmap.config import Settings
 from lhdmap.logs.source import LogSource
 from lhdmap.replay.parts import Parts
 from lhdmap.replay.run import ReplayRequest, replay
@@ -70,7 +71,7 @@ def corridor(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Callable[[Strai
     """Have the command drive in the corridor: the file of a scenario."""
 
     def made(operator: Straight) -> Path:
-        def parts_of(_: Scenario, _folder: Path) -> Parts:
+        def parts_of(_: Scenario, _folder: Path, _settings: Settings | None) -> Parts:
             return parts(operator)
 
         monkeypatch.setattr("lhdmap.replay.run.parts_of", parts_of)

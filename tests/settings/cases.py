@@ -110,7 +110,7 @@ _NOISY_SKID = {"excavation.skid_smooth_s": 0.0, "excavation.skid_max": 0.1, "exc
 _WAITS = {"cloud_odometry.step_m": 5.0, "cloud_odometry.step_deg": 50.0, "cloud_odometry.step_s": 60.0}
 _PRINTED = {"guidance.method": "paper", "guidance.samples": 16, "guidance.rounds": 2}
 _LOADING_CYCLE = (
-    "reach_m", "approach_kmh", "align_dps", "creep", "run_up_m", "lower", "press_bar", "pull_back_m",
+    "reach_m", "approach_kmh", "creep", "run_up_m", "lower", "press_bar", "pull_back_m",
     "back_kmh", "racked_rad",
 )  # fmt: skip
 _SETTINGS = {

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 from lhdmap.driving.motion import Motion
-from lhdmap.loading.identification import Identification
+from lhdmap.loading.identification import Identification, target_of
 from lhdmap.loading.moment import LoadingInput, Mission, Moment
 from lhdmap.loading.positioning_align import Aligner
 from lhdmap.loading.positioning_steps import Positioning
@@ -22,6 +22,7 @@ from tests.loading.task.bench import Drift, Until, bench, controllers
 from tests.loading.task.test_conformance import Stub
 
 _DRIFT = Drift()
+_PILE = target_of(_DRIFT.snapshot(0).estimate, 0)
 _SECOND_NS = 1_000_000_000
 
 
@@ -51,6 +52,8 @@ def limits(settings: LoadingSettings) -> list[Any]:
         _aims(settings),
         _newer(settings),
         _toes(settings),
+        _faces(settings),
+        _squares(settings),
     ]
 
 
@@ -102,9 +105,11 @@ def _looks(settings: LoadingSettings) -> list[Any]:
             found.append(k)
             break
     near, walls = Identification(MODEL, settings), _DRIFT.face_m[18:21] - np.array([20.0, 0.0])
-    for pile in (None, _DRIFT.snapshot(0)):
+    for pile, hits in ((None, walls), (_DRIFT.snapshot(0), walls), (None, walls[:2])):
         for k in range(800):
-            moment = _moment(k * 50_000_000, _motion(0, 20.0), walls)._replace(pile=pile, draw_point_m=(30.0, 0.0))
+            moment = _moment(k * 50_000_000, _motion(0, 20.0), hits)._replace(
+                pile=pile, draw_point_m=(30.0, 0.0), target=_PILE, face_m=1.5
+            )
             if k == 0:
                 near.begin(moment)
             step = near.step(moment)
@@ -194,4 +199,30 @@ def _toes(settings: LoadingSettings) -> list[Any]:
         one.begin(at)
         found.append(one.step(at).event)
     assert all(math.isfinite(one) for one in found[:1])
+    return found
+
+
+def _faces(settings: LoadingSettings) -> list[Any]:
+    """Return after how much way towards a pile that is not seen help is asked for, begun within the distance that counts."""
+    one = Identification(MODEL, settings)
+    for k in range(300):
+        moment = _moment(k * 50_000_000, _motion(0, 10.0 + 0.1 * k, speed=2.0), np.zeros((0, 2)))
+        moment = moment._replace(draw_point_m=(20.0, 0.0))
+        if k == 0:
+            one.begin(moment)
+        if one.step(moment).event is not None:
+            return [k]
+    return []
+
+
+def _squares(settings: LoadingSettings) -> list[Any]:
+    """Return the phase and the pedals of a machine near the pile: turned by some degrees, and bent."""
+    found: list[Any] = []
+    for x, turned, bend in ((22.5, 0.11, 0.0), (22.5, 0.0, 0.11), (24.8, 0.0, 0.5)):
+        one = Positioning(MODEL, BODIES, settings)
+        motion = _motion(0, x)._replace(heading_rad=turned, articulation_rad=bend)
+        moment = _moment(0, motion, np.zeros((0, 2)))._replace(target=_PILE)
+        one.begin(moment)
+        step = one.step(moment)
+        found.append([step.phase, step.pedals, step.event])
     return found
