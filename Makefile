@@ -34,7 +34,7 @@ demo: $(STAMP) ## Simulate the sample drive, build its map, evaluate it: demo/ (
 	$(BIN)/lhdmap demo --output demo --force
 
 test: $(STAMP) ## Run all tests
-	$(BIN)/python -m pytest -n $(JOBS)
+	$(BIN)/python -m pytest -n $(JOBS) --dist worksteal
 
 lint: $(STAMP) ## Check style, formatting and types
 	$(BIN)/ruff check .

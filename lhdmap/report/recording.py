@@ -265,7 +265,7 @@ class RecordingWriter:
             return
         self._log_scans()
         if self._legend:
-            words = "\n".join(["| drawn | what it is |", "| --- | --- |", *self._legend])
+            words = "\n".join(["| drawn | what it is |", "| --- | --- |", *sorted(self._legend)])
             self.add_shape("legend", self._rr.TextDocument(words, media_type="text/markdown"))
         used = tuple(view for view in self.curves if any(self._has(entity) for entity in view[1]))
         self._lay_out(used, self._end_ns - self._start_ns)
