@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from lhdmap.messages import FloatArray
@@ -14,9 +15,13 @@ COLUMNS = (
 
 @dataclass(frozen=True, slots=True)
 class LoadData:
-    """Signals of a machine that loads: `rows` (N, 15) of `COLUMNS`; the last two are the simulator's truth."""
+    """Signals of a machine that loads: `rows` (N, 15) of `COLUMNS`; the last two are the simulator's truth.
+
+    `piles`: when an estimate of a pile was made, and points of its face (M, 3) in the frame of the truth.
+    """
 
     rows: FloatArray
+    piles: Sequence[tuple[int, FloatArray]] = ()
 
     def column(self, name: str) -> FloatArray:
         """Return a column by its name, shape (N,)."""

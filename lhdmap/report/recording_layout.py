@@ -28,6 +28,9 @@ REPLAY_CURVES: Curves = (
     ("Clearance, m", ("motion/clearance/**",)),
     ("States", ("state/**",)),
     ("Place by localization less the true one", ("place/**",)),
+    ("Boom and bucket, rad", ("loading/angles/**",)),
+    ("Pressures, bar", ("loading/pressure/**",)),
+    ("Fill", ("loading/fill/**",)),
 )
 REPLAY_GRAPH = ("map/base_link/**", "map/plan/**", "map/path/**")
 """Of a drive on a map: what is seen beside the map."""

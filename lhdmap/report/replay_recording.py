@@ -13,6 +13,7 @@ import numpy as np
 
 from lhdmap.machine import Machine
 from lhdmap.messages import FloatArray
+from lhdmap.report.loading_recording import add_load
 from lhdmap.report.recording import PathStyle, RecordingWriter
 from lhdmap.report.recording_layout import REPLAY_CURVES, REPLAY_GRAPH
 from lhdmap.report.replay_data import COLUMNS, DriveData, ReplayData
@@ -115,6 +116,8 @@ class ReplayRecording:
             self._add_states(data)
         if data is not None and data.drive is not None:
             self._add_drive(data.drive)
+        if data is not None and data.load is not None:
+            add_load(self._writer, data.load, self._machine, self._start_ns)
         self._writer.close()
 
     def _add_paths(self, data: ReplayData) -> None:

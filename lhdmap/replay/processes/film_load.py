@@ -5,10 +5,12 @@ from __future__ import annotations
 import math
 from typing import Any
 
+from lhdmap.geometry import se3
 from lhdmap.loading.skid import SkidFactor
-from lhdmap.messages import Command
+from lhdmap.messages import Command, FloatArray
+from lhdmap.pile.result import Snapshot
 from lhdmap.replay.load_tally import embedded_m
-from lhdmap.replay.process import LOADING, STATE, Received
+from lhdmap.replay.process import LOADING, PILE, STATE, Received
 from lhdmap.replay.processes.load_feed import SIGNAL_TOPICS, SignalFeed
 from lhdmap.replay.series import Series
 from lhdmap.report.loading_data import COLUMNS, LoadData
@@ -16,8 +18,9 @@ from lhdmap.roles import ROLES
 from lhdmap.simulation.history import SECOND_NS, START_NS
 
 COMMAND = ROLES["command"].topic
-LOAD_TOPICS = (*SIGNAL_TOPICS, LOADING, COMMAND)
+LOAD_TOPICS = (*SIGNAL_TOPICS, LOADING, PILE, COMMAND)
 _EVERY_NS = 50_000_000
+_FACE, _MOST_PILES = 400, 200
 _WINDOW_S, _FLOOR_MPS = 1.0, 0.2
 
 
@@ -32,6 +35,8 @@ class LoadFilm:
         self._fill = math.nan
         self._truth = (math.nan, math.nan)
         self._last_ns = 0
+        self._start: Any = None
+        self._piles: list[tuple[int, FloatArray]] = []
 
     def take(self, received: Received) -> None:
         """Take a message."""
@@ -42,7 +47,10 @@ class LoadFilm:
             self._command = message
         elif topic == LOADING:
             self._fill = message.fill
+        elif topic == PILE:
+            self._see(message)
         elif topic == STATE:
+            self._start = message if self._start is None else self._start
             self._truth = message.load_kg / self._full_kg, embedded_m(message)
         if sent_ns - self._last_ns >= _EVERY_NS:
             self._last_ns = sent_ns
@@ -50,7 +58,18 @@ class LoadFilm:
 
     def data(self) -> LoadData:
         """Return what was seen."""
-        return LoadData(self.series.rows())
+        return LoadData(self.series.rows(), self._piles)
+
+    def _see(self, snapshot: Snapshot) -> None:
+        """Keep an estimate's face, placed as the odometry began where the machine truly stood."""
+        face = snapshot.estimate.face_m
+        if self._start is None or not len(face):
+            return
+        start = self._start
+        T_map_odom = se3.from_rpy(0.0, 0.0, start.yaw_rad, (start.x_m, start.y_m, start.z_m))
+        kept = face[:: max(len(face) // _FACE, 1)]
+        self._piles.append((snapshot.stamp_ns, kept @ T_map_odom[:3, :3].T + T_map_odom[:3, 3]))
+        del self._piles[:-_MOST_PILES]
 
     def _row(self, now_ns: int) -> None:
         signals, command = self._feed.signals(), self._command
