@@ -19,6 +19,7 @@ from lhdmap.messages import FloatArray
 
 _STEP_RAD = math.radians(0.5)
 _NEAR_M = 14.0
+_INSIDE = 0.6  # share of the room beside the bucket that is kept on either side, where it can be
 
 
 class Aim(NamedTuple):
@@ -52,12 +53,32 @@ class Aligner:
         return not touches(Posture(np.zeros(3), bend_rad), walls, self._bodies, self._model, 0.0)
 
     def aim(self, bend_rad: float, limits_m: FloatArray, walls_m: FloatArray) -> Aim:
-        """Return the angle to turn the joint to; limits (2, 2) and wall points (N, 2) in `base_link`."""
+        """Return the angle to turn the joint to; limits (2, 2) and wall points (N, 2) in `base_link`.
+
+        Of those that land well inside the nearest one, where there are none of those that land inside at all.
+        """
+        aim = Aim(None)
+        for margin_m in self._margins_m(limits_m):
+            found = self._aim(bend_rad, limits_m, walls_m, margin_m)
+            if found.bend_rad is not None:
+                return found
+            aim = Aim(None, aim.walled or found.walled)
+        return aim
+
+    def _margins_m(self, limits_m: FloatArray) -> tuple[float, ...]:
+        """Return how far inside both sides are to land, the most first: near a side the raised bucket is under a lower roof."""
+        room_m = float(np.hypot(*(limits_m[1] - limits_m[0]))) - float(np.ptp(self.corners_m[:, 1]))
+        least = self._settings.landing_m
+        return tuple(
+            dict.fromkeys((max(_INSIDE * 0.5 * room_m, least), max(0.5 * _INSIDE * 0.5 * room_m, least), least))
+        )
+
+    def _aim(self, bend_rad: float, limits_m: FloatArray, walls_m: FloatArray, margin_m: float) -> Aim:
         walls, walled = self._walls(limits_m, walls_m), False
         for bend in self._candidates(bend_rad):
             turn = turned(bend_rad, bend, self._model)
             limits = se2.transform(se2.inverse(np.array([0.0, 0.0, turn])), limits_m)
-            if not self._stays(bend, limits):
+            if not self._stays(bend, limits, margin_m):
                 continue
             landed = self.lands(bend, limits)
             start = Posture(np.array([0.0, 0.0, turn]), bend)
@@ -66,17 +87,16 @@ class Aligner:
             walled = True
         return Aim(None, walled)
 
-    def _stays(self, bend_rad: float, limits_m: FloatArray) -> bool:
-        """Return whether both sides land, and are still between the limits when the bucket is as deep as it digs.
+    def _stays(self, bend_rad: float, limits_m: FloatArray, margin_m: float) -> bool:
+        """Return whether both sides land so far inside, and are still between the limits when the bucket is as deep as it digs.
 
         The walls go on beside the pile: with the joint bent the bucket runs into them while it digs.
         """
-        settings = self._settings
         E = limits_m[1] - limits_m[0]
-        deep = limits_m + settings.dig_m * np.array([E[1], -E[0]]) / max(float(np.hypot(*E)), 1e-9)
+        deep = limits_m + self._settings.dig_m * np.array([E[1], -E[0]]) / max(float(np.hypot(*E)), 1e-9)
         return (
-            self.lands(bend_rad, limits_m, margin_m=settings.landing_m).good
-            and self.lands(bend_rad, deep, margin_m=settings.landing_m).good
+            self.lands(bend_rad, limits_m, margin_m=margin_m).good
+            and self.lands(bend_rad, deep, margin_m=margin_m).good
         )
 
     def _candidates(self, bend_rad: float) -> Iterator[float]:

@@ -41,6 +41,8 @@ class Span(NamedTuple):
 
 def spans_of(changes: Sequence[Change], start_ns: int, end_s: float) -> list[Span]:
     """Return the states of the task as spans of time."""
+    if not changes:
+        return []
     starts = [(one.t_ns - start_ns) / _S_NS for one in changes]
     return [Span(one.state, start, end) for one, start, end in zip(changes, starts, [*starts[1:], end_s], strict=True)]
 
