@@ -66,6 +66,13 @@ GUIDANCE = (
         "10**, 7.5 km/h, 0.065 m; 43 drives with 85 random faults: no contact"
     ),
 )
+LOADING = (
+    "a model of machine and ground fitted to the paper's tables: 200 loads that nothing was tuned on; 500 charges",
+    (
+        "first fill **0.76** (the paper's controller 0.59, tuned alike 0.68), **2.0** attempts to 90 % (3.0, 2.2); the pile "
+        "felt in 99.4 % of the charges, 0.12 s after 40 kN; weighed to 3.3 %; in closed loop two buckets from draw point to dump"
+    ),
+)
 ROCKBREAKER = (
     "the paper's machine and its trajectory T1, 20.5 s there",
     "its profile 20.3 s, `--timing smooth` **14.1 s** under the same limits, the bound of any is 12.6 s; 8 ms to plan",
@@ -128,6 +135,7 @@ def _figures(rows: list[dict[str, Any]], real: str, demo: dict[str, Any]) -> str
         ("[localization](evaluation/localization.md)", *LOCALIZATION),
         ("[guidance](evaluation/guidance.md)", *GUIDANCE),
         ("[ore pile](evaluation/pile.md)", *PILE),
+        ("[loading](evaluation/loading.md)", *LOADING),
         ("[rockbreaker](evaluation/rockbreaker.md)", *ROCKBREAKER),
     ]
     return "\n".join(f"| {' | '.join(row)} |" for row in table)

@@ -80,11 +80,12 @@ class Identification:
         """Return the pile of the attempt before as it is seen now: the machine has looked at it from where it stands."""
         target = moment.target
         looked = moment.now_ns - self._since_ns >= _AGAIN_NS
-        if not self._near or target is None or moment.marked is not None or not looked:
+        near = self._near or self._distance_m(moment) < self._settings.identify_m
+        if not near or target is None or moment.marked is not None or not looked:
             return None
         limits = target.limits_in(moment.motion)
         shift = face_behind_m(moment.walls_m, limits) - moment.face_m
-        hits = int(at_pile(moment.walls_m, limits).sum())
+        hits = int(at_pile(moment.walls_m, limits, _BEHIND_M + _MOVED_M).sum())
         if not math.isfinite(shift) or abs(shift) > _MOVED_M or hits < self._settings.pile_hits:
             return None
         return moved(target, shift, moment.now_ns)
