@@ -118,6 +118,7 @@ _SETTINGS = {
     "loading.press_most_bar": Case("loading_cycle", 28.0),
     "loading.rack_s": Case("loading_cycle", 0.5),
     "loading.align_deg": Case("loading_limits", 5.0),
+    "loading.landing_m": Case("loading_limits", 0.7),
     "odometry.max_beams": Case("tilted", 100),
     "odometry.max_rear_beams": Case("tilted", 65),
     "odometry.step_deg": Case("tilted", 0.05),
