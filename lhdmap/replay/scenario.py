@@ -270,6 +270,7 @@ def load_scenario(path: Path, **over: Any) -> Scenario:
     scenario = load_tree(Scenario, path, "scenario file")
     beside: dict[str, Any] = {key: _beside(path, getattr(scenario, key)) for key in ("mine", "machine", "site")}
     beside["map"] = _beside(path, scenario.map, folder=True)
+    beside["loading"] = replace(scenario.loading, ground=_beside(path, scenario.loading.ground))
     if scenario.grizzly.pile:
         beside["grizzly"] = replace(scenario.grizzly, pile=str(path.parent / scenario.grizzly.pile))
     return replace(scenario, **(beside | over))

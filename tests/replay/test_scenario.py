@@ -8,6 +8,7 @@ import pytest
 from lhdmap.errors import ConfigError, UsageError
 from lhdmap.replay.assemble import parts_of
 from lhdmap.replay.scenario import Scenario, find_scenario, load_scenario, scenario_toml, shipped_scenarios
+from lhdmap.simulation.ground.sections import load_ground
 
 WHOLE = """
 kind = "tram"
@@ -85,3 +86,13 @@ def test_those_that_ship_are_found_by_name_and_are_whole() -> None:
 def test_a_kind_without_a_vehicle_has_no_parts() -> None:
     with pytest.raises(UsageError, match=r"kind = .grizzly.: this version replays"):
         parts_of(Scenario(kind="grizzly", rocks=1), Path())
+
+
+def test_a_ground_is_a_file_beside_the_scenario_or_one_that_ships(tmp_path: Path) -> None:
+    own = tmp_path / "own.toml"
+    own.write_text("", encoding="utf-8")
+    text = 'kind = "loading"\nmine = "stope"\nstart = "DP1"\n[loading]\nground = "own.toml"\n'
+    assert load_scenario(write(tmp_path, text)).loading.ground == str(own)
+    assert load_ground(str(own)).name == "own"
+    with pytest.raises(UsageError, match="did you mean 'default'"):
+        load_ground("defalt")

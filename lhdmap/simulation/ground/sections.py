@@ -5,8 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
+from lhdmap.errors import UsageError
 from lhdmap.resources import resource
-from lhdmap.settings import setting
+from lhdmap.settings import nearest, setting
 from lhdmap.settings_tree import load_tree, part, tree_toml
 
 _FITTED = "fitted to Tables 3 to 5 of autonomous_loading"
@@ -213,8 +214,20 @@ def load_ground(name: str | Path = "default") -> Grounds:
         ConfigError: a key or a value in it is wrong.
         UsageError: no ground of that name ships with lhdmap.
     """
-    path = name if isinstance(name, Path) else resource(f"datasets/grounds/{name}.toml")
+    path = name if isinstance(name, Path) else _found(name)
     return load_tree(Grounds, path, "ground file", Grounds(path.stem))
+
+
+def _found(name: str) -> Path:
+    """Return the file of a name: one that is there, or one that ships."""
+    if Path(name).is_file():
+        return Path(name)
+    shipped = {path.stem: path for path in sorted(resource("datasets/grounds").glob("*.toml"))}
+    if name not in shipped:
+        raise UsageError(
+            f"ground = '{name}': a ground file or the name of one that ships was wanted{nearest(name, shipped)}"
+        )
+    return shipped[name]
 
 
 def ground_toml(ground: Grounds) -> str:
