@@ -181,7 +181,8 @@ class LoadingTask:
         memory = self._memory
         before, after = memory.state, TABLE[memory.state, event]
         cause = f"{event.value}: {step.cause}" if step.cause else event.value
-        values: dict[str, Any] = {**dict(step.values), "after_s": (told.now_ns - memory.since_ns) * 1e-9}
+        since_ns = memory.since_ns or told.now_ns  # the first state has no beginning
+        values: dict[str, Any] = {**dict(step.values), "after_s": (told.now_ns - since_ns) * 1e-9}
         self._notes.append(Note("state", before.value, after.value, cause, values))
         memory.state, memory.since_ns, memory.valid_ns = after, told.now_ns, None
         if before not in RESTING and before not in ASSISTANCE:
