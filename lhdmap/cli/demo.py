@@ -1,4 +1,4 @@
-"""`lhdmap demo`: the sample drive from end to end, without any input."""
+"""`lhdmap demo`: the sample drive from end to end, and one cycle of a machine in a mine, without any input."""
 
 from __future__ import annotations
 
@@ -13,11 +13,13 @@ from typing import TYPE_CHECKING, Any
 from lhdmap.cli.build_map import progress_of
 from lhdmap.cli.console import Console
 from lhdmap.cli.options import add_output, add_settings
+from lhdmap.cli.replay import progress_of as replay_progress_of
+from lhdmap.errors import EvaluationShortfall
 from lhdmap.outputs import free_folder
 
 if TYPE_CHECKING:
     from lhdmap.messages import Record
-    from lhdmap.pipeline.demo import Demo
+    from lhdmap.replay.demo import Demo
 
 FIRST_RUN = "the first run compiles the inner loops: up to a minute more than the next ones"
 
@@ -29,13 +31,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace, console: Console) -> int:
-    """Simulate, map, evaluate; say where everything is."""
+    """Simulate, map, evaluate, teach, work; say where everything is. Exit code 1 where the cycle is not ok."""
     from lhdmap.config import load_settings
-    from lhdmap.pipeline.demo import Watcher, run_demo
+    from lhdmap.replay.demo import Watcher, run_demo
 
     started = time.monotonic()
     settings = load_settings(arguments.config, arguments.set)
-    watcher = Watcher(console.note, _simulation_progress(console), progress_of(console))
+    watcher = Watcher(console.note, _simulation_progress(console), progress_of(console), replay_progress_of(console))
     target = arguments.output or Path("lhdmap_demo")
     free_folder(target, force=arguments.force)
     console.note(FIRST_RUN)
@@ -43,8 +45,10 @@ def run(arguments: argparse.Namespace, console: Console) -> int:
     for text in demo.built.warnings:
         console.warn(text)
     wall_s = time.monotonic() - started
-    console.result(demo_values(demo, wall_s), demo_text(demo, wall_s))
-    return 0
+    verdict = demo.cycle.verdict
+    failure = None if verdict["ok"] else EvaluationShortfall(f"the cycle is not ok: {verdict['reason']}")
+    console.result(demo_values(demo, wall_s), demo_text(demo, wall_s), failure=failure)
+    return 0 if failure is None else failure.exit_code
 
 
 def demo_values(demo: Demo, wall_s: float) -> dict[str, Any]:
@@ -57,6 +61,7 @@ def demo_values(demo: Demo, wall_s: float) -> dict[str, Any]:
         "report": str(demo.built.folder / "report.html"),
         "recording": str(demo.built.folder / "recording.rrd"),
         "evaluation": demo.evaluation.to_json(),
+        "cycle": {"run": str(demo.cycle.folder), "picture": str(demo.picture)} | demo.cycle.verdict,
         "wall_s": wall_s,
     }
 
@@ -73,14 +78,24 @@ def demo_text(demo: Demo, wall_s: float) -> str:
             f"drive       {demo.drive.distance_m:.0f} m, {demo.drive.scans} front scans, {demo.drive.log}",
             f"map         {built.summary['scans_processed']} scans processed, cloud and trajectory, {built.folder}",
             f"error       end point {end} of the distance{segments}",
+            _cycle_text(demo),
             f"time        {wall_s:.0f} s, of which build-map {built.summary['wall_s']:.0f} s{_compiling(built.summary)}",
             "",
             f"report      open {built.folder / 'report.html'} in a browser",
             f"recording   {program} view {built.folder}",
             f"comparison  {demo.plot_file}",
+            f"cycle       {demo.picture}, {demo.cycle.folder / 'report.html'}, {program} view {demo.cycle.folder}",
             f"your log    {program} doctor LOG, then {program} build-map LOG",
         ]
     )
+
+
+def _cycle_text(demo: Demo) -> str:
+    """Return what the machine did in the mine."""
+    told = demo.cycle.verdict
+    done = f"{told['cycles']} bucket of {told['tonnes']:.1f} t" if told["cycles"] else "no bucket"
+    took = f"{told['distance_m']:.0f} m in {told['duration_s']:.0f} s, {told['realtime_factor']:.1f} x real time"
+    return f"cycle       {told['reason']}: {done} from draw point to dump by itself, {took}"
 
 
 def _compiling(summary: dict[str, Any]) -> str:

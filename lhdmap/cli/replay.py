@@ -65,7 +65,7 @@ def run(arguments: argparse.Namespace, console: Console) -> int:
         live_port=port,
         force=arguments.force,
         sources=[path],
-        progress=_progress_of(console),
+        progress=progress_of(console),
         settings=load_settings(arguments.config, arguments.set),
     )
     with _viewer(port, console):
@@ -123,7 +123,9 @@ def _grizzly_lines(values: Mapping[str, Any]) -> list[str]:
     ]
 
 
-def _progress_of(console: Console) -> Any:
+def progress_of(console: Console) -> Any:
+    """Return a wrapper that shows progress by simulated time."""
+
     def wrap(moments: Iterable[int], duration_s: float) -> Iterable[int]:
         """Return the simulated times, shown as they go by."""
         from lhdmap.simulation.history import START_NS

@@ -51,5 +51,5 @@ def mission_processes(scenario: Scenario, parts: Parts, given: Autonomous, journ
         Dumps(journal.of(DUMPS)),
         Guide(guidance, settings.executor.jumps, journal.of(GUIDANCE), models=models),
         Execute(control, machine, given.mode, journal.of(EXECUTOR), models=models),
-        Station(scenario.wanted_modes, scenario.rearm_s, scenario.assist_s, journal.of(Station.name)),
+        Station(scenario.wanted_modes, scenario.rearm_s, scenario.assist_s, journal.of(Station.name), scenario.assists),
     ]

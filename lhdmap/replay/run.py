@@ -24,6 +24,7 @@ from lhdmap.replay.processes.recorder import Recorder
 from lhdmap.replay.scenario import GRIZZLY, HAULAGE, Scenario, scenario_toml
 from lhdmap.replay.series import Timeline
 from lhdmap.replay.stops import Stops
+from lhdmap.report.mission_chart import has_mission, write_mission_picture
 from lhdmap.report.replay_data import ReplayData
 from lhdmap.report.replay_page import write_replay_report
 from lhdmap.report.replay_recording import ReplayRecording
@@ -32,6 +33,7 @@ from lhdmap.simulation.history import SECOND_NS, START_NS
 
 KIND = "replay"
 LOG, JOURNAL, VERDICT, REPORT, RECORDING = "run.mcap", "journal.jsonl", "verdict.json", "report.html", "recording.rrd"
+PICTURE = "mission.png"
 GRIZZLY_FRAMES = {"base": "origin on the swing axis, x along the grizzly's middle, y left, z up"}
 _GRACE_S = 60  # the monitor ends a run at its limit; this is for a monitor that sees nothing
 Progress = Callable[[Iterable[int], float], Iterable[int]]
@@ -168,6 +170,9 @@ class _Replay:
             folder.finished(folder.path / RECORDING)
         write_replay_report(folder.path / REPORT, data)
         folder.finished(folder.path / REPORT)
+        if has_mission(data):
+            write_mission_picture(folder.path / PICTURE, data)
+            folder.finished(folder.path / PICTURE)
 
     def _data(self, verdict: dict[str, Any], film: Film) -> ReplayData:
         scenario = self._request.scenario

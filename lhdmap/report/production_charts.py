@@ -15,7 +15,7 @@ from lhdmap.report import charts
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-_COLOURS = {
+PHASE_COLOURS = {
     Phase.TRAM: "#b7d3ea", Phase.LOAD: charts.ODOMETRY, Phase.HAUL: charts.FINAL, Phase.DUMP: charts.TRUTH,
     Phase.RETURN: "#8fb8d8", Phase.PARK: "#cfd6dc", Phase.REFUEL: "#f0c419", Phase.ASSISTANCE: charts.FLAGGED,
     Phase.QUEUE_LOAD: "#c98a5b", Phase.QUEUE_DUMP: "#b56b35", Phase.TRAFFIC: charts.WHEELS, Phase.OBSTACLE: "#9c4a12",
@@ -40,7 +40,7 @@ def cycle_chart(production: Production) -> Figure:
     at, below = np.arange(1, len(cycles) + 1), np.zeros(len(cycles))
     for phase in phases:
         seconds = np.array([one.seconds(phase) for one in cycles])
-        axes.bar(at, seconds, bottom=below, width=0.8, color=_COLOURS[phase], label=str(phase))
+        axes.bar(at, seconds, bottom=below, width=0.8, color=PHASE_COLOURS[phase], label=str(phase))
         below += seconds
     axes.set(xlabel="bucket", ylabel="time, s")
     figure.subplots_adjust(top=1.0 - (0.14 + 0.19 * rows) / figure.get_figheight())
@@ -95,7 +95,7 @@ def timeline_chart(cycles: Sequence[Cycle]) -> Figure:
         for phase in Phase:
             spans = [(1e-9 * (part.from_ns - start_ns) / 60.0, part.s / 60.0) for part in parts if part.phase == phase]
             if spans:
-                axes.broken_barh(spans, (row - 0.35, 0.7), facecolors=_COLOURS[phase])
+                axes.broken_barh(spans, (row - 0.35, 0.7), facecolors=PHASE_COLOURS[phase])
     axes.set_yticks(range(len(names)), names)
     axes.set(xlabel="time, min", ylim=(len(names) - 0.5, -0.5))
     axes.grid(visible=False)

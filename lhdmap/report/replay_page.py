@@ -9,7 +9,15 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from lhdmap.report import charts, haulage_section, loading_section, markup, replay_charts, replay_drive_charts
+from lhdmap.report import (
+    charts,
+    haulage_section,
+    loading_section,
+    markup,
+    mission_chart,
+    replay_charts,
+    replay_drive_charts,
+)
 from lhdmap.report.replay_data import DriveData, ReplayData, StopRow
 
 if TYPE_CHECKING:
@@ -27,6 +35,10 @@ PLACE = (
 TIME = (
     "Speed, joint angle and clearance as they truly were; what was planned, predicted and commanded beside it. Stretches with a "
     "fault are shaded."
+)
+MISSION = (
+    "The true way in the colours of the mission's phases, speed and phases under it (of a long run its first 15 minutes). "
+    "A diamond is a place of the map."
 )
 STATES = (
     "States of the processes over time, from the journal; journal.jsonl has the cause and the figures of each change."
@@ -103,6 +115,8 @@ def _drive_cards(drive: DriveData) -> Iterator[tuple[str, str, str]]:
 def _pictures(data: ReplayData) -> Iterator[str]:
     if not len(data.rows):
         return
+    if mission_chart.has_mission(data):
+        yield markup.section("Mission", _picture(mission_chart.mission_chart(data), MISSION))
     words = PLAN if data.drive is None else f"{PLAN} {DRIVE}"
     yield markup.section("Way", _picture(replay_charts.plan_chart(data), words))
     yield markup.section("Over time", _picture(replay_charts.time_chart(data), TIME))

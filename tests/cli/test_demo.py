@@ -57,7 +57,7 @@ def short_drive(monkeypatch: pytest.MonkeyPatch) -> None:
         drift, drive = replace(whole.drift, cross_drifts=()), replace(whole.drive, distance_m=3.0)
         return replace(whole, drift=drift, drive=replace(drive, stops=(), reversals=()))
 
-    monkeypatch.setattr("lhdmap.pipeline.demo.load_scenario", load)
+    monkeypatch.setattr("lhdmap.replay.demo.load_scenario", load)
 
 
 def test_a_taken_name_is_refused_before_the_work(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

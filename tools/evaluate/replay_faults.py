@@ -125,14 +125,14 @@ def run(scenario: Scenario, folder: Path) -> Outcome:
     tally = run.monitor.tally
     rows = np.array(drive.rows)
     model = drive_model(parts.machine, 1000.0 * scenario.load)
-    missed, worst = _stops(rows, events, model)
-    missed += _stale(scenario.faults, rows, events)
+    missed, worst = stops_missed(rows, events, model)
+    missed += stale_missed(scenario.faults, rows, events)
     missed += [f"contact: {tally.reason}"] if tally.contacts else []
-    stops = sum(1 for _ in _told(events, "watchdog: armed", "disarmed"))
+    stops = sum(1 for _ in told_at(events, "watchdog: armed", "disarmed"))
     return Outcome(tally.reason, missed, float(tally.min_clearance_m or 0.0), worst, stops, tally.assists)
 
 
-def _told(events: list[Event], event: str, after: str) -> list[float]:
+def told_at(events: list[Event], event: str, after: str) -> list[float]:
     """Return when (s) the executor noted something; refusals to arm are none."""
     return [
         (one.t_ns - START_NS) / SECOND_NS
@@ -141,11 +141,11 @@ def _told(events: list[Event], event: str, after: str) -> list[float]:
     ]
 
 
-def _stops(rows: FloatArray, events: list[Event], model: DriveModel) -> tuple[list[str], float]:
+def stops_missed(rows: FloatArray, events: list[Event], model: DriveModel) -> tuple[list[str], float]:
     """Return what was missed at stops of the watchdog, and the worst share of the stopping distance."""
     missed, worst = [], 0.0
-    armed = [*_told(events, "watchdog: armed", "armed"), rows[-1, 0] + 1.0]
-    for at_s in _told(events, "watchdog: armed", "disarmed"):
+    armed = [*told_at(events, "watchdog: armed", "armed"), rows[-1, 0] + 1.0]
+    for at_s in told_at(events, "watchdog: armed", "disarmed"):
         until_s = min(one for one in armed if one > at_s)
         part = rows[(rows[:, 0] >= at_s) & (rows[:, 0] < until_s)]
         if not len(part):
@@ -164,7 +164,7 @@ def _stops(rows: FloatArray, events: list[Event], model: DriveModel) -> tuple[li
     return missed, worst
 
 
-def _stale(faults: Sequence[FaultSettings], rows: FloatArray, events: list[Event]) -> list[str]:
+def stale_missed(faults: Sequence[FaultSettings], rows: FloatArray, events: list[Event]) -> list[str]:
     """Return where the machine went on although a scanner, tachometer or joint had been silent for too long."""
     missed = []
     for fault in faults:
@@ -173,8 +173,8 @@ def _stale(faults: Sequence[FaultSettings], rows: FloatArray, events: list[Event
             continue
         late_s = fault.at_s + LIMIT_S
         at = rows[np.searchsorted(rows[:, 0], min(late_s, rows[-1, 0])).clip(max=len(rows) - 1)]
-        disarmed = [one for one in _told(events, "watchdog: armed", "disarmed") if one <= late_s + 0.02]
-        armed = [one for one in _told(events, "watchdog: armed", "armed") if one <= fault.at_s]
+        disarmed = [one for one in told_at(events, "watchdog: armed", "disarmed") if one <= late_s + 0.02]
+        armed = [one for one in told_at(events, "watchdog: armed", "armed") if one <= fault.at_s]
         holds = not disarmed or (armed and max(disarmed) < max(armed))
         if holds and abs(at[3]) > STANDS_MPS and rows[-1, 0] > late_s:
             missed.append(f"{late_s:.2f} s: moves without {fault.target} ({fault.kind} since {fault.at_s:.2f} s)")
