@@ -55,6 +55,7 @@ class Bus:
         self._link, self._withhold = link, withhold_truth
         self.inboxes = {process.name: Inbox(process) for process in processes}
         self._routes: dict[str, list[Inbox]] = {}
+        self._parted: dict[tuple[str, str, bool], tuple[list[tuple[Inbox, bool]], list[Inbox]]] = {}
         for process in processes:
             secret = [topic for topic in process.reads if topic.startswith(TRUTH)]
             if secret and process.name not in SEES_TRUTH:
@@ -71,13 +72,12 @@ class Bus:
         if link is None or topic.startswith(TRUTH):
             yield sent_ns, route
             return
-        here = sender.site
-        at_once: list[Inbox] = []
-        for inbox in route:
-            crosses = bool(here and inbox.process.site and here != inbox.process.site)
-            if not crosses and (not link.at_fault or not inbox.process.site):
-                at_once.append(inbox)
-                continue
+        key = sender.site, topic, link.at_fault
+        parted = self._parted.get(key)
+        if parted is None:
+            parted = self._parted[key] = _parted(sender.site, route, at_fault=link.at_fault)
+        over, at_once = parted
+        for inbox, crosses in over:
             at_ns = link.arrival_ns(topic, inbox.process.name, sent_ns, crosses=crosses)
             if at_ns is not None:
                 yield at_ns, [inbox]
@@ -88,6 +88,19 @@ class Bus:
         if topic.startswith(TRUTH) and self._withhold:
             return []
         return [inbox for inbox in self.inboxes.values() if _gets(inbox.process, topic)]
+
+
+def _parted(here: str, route: list[Inbox], *, at_fault: bool) -> tuple[list[tuple[Inbox, bool]], list[Inbox]]:
+    """Return the inboxes that the link decides on, and whether it lies between; and those that get all at once."""
+    over: list[tuple[Inbox, bool]] = []
+    at_once: list[Inbox] = []
+    for inbox in route:
+        crosses = bool(here and inbox.process.site and here != inbox.process.site)
+        if not crosses and (not at_fault or not inbox.process.site):
+            at_once.append(inbox)
+        else:
+            over.append((inbox, crosses))
+    return over, at_once
 
 
 def _gets(process: Process, topic: str) -> bool:

@@ -10,8 +10,20 @@ from typing import Any
 import pytest
 from lhdmap.cli.main import main
 from lhdmap.mapfolder import MapFolder
+from lhdmap.replay.run import ReplayResult
+from lhdmap.runfolder import RunFolderWriter
 from lhdmap.simulation.scenario import DriftScenario, load_scenario
 from lhdmap.trajectory import read_tum
+
+VERDICT = {"ok": True, "reason": "done", "cycles": 1, "tonnes": 9.5, "distance_m": 200.0, "duration_s": 150.0,
+           "realtime_factor": 4.0}  # fmt: skip
+
+
+def cycle(folder: RunFolderWriter, *_: Any) -> ReplayResult:
+    """The cycle, which takes most of the time and has tests of its own (tests/replay): nothing is driven."""
+    made = folder.path / "cycle"
+    made.mkdir()
+    return ReplayResult(made, VERDICT)
 
 
 @pytest.fixture(scope="module")
@@ -20,6 +32,7 @@ def demo(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Any]:
     target = tmp_path_factory.mktemp("demo") / "first"
     with pytest.MonkeyPatch.context() as patch:
         printed: list[str] = []
+        patch.setattr("lhdmap.replay.demo._cycle", cycle)
         patch.setattr("builtins.print", lambda text="", **options: None if "file" in options else printed.append(text))
         assert main(["demo", "-o", str(target), "--json"]) == 0
     assert len(printed) == 1
@@ -48,16 +61,17 @@ def test_a_pose_for_every_front_scan(demo: tuple[Path, Any]) -> None:
     assert len(read_tum(folder / "drive_map" / "trajectory.tum").stamps_ns) == told["map"]["scans"]
 
 
+def shortened(whole: DriftScenario) -> DriftScenario:
+    """Return the scenario with a drive of 3 m."""
+    drift, drive = replace(whole.drift, cross_drifts=()), replace(whole.drive, distance_m=3.0)
+    return replace(whole, drift=drift, drive=replace(drive, stops=(), reversals=()))
+
+
 @pytest.fixture
 def short_drive(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The demo with a drive of 3 m."""
-
-    def load(path: Path) -> DriftScenario:
-        whole = load_scenario(path)
-        drift, drive = replace(whole.drift, cross_drifts=()), replace(whole.drive, distance_m=3.0)
-        return replace(whole, drift=drift, drive=replace(drive, stops=(), reversals=()))
-
-    monkeypatch.setattr("lhdmap.replay.demo.load_scenario", load)
+    """The demo with a drive of 3 m, and without its cycle."""
+    monkeypatch.setattr("lhdmap.replay.demo.load_scenario", lambda path: shortened(load_scenario(path)))
+    monkeypatch.setattr("lhdmap.replay.demo._cycle", cycle)
 
 
 def test_a_taken_name_is_refused_before_the_work(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -85,6 +99,7 @@ def test_a_second_demo_replaces_the_first_with_force(
     for name in ("log", "truth", "report", "recording"):
         assert Path(told[name]).is_relative_to(target)
         assert Path(told[name]).is_file()
+    assert told["cycle"]["picture"] == str(target / "cycle" / "mission.png")
     source = json.loads((target / "drive_map" / "map.json").read_text(encoding="utf-8"))["sources"][0]
     assert source["path"] == str(target / "drive.mcap")
     assert main(["demo", "-o", str(target)]) == 2
