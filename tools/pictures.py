@@ -1,4 +1,4 @@
-"""Make the pictures of README.md and docs anew from runs of the program: the sample drive, and a plan to a rock.
+"""Make the pictures of README.md and docs anew from runs of the program: the sample drive, a cycle, and a plan to a rock.
 
     python -m tools.pictures            # needs chromium and mesa-vulkan-drivers
 
@@ -38,6 +38,7 @@ def main() -> int:
         _save(work / "page.png", (0.075, 0.0, 0.93, 0.415), "report.png")
         _save(work / "page.png", (0.075, 0.53, 0.93, 0.835), "cloud.png")
         shutil.copy(work / "demo" / "evaluation.png", TARGET / "comparison.png")
+        _save(work / "demo" / "cycle" / "mission.png", (0.0, 0.0, 1.0, 1.0), "cycle.png")
         _rockbreaker(work)
     return 0
 

@@ -41,6 +41,7 @@ _DRAWN_M = 1.0
 _KG = 1000.0  # of a tonne
 _SLOWER = 1.4  # a drive with its bends and rests takes so much longer than its way at full speed
 TOLD = {OPERATOR: "manual", TELEOPERATOR: "teleoperated"}
+_BUCKET_S = 200.0  # about what one takes in the mines that ship: how far a run is, is told by it
 _LEAST_CLEAR_M = 1.0  # what is farther is not measured
 
 
@@ -92,10 +93,14 @@ def mine_parts(scenario: Scenario, folder: Path, settings: Settings) -> Parts:
         places=places,
         goal_m=places.get(scenario.goal) or _goal_m(autonomous, scenario.goal, network, machine),
         lines_m=walls_of(network),
-        expected_s=_SLOWER * way_m / (scenario.speed_kmh / 3.6) + 10.0,
+        expected_s=_SLOWER * way_m / (scenario.speed_kmh / 3.6) + 10.0 + _buckets_s(scenario),
         settings=settings,
         autonomous=autonomous,
     )
+
+
+def _buckets_s(scenario: Scenario) -> float:
+    return _BUCKET_S * sum(one.buckets for one in scenario.mission)
 
 
 def _vehicle(scenario: Scenario, machine: Machine, world: MineWorld) -> Vehicle | LoadingVehicle:

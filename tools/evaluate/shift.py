@@ -2,7 +2,7 @@
 
     python -m tools.evaluate.shift run [SCENARIO] -o RUN [--buckets N] [--map MAP]       # the shift; memory and time on the way
     python -m tools.evaluate.shift log RUN MAP                                           # doctor, build-map, localize, batch
-    python -m tools.evaluate.shift page LINES… -o evaluation/shift.md
+    python -m tools.evaluate.shift page LINES… -o evaluation/shift.md [--run RUN]
 
 `run` and `log` print JSON lines, `page` makes the page of them.
 """
@@ -26,9 +26,12 @@ from lhdmap.logs.source import LogSource
 from lhdmap.pipeline.production_run import production_of_runs
 from lhdmap.replay.run import LOG, ReplayRequest, replay
 from lhdmap.replay.scenario import find_scenario, load_scenario
+from lhdmap.report import charts
+from lhdmap.report.production_charts import cycle_chart
 from lhdmap.simulation.history import SECOND_NS, START_NS
 
 EVERY_S = 300.0
+PICTURE = Path(__file__).resolve().parents[2] / "docs" / "img" / "shift_cycles.png"
 
 
 def run(words: argparse.Namespace) -> None:
@@ -149,6 +152,9 @@ def page(words: argparse.Namespace) -> None:
         "CPU time and memory are those of all processes of a command; each one begins with some 5 s of loading the program.",
     ]
     words.output.write_text("\n\n".join(parts) + "\n", encoding="utf-8")
+    if words.run:
+        with charts.styled():
+            charts.write_figure(cycle_chart(production_of_runs([words.run])), PICTURE, "png")
 
 
 def _command_rows(lines: list[dict[str, Any]]) -> list[list[Any]]:
@@ -205,6 +211,7 @@ def main() -> None:
     one.set_defaults(does=log)
     one = commands.add_parser("page")
     one.add_argument("lines", nargs="+", type=Path)
+    one.add_argument("--run", type=Path, help="a shift whose cycles are drawn for docs/cycle.md")
     one.add_argument("-o", "--output", type=Path, required=True)
     one.set_defaults(does=page)
     words = parser.parse_args()
