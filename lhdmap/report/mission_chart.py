@@ -24,6 +24,7 @@ _MOST_S = 900.0  # of a longer run its beginning: bars of single phases have to 
 _STRIP_IN, _LEGEND_IN = 1.9, 0.2
 _TEXT_SHARE = 0.0085  # of the strip's width, a letter
 _COLUMNS = 7
+_WIDEST, _NARROWER, _NARROWEST = 5.5, 0.7, 1.4
 _KNOWN = {str(phase): phase for phase in Phase}
 
 
@@ -56,19 +57,23 @@ def mission_chart(data: ReplayData) -> Figure:
 def _draw_plan(axes: Axes, data: ReplayData, spans: list[Span]) -> None:
     for line in data.lines_m:
         axes.plot(line[:, 0], line[:, 1], color=charts.INK, linewidth=0.7, alpha=0.5)
-    time_s, told = data.column("time_s"), set[str]()
+    time_s, states = data.column("time_s"), list(dict.fromkeys(span.state for span in spans))
+    told = set[str]()
     for span in spans:
         rows = np.flatnonzero((time_s >= span.from_s - 0.1) & (time_s <= span.to_s + 0.1))
         x, y = data.rows[rows, 1], data.rows[rows, 2]
         label = None if span.state in told else span.state
         told.add(span.state)
-        axes.plot(x, y, color=_colour(span.state), linewidth=2.4, alpha=0.85, label=label, solid_capstyle="round")
+        width = max(_WIDEST - _NARROWER * states.index(span.state), _NARROWEST)  # what lies under another is seen, too
+        axes.plot(x, y, color=charts.INK, linewidth=width + 0.7, alpha=0.5)  # pale phases are seen on white
+        axes.plot(x, y, color=_colour(span.state), linewidth=width, label=label, solid_capstyle="round")
     plan_axes(axes)
     charts.legend_above(axes, columns=_COLUMNS)
     if data.drive is not None and data.drive.topology is not None:
+        axes.apply_aspect()  # labels are placed on the page
         points = data.drive.topology.waypoints
         drawing.draw_marks(axes, [one.pose for one in points], "d", charts.INK, "", markersize=5)
-        drawing.draw_labels(axes, [(one.name, one.pose, 4.0) for one in points], [data.rows[:, 1:4]])
+        drawing.draw_labels(axes, [(one.name, one.pose, 4.0) for one in points], [data.rows[:, 1:4], *data.lines_m])
 
 
 def _draw_strip(axes: Axes, data: ReplayData, spans: list[Span], end_s: float) -> None:
