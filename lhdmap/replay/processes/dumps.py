@@ -21,7 +21,10 @@ BUSY, DONE, FAILED = "busy", "done", "failed"
 
 
 class Dumps(Process):
-    """Pedals each 20 ms while a task of dumping runs and the machine is armed; it waits while it is not."""
+    """Pedals each 20 ms while a task of dumping runs and the machine is armed; it waits while it is not.
+
+    What it dumps with has a clock that stands while it waits: a joint that rested is not at its stop.
+    """
 
     name, period_ns, latency_ns, priority = DUMPS, 20 * MILLISECOND_NS, 2 * MILLISECOND_NS, 20
     reads = (*SIGNAL_TOPICS, ORDERS, MACHINE_SAYS)
@@ -29,7 +32,7 @@ class Dumps(Process):
     def __init__(self, scribe: Scribe) -> None:
         self._dump, self._signals, self._scribe = Dump(), SignalFeed(), scribe
         self._task, self._wanted, self._armed = 0, 0, False
-        self._state, self._since_ns = "", 0
+        self._state, self._worked_ns = "", 0
 
     def step(self, now_ns: int, inbox: Sequence[Received]) -> Iterator[Outgoing]:
         """Take what has come; work the pedals where a bucket is to be emptied."""
@@ -39,20 +42,21 @@ class Dumps(Process):
         if signals is None or not self._wanted:
             return
         if self._wanted != self._task:
-            self._task, self._state, self._since_ns = self._wanted, BUSY, now_ns
-            self._dump.begin(signals._replace(now_ns=now_ns))
+            self._task, self._state, self._worked_ns = self._wanted, BUSY, 0
+            self._dump.begin(signals._replace(now_ns=0))
             self._scribe.goes(BUSY, "ordered", task=self._task)
         if self._state == BUSY:
             fresh = self._armed and now_ns - signals.now_ns <= _OLD_NS
-            if now_ns - self._since_ns > _MOST_NS:
+            if self._worked_ns > _MOST_NS:
                 self._ends(FAILED, "time limit")
             elif fresh:
-                turn = self._dump.step(signals._replace(now_ns=now_ns))
+                self._worked_ns += self.period_ns
+                turn = self._dump.step(signals._replace(now_ns=self._worked_ns))
                 p = turn.pedals
                 pedals = Command(now_ns, p.propel, 0.0, p.tilt, p.lift, p.full_rpm, p.brake)
                 yield Outgoing(PEDALS, Digs(pedals, np.zeros((0, 2))))
                 if turn.ended:
-                    self._ends(DONE, turn.ended)
+                    self._ends(DONE if turn.ended == "dumped" else FAILED, turn.ended)
         yield Outgoing(DUMPING, DumpingNow(now_ns, self._task, self._state))
 
     def _ends(self, state: str, cause: str) -> None:
