@@ -48,7 +48,7 @@ def mission_processes(scenario: Scenario, parts: Parts, given: Autonomous, journ
         Executive(executive, orders, topology, 1e-3 * full_kg, journal.of(EXECUTIVE)),
         OrderedNavigation(navigation, journal.of(NAVIGATION)),
         Loads(task_of(scenario.loading, settings, machine), None, journal.of(LOADS)),
-        Dumps(journal.of(DUMPS)),
+        Dumps(journal.of(DUMPS), machine.linkage),
         Guide(guidance, settings.executor.jumps, journal.of(GUIDANCE), models=models),
         Execute(control, machine, given.mode, journal.of(EXECUTOR), models=models),
         Station(scenario.wanted_modes, scenario.rearm_s, scenario.assist_s, journal.of(Station.name), scenario.assists),

@@ -38,7 +38,7 @@ class LoadTally:
             self._fill_true = self._load_kg / self._full_kg
 
     def verdict(self) -> dict[str, Any]:
-        """Return what `verdict.json` says of the loading; `fill_true` is the simulator's."""
+        """Return what `verdict.json` says of the loading; `fill_true`, and what is left in the bucket, are the simulator's."""
         return {
             "attempts": self.attempts,
             "fill": _known(self.fill),
@@ -46,6 +46,7 @@ class LoadTally:
             "charges": self.charges,
             "early_triggers": int(self.early_triggers),
             "fill_true": _known(self._fill_true),
+            "left_true_t": 1e-3 * self._load_kg,
         }
 
 

@@ -7,6 +7,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from lhdmap.loading.dump import Dump
+from lhdmap.machine_sections import Linkage
 from lhdmap.messages import Command
 from lhdmap.replay.journal import Scribe
 from lhdmap.replay.process import DUMPING, MACHINE_SAYS, MILLISECOND_NS, ORDERS, PEDALS, Outgoing, Process, Received
@@ -15,7 +16,7 @@ from lhdmap.replay.processes.told import Digs, DumpingNow
 from lhdmap.simulation.history import SECOND_NS
 
 DUMPS = "dumping"
-_MOST_NS = 60 * SECOND_NS
+_MOST_NS = 90 * SECOND_NS
 _OLD_NS = 300 * MILLISECOND_NS
 BUSY, DONE, FAILED = "busy", "done", "failed"
 
@@ -29,8 +30,8 @@ class Dumps(Process):
     name, period_ns, latency_ns, priority = DUMPS, 20 * MILLISECOND_NS, 2 * MILLISECOND_NS, 20
     reads = (*SIGNAL_TOPICS, ORDERS, MACHINE_SAYS)
 
-    def __init__(self, scribe: Scribe) -> None:
-        self._dump, self._signals, self._scribe = Dump(), SignalFeed(), scribe
+    def __init__(self, scribe: Scribe, linkage: Linkage | None = None) -> None:
+        self._dump, self._signals, self._scribe = Dump(linkage), SignalFeed(), scribe
         self._task, self._wanted, self._armed = 0, 0, False
         self._state, self._worked_ns = "", 0
 
