@@ -26,8 +26,8 @@ def run(
 ) -> tuple[list[tuple[float, float]], str]:
     """Dump; returns boom and bucket angles over time, and how it ended.
 
-    Once the bucket is below `old_from_rad`, joints tell what they told then for `old_s` seconds. With its floor below `tips_rad` it
-    is empty.
+    Once the bucket is below `old_from_rad`, joints tell what they told then for `old_s` seconds. With its floor below `tips_rad`
+    it is empty.
     """
     dump, boom, bucket, now_ns, ways = Dump(), 0.2, 0.0, 0, list[tuple[float, float]]()
     said = Signals(0, 0.0, 0.0, 0, 0.0, boom, bucket, 0.0, 20.0, FULL_BAR, 10.0)
