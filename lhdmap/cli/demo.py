@@ -93,7 +93,7 @@ def demo_text(demo: Demo, wall_s: float) -> str:
 def _cycle_text(demo: Demo) -> str:
     """Return what the machine did in the mine."""
     told = demo.cycle.verdict
-    done = f"{told['cycles']} bucket of {told['tonnes']:.1f} t" if told["cycles"] else "no bucket"
+    done = f"{told['cycles']} bucket of {told['tonnes']:.1f} t" if told.get("cycles") else "no bucket"
     took = f"{told['distance_m']:.0f} m in {told['duration_s']:.0f} s, {told['realtime_factor']:.1f} x real time"
     return f"cycle       {told['reason']}: {done} from draw point to dump by itself, {took}"
 
