@@ -72,7 +72,7 @@ def test_a_crowd_does_not_carry_the_pose_away() -> None:
     """Three quarters of the beams hidden over 9 m, other people in each scan: without the wheels' word it ended 6 to 10 m off."""
     poses, scans = drive()
     ends, turns = [], []
-    for seed in range(8):
+    for seed in range(5):
         rng = np.random.default_rng(seed)
         mixed = [crowded(scan, rng, 0.75) if 15 <= k < 45 else scan for k, scan in enumerate(scans)]
         off = errors(run(mixed, wheels(poses, rng)), poses)

@@ -21,7 +21,6 @@ from tests.odometry.planar_drives import (
     drive,
     run,
     scans_at,
-    segment_errors_pct,
     world,
 )
 
@@ -36,7 +35,7 @@ def rough() -> Driven:
 
 def test_default_over_ten_metres(rough: Driven) -> None:
     """The figure over three worlds of 180 m is in evaluation/odometry.md: 0.02 %."""
-    assert segment_errors_pct(rough).mean() < 0.05
+    assert rough.segments().translation_pct < 0.05
     assert rough.distance_m[-1] < 0.05
     assert abs(math.degrees(rough.errors[-1, 2])) < 0.1
     assert np.mean([step.degenerate for step in rough.steps if step.processed]) < 0.1
@@ -45,7 +44,7 @@ def test_default_over_ten_metres(rough: Driven) -> None:
 
 def test_range_flow_over_ten_metres() -> None:
     poses, scans = drive()
-    assert segment_errors_pct(run(scans, poses, "range_flow")).mean() < 0.15
+    assert run(scans, poses, "range_flow").segments().translation_pct < 0.15
 
 
 def test_a_smooth_drive_is_flagged_and_bounded() -> None:
@@ -54,7 +53,7 @@ def test_a_smooth_drive_is_flagged_and_bounded() -> None:
     processed = [step for step in driven.steps if step.processed]
     assert np.mean([step.degenerate for step in processed]) > 0.2  # the ends of this short drift are in sight
     assert {step.substitute for step in processed if step.degenerate} == {"motion"}
-    assert segment_errors_pct(driven).max() < 5.0
+    assert driven.segments().worst_pct < 5.0
 
 
 def test_a_step_says_what_it_stands_for(rough: Driven) -> None:
@@ -159,7 +158,7 @@ def test_half_of_the_beams_behind_a_person(first: int) -> None:
     assert not (grown & ~doubtful).any()
     assert driven.distance_m.max() <= 1.2 * 75 * 3.3 / RATE_HZ  # never further off than what was driven meanwhile
     after = driven._replace(estimate=driven.estimate[first + 85 :], truth=driven.truth[first + 85 :])
-    assert segment_errors_pct(after, 4.0).mean() < 0.5
+    assert np.median(after.segments(4.0).translations_m) < 0.02
 
 
 def test_a_jump_of_what_the_log_left_out() -> None:

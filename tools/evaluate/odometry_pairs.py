@@ -6,6 +6,7 @@ import time
 from collections.abc import Iterator, Sequence
 
 import numpy as np
+from lhdmap.evaluation.planar_segments import planar_segments
 from lhdmap.geometry import se2
 from lhdmap.messages import FloatArray, LaserScan
 from lhdmap.odometry.flow_scan import Pyramid
@@ -26,7 +27,6 @@ from tools.evaluate.worlds import (
     odometry,
     run,
     scans_of,
-    segments,
     world_of,
 )
 
@@ -182,7 +182,7 @@ def peer_rows(seeds: Sequence[int]) -> Iterator[Figure]:
             errors = []
             for seed in seeds:
                 truth, scans = scans_of(Drive(seed, rms_m=rms_m))
-                found = segments(aligned(method(scans), truth), truth)
+                found = planar_segments(aligned(method(scans), truth), truth)
                 errors.append(found.translation_pct)
             yield Figure(
                 group, f"{name}, {walls}", float(np.mean(errors)), "%", note=", ".join(f"{e:.3f}" for e in errors)
