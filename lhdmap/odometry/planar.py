@@ -9,17 +9,17 @@ from typing import NamedTuple
 import numpy as np
 
 from lhdmap.messages import FloatArray, LaserScan
-from lhdmap.odometry.anchored import AnchoredMatcher
+from lhdmap.odometry.anchored.matcher import AnchoredMatcher
+from lhdmap.odometry.anchored.rear_view import NO_POINTS, NOTHING_BEHIND, Behind, RearView, behind
 from lhdmap.odometry.clock import ScanClock
-from lhdmap.odometry.flow_matcher import FlowMatcher
-from lhdmap.odometry.gyro_turn import GyroTurn
 from lhdmap.odometry.motion import Motion
-from lhdmap.odometry.rear_view import NO_POINTS, NOTHING_BEHIND, Behind, RearView, behind
+from lhdmap.odometry.range_flow.matcher import FlowMatcher
 from lhdmap.odometry.settings import AnchorSettings, OdometrySettings, RangeFlowSettings, SearchSettings
 from lhdmap.odometry.step_covariance import StepErrors
 from lhdmap.odometry.steps import Matched, OdometryStep, WheelStep
 from lhdmap.odometry.trust_settings import TrustSettings
-from lhdmap.odometry.wheel_model import WheelModel
+from lhdmap.odometry.wheels.gyro import GyroTurn
+from lhdmap.odometry.wheels.model import WheelModel
 from lhdmap.scan_matching.information import body_information, inflated, marginal_information
 from lhdmap.scan_matching.scan_points import NO_BOXES, half_sweep_ns, planar_points
 from lhdmap.scan_matching.slant import NO_RISE

@@ -22,9 +22,9 @@ from lhdmap.messages import (
     Tachometer,
     WheelPose,
 )
-from lhdmap.odometry.cloud_motion import CloudPrior
+from lhdmap.odometry.anchored.rear_view import RearView
+from lhdmap.odometry.cloud.motion import CloudPrior
 from lhdmap.odometry.planar import View
-from lhdmap.odometry.rear_view import RearView
 from lhdmap.odometry.start import ScanInput
 from lhdmap.odometry.steps import WheelStep
 from lhdmap.pipeline.mounts import Mounts, level_sensor

@@ -8,10 +8,10 @@ from itertools import pairwise
 import numpy as np
 import pytest
 from lhdmap.messages import FloatArray
-from lhdmap.odometry.jump import jump
+from lhdmap.odometry.anchored.jump import jump
 from lhdmap.odometry.motion import FORWARD, TURNING, Motion
 from lhdmap.odometry.settings import OdometrySettings, SearchSettings
-from lhdmap.odometry.wheel_model import WheelModel
+from lhdmap.odometry.wheels.model import WheelModel
 from lhdmap.scan_matching.matching import Hits, Match, MatchModel, Prior
 from lhdmap.scan_matching.search import SearchGrid
 from lhdmap.scan_matching.submap import Submap

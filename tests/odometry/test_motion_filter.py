@@ -12,7 +12,7 @@ from lhdmap.messages import FloatArray
 from lhdmap.odometry import motion_filter
 from lhdmap.odometry.motion import FORWARD, TURNING, Motion
 from lhdmap.odometry.settings import OdometrySettings
-from lhdmap.odometry.wheel_gate import WheelGate
+from lhdmap.odometry.wheels.gate import WheelGate
 
 ACCELERATION = np.array([0.7, 0.1, 1.0])
 

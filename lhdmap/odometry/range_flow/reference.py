@@ -9,9 +9,9 @@ import numpy as np
 
 from lhdmap.geometry import se2
 from lhdmap.messages import FloatArray
-from lhdmap.odometry.flow_scan import Pyramid
 from lhdmap.odometry.motion import Motion
-from lhdmap.odometry.range_flow import flow
+from lhdmap.odometry.range_flow.flow import flow
+from lhdmap.odometry.range_flow.scan import Pyramid
 from lhdmap.odometry.settings import RangeFlowSettings
 from lhdmap.scan_matching.information import body_information
 

@@ -10,7 +10,7 @@ from lhdmap.geometry import se2
 from lhdmap.messages import FloatArray
 from lhdmap.odometry.motion import Motion
 from lhdmap.odometry.settings import SearchSettings
-from lhdmap.odometry.wheel_model import WheelModel
+from lhdmap.odometry.wheels.model import WheelModel
 from lhdmap.scan_matching.matching import Hits, Match, Prior
 from lhdmap.scan_matching.submap import Submap
 

@@ -14,7 +14,7 @@ import numpy.typing as npt
 
 from lhdmap.geometry import se3
 from lhdmap.messages import FloatArray
-from lhdmap.odometry.cloud_motion import exp, log, orthonormal
+from lhdmap.odometry.cloud.motion import exp, log, orthonormal
 
 _SHIFT, _BITS = 1 << 20, 21
 _CUTOFF = 3.0  # sigmas beyond which a point has no weight

@@ -6,7 +6,7 @@ a scanner that moves with (v_x, v_y, w) in its own frame,
     (cos th + R_th sin th / r) v_x + (sin th - R_th cos th / r) v_y - R_th w + R_t = 0
 
 The scanner is the origin, so the term x sin th - y cos th of the general form is zero; mounts are applied outside. What
-differs from the published method: gradients are least squares lines over a width in metres (`flow_scan`); scans are warped
+differs from the published method: gradients are least squares lines over a width in metres (`scan`); scans are warped
 exactly, as chains of wall segments, and in both directions, so that the estimate does not lock to the beams' spacing.
 """
 
@@ -20,8 +20,8 @@ import numpy as np
 
 from lhdmap.geometry import se2
 from lhdmap.messages import FloatArray
-from lhdmap.odometry.flow_rows import ROWS, SUMS, add_up, add_up_noise, warp
-from lhdmap.odometry.flow_scan import Pyramid
+from lhdmap.odometry.range_flow.rows import ROWS, SUMS, add_up, add_up_noise, warp
+from lhdmap.odometry.range_flow.scan import Pyramid
 from lhdmap.scan_matching.matching import solve3
 
 _FEWEST_BEAMS = 12

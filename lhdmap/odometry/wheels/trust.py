@@ -10,7 +10,7 @@ from collections import deque
 
 import numpy as np
 
-from lhdmap.odometry.stretch import Compared
+from lhdmap.odometry.wheels.stretch import Compared
 
 _AGREES = (0.75, 1.33)  # wheels' way over that of the walls: worn wheels are off by 15 % (ACES), slipping ones by more
 _MEMORY_M = 3.0

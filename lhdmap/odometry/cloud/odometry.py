@@ -9,11 +9,11 @@ import numpy as np
 
 from lhdmap.geometry import se3
 from lhdmap.messages import FloatArray, PointCloud
-from lhdmap.odometry.cloud_matchers import Cloud, CloudMatcher, KissMatcher, Prediction, VgicpMatcher, prepare
-from lhdmap.odometry.cloud_motion import CloudMotion, CloudPrior, exp
-from lhdmap.odometry.cloud_planes import PlaneFit
-from lhdmap.odometry.cloud_settings import CloudOdometrySettings
-from lhdmap.odometry.cloud_sweep import Sweep, middle_s, sweep_of
+from lhdmap.odometry.cloud.matchers import Cloud, CloudMatcher, KissMatcher, Prediction, VgicpMatcher, prepare
+from lhdmap.odometry.cloud.motion import CloudMotion, CloudPrior, exp
+from lhdmap.odometry.cloud.planes import PlaneFit
+from lhdmap.odometry.cloud.settings import CloudOdometrySettings
+from lhdmap.odometry.cloud.sweep import Sweep, middle_s, sweep_of
 from lhdmap.scan_matching.scan_points import NO_BOXES
 
 _FIRST_CLOUDS = 10

@@ -12,7 +12,7 @@ import math
 
 import numpy as np
 
-from lhdmap.odometry.stretch import Compared
+from lhdmap.odometry.wheels.stretch import Compared
 
 _EDGES_RAD = math.radians(1.0)  # at both ends of a stretch the wheels are late or early
 _WANDER_PER_SQRT_M = 1e-4

@@ -13,9 +13,9 @@ import numpy as np
 
 from lhdmap.geometry import se3
 from lhdmap.messages import FloatArray
-from lhdmap.odometry.cloud_motion import exp, log, orthonormal
-from lhdmap.odometry.cloud_planes import PlaneFit, PlaneMap, PlaneNoise
-from lhdmap.odometry.cloud_settings import CloudOdometrySettings
+from lhdmap.odometry.cloud.motion import exp, log, orthonormal
+from lhdmap.odometry.cloud.planes import PlaneFit, PlaneMap, PlaneNoise
+from lhdmap.odometry.cloud.settings import CloudOdometrySettings
 
 _NEIGHBOURS = 20
 _LEAST_POINTS = 100

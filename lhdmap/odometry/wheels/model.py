@@ -21,12 +21,12 @@ from lhdmap.geometry import se2
 from lhdmap.messages import FloatArray
 from lhdmap.odometry.motion import FORWARD, TURNING, Motion
 from lhdmap.odometry.settings import OdometrySettings
-from lhdmap.odometry.stale import StaleWheels
 from lhdmap.odometry.steps import Matched, WheelStep
-from lhdmap.odometry.stretch import Stretch
-from lhdmap.odometry.wheel_gate import WheelGate
-from lhdmap.odometry.wheel_trust import WheelTrust
-from lhdmap.odometry.wheel_turn import WheelTurn
+from lhdmap.odometry.wheels.gate import WheelGate
+from lhdmap.odometry.wheels.stale import StaleWheels
+from lhdmap.odometry.wheels.stretch import Stretch
+from lhdmap.odometry.wheels.trust import WheelTrust
+from lhdmap.odometry.wheels.turn import WheelTurn
 
 _SHORTEST_STEP_S = 1e-3
 _BOTH_WAYS_M = 0.03

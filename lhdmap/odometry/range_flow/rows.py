@@ -9,7 +9,7 @@ import math
 
 import numba as nb
 
-from lhdmap.odometry.flow_scan import BEND, GAIN, SLOPE, WALL, X, Y
+from lhdmap.odometry.range_flow.scan import BEND, GAIN, SLOPE, WALL, X, Y
 
 CAUCHY_SIGMAS = 3.0
 # Parts of the squared slope and of the mean square about the wall's line by which a residual's variance grows: grazing

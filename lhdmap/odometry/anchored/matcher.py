@@ -8,14 +8,14 @@ import numpy as np
 
 from lhdmap.geometry import se2
 from lhdmap.messages import FloatArray
-from lhdmap.odometry.flow_reference import FlowReference, compare, scanner_pyramid
-from lhdmap.odometry.jump import NOTHING_OWED, jump, left_by
+from lhdmap.odometry.anchored.jump import NOTHING_OWED, jump, left_by
+from lhdmap.odometry.anchored.rear_view import NO_POINTS, NOTHING_BEHIND, Behind, JointOffset
 from lhdmap.odometry.motion import Motion
-from lhdmap.odometry.rear_view import NO_POINTS, NOTHING_BEHIND, Behind, JointOffset
+from lhdmap.odometry.range_flow.reference import FlowReference, compare, scanner_pyramid
 from lhdmap.odometry.settings import AnchorSettings, OdometrySettings, RangeFlowSettings, SearchSettings
 from lhdmap.odometry.step_covariance import direction_noise
 from lhdmap.odometry.steps import BY_DEFINITION, Matched
-from lhdmap.odometry.wheel_model import WheelModel
+from lhdmap.odometry.wheels.model import WheelModel
 from lhdmap.scan_matching.information import marginal_information
 from lhdmap.scan_matching.matching import Hits, Match, MatchModel, Prior
 from lhdmap.scan_matching.search import SearchGrid

@@ -13,7 +13,7 @@ import numpy as np
 
 from lhdmap.geometry import se3
 from lhdmap.messages import FloatArray
-from lhdmap.odometry.cloud_settings import CloudOdometrySettings
+from lhdmap.odometry.cloud.settings import CloudOdometrySettings
 
 _GATE_SIGMAS = 4.0
 _LONGEST_STEP_S = 3.0
