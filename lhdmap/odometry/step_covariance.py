@@ -13,8 +13,9 @@ from lhdmap.messages import FloatArray
 from lhdmap.odometry.steps import Matched
 from lhdmap.odometry.trust_settings import TrustSettings
 from lhdmap.scan_matching.information import body_information
-from lhdmap.scan_matching.matching import line_weight, slanted
 from lhdmap.scan_matching.step_error import StepError
+from lhdmap.scan_matching.surface_map import CELLS, CENTRE_X, CENTRE_Y, NORMAL_X, NORMAL_Y, SCATTER, SERVED
+from lhdmap.scan_matching.wall_lines import line_weight, slanted
 
 # Variance of the cells along a line, in squares of a cell: a Gaussian of two cells' deviation, cut off at three.
 _SPREAD_CELLS2 = 2.2
@@ -114,15 +115,15 @@ def direction_noise(pose, hits, lines, fine_m, model):  # type: ignore[no-untype
     c, s = math.cos(pose[2]), math.sin(pose[2])
     points, total, row = hits.points, np.zeros((3, 3)), np.zeros(3)
     for i in range(points.shape[0]):
-        if lines[i, 6] == 0.0:
+        if lines[i, SERVED] == 0.0:
             continue
         rx, ry = c * points[i, 0] - s * points[i, 1], s * points[i, 0] + c * points[i, 1]
-        nx, ny = lines[i, 2], lines[i, 3]
+        nx, ny = lines[i, NORMAL_X], lines[i, NORMAL_Y]
         towards = nx * rx + ny * ry
-        d = nx * (pose[0] + rx - lines[i, 0]) + ny * (pose[1] + ry - lines[i, 1])
+        d = nx * (pose[0] + rx - lines[i, CENTRE_X]) + ny * (pose[1] + ry - lines[i, CENTRE_Y])
         d += slanted(hits, i, lines[i], c, s, nx, ny)
         _, w = line_weight(lines[i], d * d, towards * towards / (rx * rx + ry * ry + 1e-12), fine_m, model)
-        angle2 = lines[i, 4] / (lines[i, 5] * _SPREAD_CELLS2 * lines[i, 6] ** 2)
+        angle2 = lines[i, SCATTER] / (lines[i, CELLS] * _SPREAD_CELLS2 * lines[i, SERVED] ** 2)
         row[0], row[1], row[2] = -ny, nx, ny * ry + nx * rx
         for a in range(3):
             for b in range(3):

@@ -22,7 +22,7 @@ from lhdmap.geometry import se2
 from lhdmap.messages import FloatArray
 from lhdmap.odometry.range_flow.rows import ROWS, SUMS, add_up, add_up_noise, warp
 from lhdmap.odometry.range_flow.scan import Pyramid
-from lhdmap.scan_matching.matching import solve3
+from lhdmap.scan_matching.equations import solve3
 
 _FEWEST_BEAMS = 12
 _CONVERGED_M = 5e-4  # a quarter of a pair's error: measured, stopping later gains nothing
