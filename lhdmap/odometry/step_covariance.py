@@ -20,15 +20,16 @@ from lhdmap.scan_matching.wall_lines import line_weight, slanted
 # Variance of the cells along a line, in squares of a cell: a Gaussian of two cells' deviation, cut off at three.
 _SPREAD_CELLS2 = 2.2
 _MOST_NOISE = 2.0  # share of noise: lines of few cells make it larger than all that the scan tells
+# Lever of a scan's hits: how far away the walls are whose noise turns it. The settings were measured at the usual one; beyond
+# the limits none was.
 _USUAL_LEVER_M, _LEAST_LEVER_M, _LONGEST_LEVER_M = 5.0, 3.0, 50.0
-_LEVER_POWER = 1.5
+_LEVER_POWER = 1.5  # with which the walk falls as the lever grows: fitted, as the settings of `TrustSettings`
 _OF_PAIRS = 0.24  # share of noise where scans are compared in pairs: each link of the chain adds its error
-_SECOND = 2
-_NOTHING = np.zeros((3, 3))
+_SECOND = 2  # scan of a drive: it is placed against one scan alone
+_NOTHING = np.zeros((3, 3))  # covariance of a scan that adds none
 _LITTLE = np.diag([1e-3, 1e-3, 1e-3])  # information of no scan
-_SWAY = np.diag(
-    [0.0, 0.0035**2, 0.0]
-)  # of a tilted scanner: noise of the roll shifts what it sees of the walls sideways
+# Of a tilted scanner: noise of the roll shifts what it sees of the walls sideways.
+_SWAY = np.diag([0.0, 0.0035**2, 0.0])
 
 
 class StepErrors:

@@ -13,8 +13,9 @@ from hypothesis.extra import numpy as hnp
 from lhdmap.geometry import se3
 from lhdmap.messages import Float32Array, FloatArray, PointCloud
 from lhdmap.odometry.cloud.motion import CloudPrior, exp, log
-from lhdmap.odometry.cloud.odometry import CloudOdometry, CloudStep, marginal_information
+from lhdmap.odometry.cloud.odometry import CloudOdometry
 from lhdmap.odometry.cloud.settings import CloudOdometrySettings
+from lhdmap.odometry.cloud.steps import CloudStep, marginal_information
 from lhdmap.odometry.cloud.sweep import Sweep, sweep_of
 from lhdmap.simulation.sections import DriftSettings
 

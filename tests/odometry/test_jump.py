@@ -1,4 +1,4 @@
-"""Jumps: what the motion did not foretell is found all around; a pose that wheels speak against must be far better."""
+"""Jumps: what the motion did not predict is found all around; a pose that wheels speak against must be far better."""
 
 from __future__ import annotations
 
@@ -101,7 +101,7 @@ def test_a_jump_back_to_where_the_wheels_lead_is_cheap(walls: Submap) -> None:
     close = walls.align(hits, prior)._replace(pose=predicted, support=0.82)
     wide, back = SearchSettings(), TRUE - predicted
     assert jump(walls, hits, close, prior, *wheeled(), wide) is None
-    found = jump(walls, hits, close, prior, *wheeled(), wide, owed=-back)
+    found = jump(walls, hits, close, prior, *wheeled(), wide, offset=-back)
     assert found is not None
     assert np.hypot(*(found.pose - TRUE)[:2]) < 0.01
 

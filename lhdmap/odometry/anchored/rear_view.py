@@ -19,12 +19,12 @@ from lhdmap.scan_matching.scan_points import planar_points
 from lhdmap.scan_matching.surface_map import CENTRE_X, CENTRE_Y, NORMAL_X, NORMAL_Y, SERVED
 from lhdmap.scan_matching.wall_lines import line_weight, slanted
 
-NO_POINTS = np.zeros((0, 3))
-_FIRST_STD_RAD = math.radians(0.2)
+NO_POINTS = np.zeros((0, 3))  # hits of no scan
+_FIRST_STD_RAD = math.radians(0.2)  # how far an encoder's zero is off: an installer's
 _SPREAD_RAD = 0.01  # of one comparison of joint and map: the map's own bend, alike for many scans, not the scan's noise
-_WANDER_RAD = 1e-4
-_OWN_ZERO = 0.1
-_FEWEST_INFORMATION = 1e4  # 1/rad²
+_WANDER_RAD = 1e-4  # by scan: so that it follows a joint that wears
+_OWN_ZERO = 0.1  # of the offset that the encoder's own zero takes back in each update
+_FEWEST_INFORMATION = 1e4  # 1/rad², 0.6°: a scan that tells less tells only its noise
 
 
 class RearView(NamedTuple):
@@ -47,7 +47,7 @@ class Behind(NamedTuple):
     joint_x_m: float
 
 
-NOTHING_BEHIND = Behind(NO_POINTS, 0.0)
+NOTHING_BEHIND = Behind(NO_POINTS, 0.0)  # where no rear scanner helps
 
 
 def behind(view: RearView, velocity: FloatArray, height_m: float, floor_m: float, most: int) -> Behind:

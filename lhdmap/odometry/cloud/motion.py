@@ -15,10 +15,16 @@ from lhdmap.geometry import se3
 from lhdmap.messages import FloatArray
 from lhdmap.odometry.cloud.settings import CloudOdometrySettings
 
-_GATE_SIGMAS = 4.0
-_LONGEST_STEP_S = 3.0
-_GAP_VARIANCE = np.diag([0.01, 0.01, 0.5, 4.0, 0.1, 0.1])
-_JUMP_VARIANCE = np.diag([1e-4] * 3 + [1e-2] * 3)
+_GATE_SIGMAS = 4.0  # wheels that are farther off than one in ten thousand by chance slip
+_LONGEST_STEP_S = 3.0  # a machine brakes to rest within it: after a longer gap the old velocity says little
+_GAP_VARIANCE = np.diag(
+    [0.01, 0.01, 0.5, 4.0, 0.1, 0.1]
+)  # of the velocity after a gap, as in the plane; hardly any tilt
+_JUMP_VARIANCE = np.diag(
+    [1e-4] * 3 + [1e-2] * 3
+)  # of the pose after a jump: half a degree, 10 cm, what one match gives
+# Of pose and velocity at the start: the pose defines `odom`, the machine may drive already (3 m/s, 0.7 rad/s).
+_STARTING_VARIANCES = [1e-10] * 3 + [1e-8] * 3 + [0.05, 0.05, 0.5, 9.0, 0.25, 0.05]
 _PLANAR = [3, 4, 2]  # forward, lateral, heading as components of a twist
 
 
@@ -104,7 +110,7 @@ class CloudMotion:
         self._tilt_variance = math.radians(s.tilt_sigma_deg) ** 2
         self.pose: FloatArray = np.eye(4)
         self.twist: FloatArray = np.zeros(6)
-        self.P: FloatArray = np.diag([1e-10] * 3 + [1e-8] * 3 + [0.05, 0.05, 0.5, 9.0, 0.25, 0.05])
+        self.P: FloatArray = np.diag(_STARTING_VARIANCES)
 
     @property
     def prior_information(self) -> FloatArray:

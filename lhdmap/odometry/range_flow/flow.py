@@ -24,9 +24,10 @@ from lhdmap.odometry.range_flow.rows import ROWS, SUMS, add_up, add_up_noise, wa
 from lhdmap.odometry.range_flow.scan import Pyramid
 from lhdmap.scan_matching.equations import solve3
 
-_FEWEST_BEAMS = 12
+_FEWEST_BEAMS = 12  # equations: four for each unknown
 _CONVERGED_M = 5e-4  # a quarter of a pair's error: measured, stopping later gains nothing
-_REWEIGHTINGS = 4  # on one warp
+_REWEIGHTINGS = 4  # on one warp at most
+_LEAST_SCALE = 0.25  # of the variances: a scan against itself has no residuals, and no scale
 _HEADING_ARM_M = 4.0  # by which a turn counts as a step
 
 
@@ -90,7 +91,7 @@ def _solve(reference, current, start, guess, prior_information, noise_m, iterati
             weights, squares = _normal_equations(table, middle, end, turn, twist, scale, H, b)
             change = solve3(H + prior_information, b + toward) - twist
             twist += change
-            scale = max(squares / max(weights, 1.0), 0.25)
+            scale = max(squares / max(weights, 1.0), _LEAST_SCALE)
             if _size_m(change) < _CONVERGED_M:
                 break
         pose = se2.compose(twist, pose)

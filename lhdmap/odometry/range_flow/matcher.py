@@ -18,7 +18,7 @@ from lhdmap.odometry.range_flow.scan import Pyramid
 from lhdmap.odometry.settings import OdometrySettings, RangeFlowSettings
 from lhdmap.odometry.steps import BY_DEFINITION, Matched
 
-_FEWEST_HITS = 12
+_FEWEST_HITS = 12  # as many as one comparison needs at least (`flow`)
 
 
 class FlowMatcher:
