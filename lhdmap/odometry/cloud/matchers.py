@@ -12,8 +12,8 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 
 from lhdmap.geometry import se3
+from lhdmap.geometry.twist import exp, log, orthonormal
 from lhdmap.messages import FloatArray
-from lhdmap.odometry.cloud.motion import exp, log, orthonormal
 from lhdmap.odometry.cloud.planes import PlaneFit, PlaneMap, PlaneNoise
 from lhdmap.odometry.cloud.settings import CloudOdometrySettings
 

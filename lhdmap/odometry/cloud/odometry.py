@@ -8,9 +8,10 @@ from typing import NamedTuple
 import numpy as np
 
 from lhdmap.geometry import se3
+from lhdmap.geometry.twist import exp
 from lhdmap.messages import FloatArray, PointCloud
 from lhdmap.odometry.cloud.matchers import Cloud, CloudMatcher, KissMatcher, Prediction, VgicpMatcher, prepare
-from lhdmap.odometry.cloud.motion import CloudMotion, CloudPrior, exp
+from lhdmap.odometry.cloud.motion import CloudMotion, CloudPrior
 from lhdmap.odometry.cloud.planes import PlaneFit
 from lhdmap.odometry.cloud.settings import CloudOdometrySettings
 from lhdmap.odometry.cloud.steps import CloudStep, marginal_information, starts_along, travel_m, turn_rad

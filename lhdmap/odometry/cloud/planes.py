@@ -13,8 +13,8 @@ import numpy as np
 import numpy.typing as npt
 
 from lhdmap.geometry import se3
+from lhdmap.geometry.twist import exp, log, orthonormal
 from lhdmap.messages import FloatArray
-from lhdmap.odometry.cloud.motion import exp, log, orthonormal
 
 _SHIFT, _BITS = 1 << 20, 21  # a cell's place in a key of 63 bits: a million cells to each side
 _CUTOFF = 3.0  # sigmas beyond which a point has no weight

@@ -7,8 +7,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from lhdmap.geometry.twist import exp
 from lhdmap.messages import FloatArray
-from lhdmap.odometry.cloud.motion import exp
 
 _TURNS_DEG = (10.0, -10.0, 20.0, -20.0)  # tried where the prediction failed: half of it is within reach of a match
 
