@@ -22,7 +22,7 @@ from lhdmap.loading.weighing_settings import AttemptSettings, WeighingSettings
 from lhdmap.localization.settings import LocalizationSettings
 from lhdmap.movement.settings import MovementSettings
 from lhdmap.navigation.settings import NavigationSettings
-from lhdmap.odometry.cloud_settings import CloudOdometrySettings
+from lhdmap.odometry.cloud.settings import CloudOdometrySettings
 from lhdmap.odometry.settings import AnchorSettings, OdometrySettings, RangeFlowSettings, SearchSettings
 from lhdmap.odometry.trust_settings import TrustSettings
 from lhdmap.pile.figure9_settings import Figure9Constants, RepairedConstants

@@ -14,8 +14,9 @@ import numba as nb
 import numpy as np
 import numpy.typing as npt
 
+from lhdmap.geometry.articulated import T_base_rear
 from lhdmap.integration.beams import BeamTable
-from lhdmap.integration.self_filter import Rig, base_to_rear, body_poses, in_boxes
+from lhdmap.integration.self_filter import Rig, body_poses, in_boxes
 from lhdmap.messages import Float32Array, FloatArray
 
 
@@ -81,7 +82,7 @@ class _Arc(NamedTuple):
 def sensor_pose(T_map_base: FloatArray, articulation_rad: float, rig: Rig) -> FloatArray:
     """Return T_map_sensor, shape (4, 4)."""
     if rig.on_rear:
-        return T_map_base @ base_to_rear(articulation_rad, rig.L_f_m, rig.L_r_m) @ rig.T_parent_sensor
+        return T_map_base @ T_base_rear(articulation_rad, rig.L_f_m, rig.L_r_m) @ rig.T_parent_sensor
     return T_map_base @ rig.T_parent_sensor
 
 

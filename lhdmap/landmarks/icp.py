@@ -16,7 +16,7 @@ import numpy as np
 from lhdmap.geometry import se2
 from lhdmap.landmarks.target import REACH_M, IcpModel, Target, bearing, counterpart, distance2, prepare
 from lhdmap.messages import Float32Array, FloatArray
-from lhdmap.scan_matching.matching import solve3
+from lhdmap.scan_matching.equations import solve3
 
 _ROUNDS, _POINT_ROUNDS, _WIDE_ROUNDS, _TRIED = 30, 60, 4, 3  # points slide along a wall slowly
 _NARROWING = 0.85  # of the gate, each round

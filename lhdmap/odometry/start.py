@@ -17,10 +17,11 @@ from lhdmap.odometry.planar import Placement, PlanarOdometry, View
 from lhdmap.odometry.steps import OdometryStep, WheelStep
 
 _SPAN_SCANS = 6  # the starting speed is the mean over so many scans
-_LONGEST_SPAN_S = 1.0
+_LONGEST_SPAN_S = 1.0  # over more the speed of a machine changes
 _WEAK_SHARE = 0.2  # of scans from which the walls are smooth: other speeds are tried, too
 _NO_RESIDUAL_M = 1e-6  # of scans without noise
-_SPEEDS_MPS = (0.0, 2.0, -2.0, 4.0, 6.0)
+_SPEEDS_MPS = (0.0, 2.0, -2.0, 4.0, 6.0)  # tried: what loaders drive, mostly forward
+_FEWEST_SCANS = 3  # two tell one step, which noise may be
 _DRY_SCANS = 25  # of a run where walls hold; smooth ones want all there are
 
 
@@ -38,7 +39,7 @@ Maker = Callable[[FloatArray | None], PlanarOdometry]  # takes a starting veloci
 
 def starting_velocity(make: Maker, inputs: Sequence[ScanInput]) -> FloatArray | None:
     """Return forward, lateral and turning speed (3,) at the first scan, or None where the scans do not show it."""
-    if len(inputs) < 3:
+    if len(inputs) < _FEWEST_SCANS:
         return None
     all_inputs, inputs = inputs, inputs[:_DRY_SCANS]
     steps = _run(make(None), inputs)

@@ -15,7 +15,7 @@ import numpy.typing as npt
 
 from lhdmap.integration.normals import estimate_normals
 from lhdmap.messages import FloatArray
-from lhdmap.pile.figure9_fit import plane_inclination_deg, robust_plane, voxelised
+from lhdmap.pile.figure9_fit import face_plane, plane_inclination_deg, voxelised
 from lhdmap.pile.figure9_settings import Figure9Constants
 from lhdmap.pile.height_map import Mask
 from lhdmap.pile.result import PileEstimate
@@ -197,7 +197,7 @@ def _turn(heading: float) -> FloatArray:
 def _bounded(shell: Shell, points: FloatArray, normal: FloatArray) -> Slope | None:
     """Return the slope with floor and walls where it closes the drift, None where it does not."""
     R = _uphill(normal)
-    askew = float(robust_plane(points @ R.T)[1])
+    askew = float(face_plane(points @ R.T)[1])
     R = _turn(-math.atan(askew)) @ R if math.isfinite(askew) else R
     face = points @ R.T
     inclination = plane_inclination_deg(face)

@@ -7,8 +7,8 @@ from dataclasses import replace
 
 import numpy as np
 
+from lhdmap.geometry.frame import UprightFrame
 from lhdmap.messages import FloatArray
-from lhdmap.pile.end_frame import Frame2
 from lhdmap.pile.face import Face
 from lhdmap.pile.limits import Limits
 from lhdmap.pile.measure import WORTH, attack_point
@@ -31,9 +31,11 @@ def with_rocks(pile: PileEstimate, points_m: FloatArray) -> PileEstimate:
 def _scene(pile: PileEstimate, points_m: FloatArray) -> Scene:
     """Return the scene that `surface` would have made of a drive: its frame has its origin in the middle of the toe."""
     across = pile.left_limit_m - pile.right_limit_m
-    frame = Frame2(0.5 * (pile.left_limit_m + pile.right_limit_m), math.atan2(-float(across[0]), float(across[1])))
+    frame = UprightFrame(
+        0.5 * (pile.left_limit_m + pile.right_limit_m), math.atan2(-float(across[0]), float(across[1]))
+    )
     near = np.abs(points_m[:, :2] - frame.origin_m[:2]).max(axis=1) < _ROUND_M
-    local = frame.local(np.column_stack([points_m[near], np.zeros(int(near.sum()))]))
+    local = np.column_stack([frame.local(points_m[near]), np.zeros(int(near.sum()))])
     slope = -1.0 / math.tan(math.radians(pile.inclination_deg))
     slant = math.hypot(1.0, slope)
     spread = 1.4826 * float(np.median(np.abs(pile.residuals_m))) * slant

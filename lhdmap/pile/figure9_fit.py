@@ -7,10 +7,10 @@ import math
 import numpy as np
 import numpy.typing as npt
 
+from lhdmap.geometry.plane import robust_plane, tukey
 from lhdmap.messages import FloatArray
 
-_TUKEY = 4.685  # 95 % efficiency for normal residuals
-_MAD_TO_STD = 1.4826
+_ROUNDS = 20  # of the robust plane: weights have settled long before
 
 
 def voxelised(points_m: FloatArray, size_m: tuple[float, float, float]) -> FloatArray:
@@ -43,25 +43,14 @@ def largest_cluster(points_m: FloatArray, gap_m: float) -> npt.NDArray[np.bool_]
     return largest
 
 
-def robust_plane(points_m: FloatArray) -> FloatArray:
-    """Return a, b, c (3,) of x = a + b y + c z through points (N, 3); NaN where (y, z) lie on a line.
-
-    Regression of x on (y, z) with Tukey's weights.
-    """
-    design = np.column_stack([np.ones(len(points_m)), points_m[:, 1:]])
-    weights = np.ones(len(points_m))
-    values = np.full(3, math.nan)
-    for _ in range(20):
-        root = np.sqrt(weights)
-        values, _, rank, _ = np.linalg.lstsq(design * root[:, None], points_m[:, 0] * root, rcond=1e-9)
-        if rank < 3:
-            return np.full(3, math.nan)
-        residuals = points_m[:, 0] - design @ values
-        scale = max(_MAD_TO_STD * float(np.median(np.abs(residuals - np.median(residuals)))), 1e-6)
-        weights = np.clip(1.0 - (residuals / (_TUKEY * scale)) ** 2, 0.0, None) ** 2
-    return values
+def face_plane(points_m: FloatArray) -> FloatArray:
+    """Return a, b, c (3,) of x = a + b y + c z through points (N, 3), by Tukey's weights; NaN where (y, z) lie on a line."""
+    if not len(points_m):
+        return np.full(3, math.nan)
+    found = robust_plane(points_m[:, 1:], points_m[:, 0], tukey, _ROUNDS)
+    return found.terms if found.determined else np.full(3, math.nan)
 
 
 def plane_inclination_deg(points_m: FloatArray) -> float:
     """Return the inclination -atan2(1, dx/dz) of the robust plane through points (N, 3), Table 6's sign; x into the pile."""
-    return -math.degrees(math.atan2(1.0, float(robust_plane(points_m)[2])))
+    return -math.degrees(math.atan2(1.0, float(face_plane(points_m)[2])))

@@ -8,10 +8,13 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from lhdmap.geometry.plane import MAD_TO_STD, Weights, robust_plane
 from lhdmap.messages import FloatArray
 from lhdmap.pile.height_map import HeightMap
 
 _FLAT_DEG = 8.0
+_ROUNDS = 6  # of the plane through the level cells
+_OFF_SIGMAS, _NO_SPREAD_M = 2.5, 1e-9  # a cell farther off is no floor; of cells that lie in one plane exactly
 _FLOOR_SHARE = 0.15
 _LOWEST_SHARE = 1e-4
 _FEWEST_LOWEST = 4
@@ -53,7 +56,8 @@ def _seen_plane(surface: HeightMap) -> Floor | None:
     low = z < np.percentile(z, 5.0) + 2.0 * reach
     if np.count_nonzero(low) < _FLOOR_SHARE * np.count_nonzero(surface.seen):
         return None
-    values, used = _plane(xy[low], z[low])
+    start = np.ones(np.count_nonzero(low), dtype=bool)
+    values, used, _ = robust_plane(xy[low], z[low], _near, _ROUNDS, start)
     rest = z[low][used] - (values[0] + xy[low][used] @ values[1:])
     # Neighbouring cells share their points: a disc of them counts once.
     independent = max(np.count_nonzero(used) * (surface.cell_m / surface.radius_m) ** 2 / math.pi, 1.0)
@@ -61,19 +65,12 @@ def _seen_plane(surface: HeightMap) -> Floor | None:
     return Floor(float(values[0]), float(values[1]), float(values[2]), std, "plane through its level cells")
 
 
-def _plane(xy: FloatArray, z: FloatArray) -> tuple[FloatArray, npt.NDArray[np.bool_]]:
-    """Return offset and slopes (3,) of a plane, and the places (N,) it was fitted to: those within 2.5 deviations."""
-    design = np.column_stack([np.ones(len(z)), xy])
-    used = np.ones(len(z), dtype=bool)
-    values = np.zeros(3)
-    for _ in range(6):
-        values = np.linalg.lstsq(design[used], z[used], rcond=None)[0].astype(np.float64)
-        rest = z - design @ values
-        spread = 1.4826 * float(np.median(np.abs(rest[used] - np.median(rest[used]))))
-        used = np.abs(rest) <= max(2.5 * spread, 1e-9)
-        if np.count_nonzero(used) < 3:
-            return values, np.ones(len(z), dtype=bool)
-    return values, used
+def _near(residuals: FloatArray, used: Weights) -> Weights | None:
+    """Return which places (N,) are within some deviations of those used before."""
+    rest = residuals[used]
+    spread = MAD_TO_STD * float(np.median(np.abs(rest - np.median(rest))))
+    near: npt.NDArray[np.bool_] = np.abs(residuals) <= max(_OFF_SIGMAS * spread, _NO_SPREAD_M)
+    return near if np.count_nonzero(near) >= 3 else None
 
 
 def _lowest_level(z: FloatArray) -> Floor:

@@ -9,9 +9,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from lhdmap.geometry.frame import UprightFrame
 from lhdmap.messages import FloatArray
 from lhdmap.pile.approach import Approaches
-from lhdmap.pile.end_frame import Frame2
 from lhdmap.pile.face import Registration
 from lhdmap.pile.measure import measure
 from lhdmap.pile.result import PileEstimate, PileReport, Snapshot
@@ -92,13 +92,13 @@ class PileStage:
             return np.zeros((0, 3))
         across = pile.left_limit_m - pile.right_limit_m
         heading = math.atan2(-float(across[0]), float(across[1]))
-        start = Frame2(pile.center_m, heading).map(np.array([-_AROUND_M, 0.0, 0.0]))
+        start = UprightFrame(pile.center_m, heading).map(np.array([-_AROUND_M, 0.0, 0.0]))
         hits = self._window.hits(np.array([*start, heading]), self._travelled_m)
         hits = hits[hits[:, 0] < 2.0 * _AROUND_M][:, :3]
-        return Frame2(start, heading).map(hits[:: max(1, len(hits) // _MOST_AROUND)])
+        return UprightFrame(start, heading).map(hits[:: max(1, len(hits) // _MOST_AROUND)])
 
     def _estimate(self, scan: ScanHits) -> Snapshot:
-        base = Frame2(scan.T_map_base[:3], float(scan.T_map_base[3]))
+        base = UprightFrame(scan.T_map_base[:3], float(scan.T_map_base[3]))
         hits = self._window.hits(scan.T_map_base, self._travelled_m)
         rng = np.random.default_rng(len(hits))
         self._tilt.update(hits, self._travelled_m)

@@ -14,9 +14,10 @@ import numba as nb
 import numpy as np
 import numpy.typing as npt
 
+from lhdmap.geometry.frame import UprightFrame
 from lhdmap.messages import FloatArray
 from lhdmap.pile.corridor import Corridor, trace
-from lhdmap.pile.end_frame import Frame2, end_of, floor_before, turned_near
+from lhdmap.pile.end_frame import end_of, floor_before, turned_near
 from lhdmap.pile.face import STEEPEST, Face, Registration, find, fit
 from lhdmap.pile.limits import Limits, limits_of
 from lhdmap.pile.order import quantile
@@ -36,7 +37,7 @@ _FEWEST_BLOCKS = 6
 class Scene(NamedTuple):
     """What was found: `frame` at the face's foot, all hits in it (N, 4), the face, those on it (mask), floor, limits."""
 
-    frame: Frame2
+    frame: UprightFrame
     points: FloatArray
     face: Face
     on_face: Mask
@@ -53,12 +54,11 @@ class Scene(NamedTuple):
         face = fit(self.points[left], np.array([self.face.a, self.face.b, self.face.c]), self.registration)
         return self._replace(face=face) if face.c > STEEPEST and face.blocks >= _FEWEST_BLOCKS else self
 
-    def face_in(self, base: Frame2) -> FloatArray:
+    def face_in(self, base: UprightFrame) -> FloatArray:
         """Return a, b, c of the face in another frame."""
         y = np.array([-1.0, 1.0, 0.0])
         z = self.floor_m + np.array([0.5, 0.5, 1.5])
-        corners = self.frame.map(np.column_stack([self.face.x_at(y, z), y, z]))
-        local = base.local(np.column_stack([corners, np.zeros(3)]))
+        local = base.local(self.frame.map(np.column_stack([self.face.x_at(y, z), y, z])))
         A = np.column_stack([np.ones(3), local[:, 1], local[:, 2]])
         found: FloatArray = np.linalg.solve(A, local[:, 0]).astype(np.float64)
         return found
@@ -67,7 +67,7 @@ class Scene(NamedTuple):
 class View(NamedTuple):
     """From where one looks: the machine's frame, the grade of its path (m/m, rising ahead), how far poses may be wrong."""
 
-    base: Frame2
+    base: UprightFrame
     grade: float
     registration: Registration
     known: Scene | None = None
@@ -133,7 +133,7 @@ class _Floor(NamedTuple):
 
 
 def _refined(
-    frame: Frame2, points: FloatArray, model: FloatArray, half_m: float, path: _Floor, registration: Registration
+    frame: UprightFrame, points: FloatArray, model: FloatArray, half_m: float, path: _Floor, registration: Registration
 ) -> Scene | None:
     """Fit the face in the end frame, with the floor and the walls that the fit itself shows."""
     left, right = half_m, -half_m

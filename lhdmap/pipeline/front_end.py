@@ -6,10 +6,9 @@ import math
 from collections import Counter, deque
 from functools import partial
 
-import numpy as np
-
 from lhdmap.config import Settings
 from lhdmap.geometry import se3
+from lhdmap.geometry.boxes import grown
 from lhdmap.machine import Machine
 from lhdmap.messages import (
     FloatArray,
@@ -22,9 +21,9 @@ from lhdmap.messages import (
     Tachometer,
     WheelPose,
 )
-from lhdmap.odometry.cloud_motion import CloudPrior
+from lhdmap.odometry.anchored.rear_view import RearView
+from lhdmap.odometry.cloud.motion import CloudPrior
 from lhdmap.odometry.planar import View
-from lhdmap.odometry.rear_view import RearView
 from lhdmap.odometry.start import ScanInput
 from lhdmap.odometry.steps import WheelStep
 from lhdmap.pipeline.mounts import Mounts, level_sensor
@@ -173,7 +172,4 @@ def own_boxes(machine: Machine | None, margin_m: float) -> FloatArray:
     """Return the boxes of the front body with a margin, shape (K, 6), for scans of the front scanner."""
     if machine is None:
         return NO_BOXES
-    boxes = machine.boxes("base_link").reshape(-1, 6).copy()
-    boxes[:, :3] -= margin_m
-    boxes[:, 3:] += margin_m
-    return np.asarray(boxes, dtype=float)
+    return grown(machine.boxes("base_link"), margin_m)

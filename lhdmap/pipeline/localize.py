@@ -38,8 +38,8 @@ from lhdmap.localization.walls import MapWalls
 from lhdmap.machine import Machine
 from lhdmap.mapfolder import MapFolder
 from lhdmap.messages import FloatArray, Message
+from lhdmap.odometry.anchored.rear_view import behind
 from lhdmap.odometry.planar import PlanarOdometry
-from lhdmap.odometry.rear_view import behind
 from lhdmap.odometry.steps import OdometryStep
 from lhdmap.pipeline.mapping import MappingPipeline
 from lhdmap.pipeline.pile import PileSink

@@ -19,9 +19,10 @@ import numpy as np
 from lhdmap.config import Settings
 from lhdmap.machine import Machine
 from lhdmap.messages import FloatArray, LaserScan, Message, PointCloud, Text, WheelPose
-from lhdmap.odometry.cloud_odometry import CloudOdometry, CloudStep
+from lhdmap.odometry.anchored.rear_view import behind
+from lhdmap.odometry.cloud.odometry import CloudOdometry
+from lhdmap.odometry.cloud.steps import CloudStep
 from lhdmap.odometry.planar import PlanarOdometry
-from lhdmap.odometry.rear_view import behind
 from lhdmap.odometry.start import starting_velocity
 from lhdmap.odometry.steps import OdometryStep
 from lhdmap.pipeline.front_end import FrontEnd

@@ -11,7 +11,7 @@ from lhdmap.geometry import se3
 from lhdmap.kinematics import T_base_rear
 from lhdmap.machine import Machine
 from lhdmap.messages import LaserScan
-from lhdmap.odometry.rear_view import RearView
+from lhdmap.odometry.anchored.rear_view import RearView
 from lhdmap.pipeline.mounts import Mounts
 from lhdmap.proprioception.wheels import WheelOdometry
 from lhdmap.scan_matching.scan_points import half_sweep_ns

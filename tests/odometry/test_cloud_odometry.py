@@ -11,11 +11,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 from lhdmap.geometry import se3
+from lhdmap.geometry.twist import exp, log
 from lhdmap.messages import Float32Array, FloatArray, PointCloud
-from lhdmap.odometry.cloud_motion import CloudPrior, exp, log
-from lhdmap.odometry.cloud_odometry import CloudOdometry, CloudStep, marginal_information
-from lhdmap.odometry.cloud_settings import CloudOdometrySettings
-from lhdmap.odometry.cloud_sweep import Sweep, sweep_of
+from lhdmap.odometry.cloud.motion import CloudPrior
+from lhdmap.odometry.cloud.odometry import CloudOdometry
+from lhdmap.odometry.cloud.settings import CloudOdometrySettings
+from lhdmap.odometry.cloud.steps import CloudStep, marginal_information
+from lhdmap.odometry.cloud.sweep import Sweep, sweep_of
 from lhdmap.simulation.sections import DriftSettings
 
 from tests.odometry.cloud_drives import (

@@ -1,4 +1,4 @@
-"""A slow scanner among people, with wheels: what the wheels foretell is not given up for a chance match."""
+"""A slow scanner among people, with wheels: what the wheels predict is not given up for a chance match."""
 
 from __future__ import annotations
 

@@ -6,9 +6,9 @@ import math
 
 import numpy as np
 import pytest
-from lhdmap.odometry.gyro_turn import GyroTurn
 from lhdmap.odometry.motion import Motion
 from lhdmap.odometry.settings import OdometrySettings
+from lhdmap.odometry.wheels.gyro import GyroTurn
 
 DT_S = 0.04
 

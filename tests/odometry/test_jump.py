@@ -1,4 +1,4 @@
-"""Jumps: what the motion did not foretell is found all around; a pose that wheels speak against must be far better."""
+"""Jumps: what the motion did not predict is found all around; a pose that wheels speak against must be far better."""
 
 from __future__ import annotations
 
@@ -8,10 +8,10 @@ from itertools import pairwise
 import numpy as np
 import pytest
 from lhdmap.messages import FloatArray
-from lhdmap.odometry.jump import jump
+from lhdmap.odometry.anchored.jump import jump
 from lhdmap.odometry.motion import FORWARD, TURNING, Motion
 from lhdmap.odometry.settings import OdometrySettings, SearchSettings
-from lhdmap.odometry.wheel_model import WheelModel
+from lhdmap.odometry.wheels.model import WheelModel
 from lhdmap.scan_matching.matching import Hits, Match, MatchModel, Prior
 from lhdmap.scan_matching.search import SearchGrid
 from lhdmap.scan_matching.submap import Submap
@@ -101,7 +101,7 @@ def test_a_jump_back_to_where_the_wheels_lead_is_cheap(walls: Submap) -> None:
     close = walls.align(hits, prior)._replace(pose=predicted, support=0.82)
     wide, back = SearchSettings(), TRUE - predicted
     assert jump(walls, hits, close, prior, *wheeled(), wide) is None
-    found = jump(walls, hits, close, prior, *wheeled(), wide, owed=-back)
+    found = jump(walls, hits, close, prior, *wheeled(), wide, offset=-back)
     assert found is not None
     assert np.hypot(*(found.pose - TRUE)[:2]) < 0.01
 

@@ -12,7 +12,7 @@ from lhdmap.messages import FloatArray
 from lhdmap.odometry import motion_filter
 from lhdmap.odometry.motion import FORWARD, TURNING, Motion
 from lhdmap.odometry.settings import OdometrySettings
-from lhdmap.odometry.wheel_gate import WheelGate
+from lhdmap.odometry.wheels.gate import WheelGate
 
 ACCELERATION = np.array([0.7, 0.1, 1.0])
 
@@ -85,7 +85,7 @@ def test_a_measured_way_is_kalmans(scaled: bool) -> None:
     S = h @ joint @ h + 0.02**2
     K = joint @ h / S
     expected, wanted = np.concatenate([state, way]) + K * 0.1, (np.eye(10) - np.outer(K, h)) @ joint
-    nis = motion_filter.update_way(
+    nis = motion_filter.update_displacement(
         state, joint, way, direction, float(scale * direction @ way) + 0.1, 0.02**2, scaled, 9.0
     )
     assert nis == pytest.approx(0.01 / S)

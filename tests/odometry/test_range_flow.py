@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from lhdmap.geometry import se2
 from lhdmap.messages import FloatArray, LaserScan
-from lhdmap.odometry.flow_scan import BEND, SLOPE, WALL, Pyramid, Y
-from lhdmap.odometry.range_flow import Flow, flow
+from lhdmap.odometry.range_flow.flow import Flow, flow
+from lhdmap.odometry.range_flow.scan import BEND, SLOPE, WALL, Pyramid, Y
 from lhdmap.odometry.settings import RangeFlowSettings
 from lhdmap.scan_matching.scan_points import planar_points
 from lhdmap.simulation.planar import PlanarScanner, drive_along, simulate_scans

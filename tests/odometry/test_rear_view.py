@@ -15,7 +15,7 @@ from lhdmap.kinematics import T_base_rear
 from lhdmap.logs.source import LogSource
 from lhdmap.machine import Machine
 from lhdmap.messages import FloatArray, Joints, LaserScan
-from lhdmap.odometry.rear_view import Behind, JointOffset, RearView, behind
+from lhdmap.odometry.anchored.rear_view import Behind, JointOffset, RearView, behind
 from lhdmap.pipeline.mapping import MappingPipeline
 from lhdmap.pipeline.track import Rows, resample
 from lhdmap.scan_matching.matching import Hits, MatchModel, Prior, match

@@ -9,8 +9,8 @@ import numpy as np
 from lhdmap.geometry import se2
 from lhdmap.odometry.planar import PlanarOdometry
 from lhdmap.odometry.settings import OdometrySettings
-from lhdmap.odometry.stale import StaleWheels
 from lhdmap.odometry.steps import WheelStep
+from lhdmap.odometry.wheels.stale import StaleWheels
 from lhdmap.simulation.planar import PlanarScanner, simulate_scans
 
 from tests.odometry.planar_drives import LEVEL, along, world

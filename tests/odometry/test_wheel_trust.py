@@ -12,8 +12,8 @@ from lhdmap.messages import FloatArray
 from lhdmap.odometry.planar import PlanarOdometry
 from lhdmap.odometry.start import ScanInput, starting_velocity
 from lhdmap.odometry.steps import WheelStep
-from lhdmap.odometry.stretch import Compared
-from lhdmap.odometry.wheel_trust import WheelTrust
+from lhdmap.odometry.wheels.stretch import Compared
+from lhdmap.odometry.wheels.trust import WheelTrust
 
 from tests.odometry.planar_drives import LEVEL, WARM_SCANS, Driven, along, drive, scans_at
 

@@ -14,8 +14,8 @@ from lhdmap.messages import FloatArray
 from lhdmap.odometry.planar import PlanarOdometry
 from lhdmap.odometry.settings import OdometrySettings
 from lhdmap.odometry.steps import WheelStep
-from lhdmap.odometry.stretch import Compared, Stretch
-from lhdmap.odometry.wheel_turn import WheelTurn
+from lhdmap.odometry.wheels.stretch import Compared, Stretch
+from lhdmap.odometry.wheels.turn import WheelTurn
 
 from tests.odometry.planar_drives import LEVEL, RATE_HZ, drive
 

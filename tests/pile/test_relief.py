@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from lhdmap.geometry.frame import UprightFrame
 from lhdmap.messages import FloatArray
-from lhdmap.pile.end_frame import Frame2
 from lhdmap.pile.face import Face
 from lhdmap.pile.judge import _ROCK_M, _RUBBLE_M
 from lhdmap.pile.limits import Limits
@@ -53,7 +53,7 @@ def _scene(slope: float, *parts: FloatArray) -> Scene:
     face = Face(0.0, 0.0, slope, 0.0, 1e-6 * np.eye(4), 0.05, 50)
     limits = Limits(HALF_M, -HALF_M, 0.05, 0.05, 0.0, 0.0, 0.1)
     on = (points[:, 2] > 0.2) & (points[:, 2] < 1.6)
-    return Scene(Frame2(np.zeros(3), 0.0), points, face, on, 0.0, True, limits)
+    return Scene(UprightFrame(np.zeros(3), 0.0), points, face, on, 0.0, True, limits)
 
 
 @pytest.mark.parametrize("size_m", [1.0, 1.3, 1.5])

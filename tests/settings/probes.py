@@ -28,7 +28,7 @@ from lhdmap.messages import FloatArray
 from lhdmap.movement.check import topology_findings
 from lhdmap.movement.route import route_json
 from lhdmap.movement.routes import RouteOptions, route
-from lhdmap.odometry.cloud_odometry import CloudStep
+from lhdmap.odometry.cloud.steps import CloudStep
 from lhdmap.odometry.steps import OdometryStep
 from lhdmap.pile.stage import ScanHits
 from lhdmap.pipeline.heading import gyro_correction

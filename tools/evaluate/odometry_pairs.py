@@ -9,8 +9,8 @@ import numpy as np
 from lhdmap.evaluation.planar_segments import planar_segments
 from lhdmap.geometry import se2
 from lhdmap.messages import FloatArray, LaserScan
-from lhdmap.odometry.flow_scan import Pyramid
-from lhdmap.odometry.range_flow import flow
+from lhdmap.odometry.range_flow.flow import flow
+from lhdmap.odometry.range_flow.scan import Pyramid
 from lhdmap.odometry.settings import RangeFlowSettings
 from lhdmap.scan_matching.scan_points import planar_points
 from lhdmap.simulation.planar import PlanarScanner, PlanarWorld, drive_along, simulate_scans

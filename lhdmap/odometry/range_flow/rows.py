@@ -9,9 +9,9 @@ import math
 
 import numba as nb
 
-from lhdmap.odometry.flow_scan import BEND, GAIN, SLOPE, WALL, X, Y
+from lhdmap.odometry.range_flow.scan import BEND, GAIN, SLOPE, WALL, X, Y
 
-CAUCHY_SIGMAS = 3.0
+CAUCHY_SIGMAS = 3.0  # at which a residual has half its weight: edges and moving things count less, walls hardly
 # Parts of the squared slope and of the mean square about the wall's line by which a residual's variance grows: grazing
 # beams, edges and rough walls count less. Measured: best heading of a pair and best over 10 m in rough walls (tools/evaluate).
 GRAZING_WEIGHT, BEND_WEIGHT = 0.3, 0.5
@@ -19,7 +19,7 @@ GRAZING_WEIGHT, BEND_WEIGHT = 0.3, 0.5
 # Rows of the table of equations, shape (7, M): residual range (m), direction of the warped point as cosine and sine, slope
 # and range (m) there, variance of the residual (m²), variance of the slope for a range noise of 1 m.
 RESIDUAL, COS, SIN, SLOPE_THERE, RANGE, VARIANCE, SLOPE_GAIN = range(7)
-ROWS = 7
+ROWS = 7  # their number
 # What `add_up` gives: H00 H01 H02 H11 H12 H22 b0 b1 b2, sum of robust weights, weighted square sum.
 SUMS = 11
 

@@ -1,4 +1,4 @@
-"""Where a scan fits elsewhere than foretold: what is found all around the prediction, and the odds for it against the wheels."""
+"""Where a scan fits elsewhere than predicted: what is found all around the prediction, and the odds for it against the wheels."""
 
 from __future__ import annotations
 
@@ -8,16 +8,19 @@ import numpy as np
 
 from lhdmap.geometry import se2
 from lhdmap.messages import FloatArray
+from lhdmap.odometry.anchored.state import NO_OFFSET
 from lhdmap.odometry.motion import Motion
 from lhdmap.odometry.settings import SearchSettings
-from lhdmap.odometry.wheel_model import WheelModel
+from lhdmap.odometry.wheels.model import WheelModel
 from lhdmap.scan_matching.matching import Hits, Match, Prior
 from lhdmap.scan_matching.submap import Submap
 
-# A jump must bring that much more support, and more where wheels speak against it: the logarithm of the odds over the nats that
-# support is worth. Measured: crowds win by chance with more, slip stays with less.
-NOTHING_OWED = np.zeros(3)
+# A jump must bring that much more support, and more where wheels speak against it: the log-odds over the nats that support is
+# worth. Measured: crowds win by chance with more, slip stays with less.
 _GAIN, _NATS_PER_SUPPORT = 0.02, 22.0
+_REACH_SIGMAS = 3.0  # of the prediction: how far to search
+# ... but so far at least: a prediction that has just failed is worse than it says.
+_LEAST_REACH_M, _LEAST_TURN_RAD = 0.3, math.radians(20.0)
 
 
 def jump(
@@ -28,7 +31,7 @@ def jump(
     motion: Motion,
     wheels: WheelModel,
     s: SearchSettings,
-    owed: FloatArray = NOTHING_OWED,
+    offset: FloatArray = NO_OFFSET,
 ) -> Match | None:
     """Return the best match from all around the prediction, None where none is better enough than the one near it.
 
@@ -40,26 +43,26 @@ def jump(
         motion: tells how far to search.
         wheels: tell how much they speak against a pose.
         s: limits of the search.
-        owed: by how much jumps a moment ago left the motion (3,): wheels speak against staying there, and for the way back.
+        offset: by how much jumps a moment ago left the motion (3,): wheels speak against staying there, and for going back.
     """
     best = near
     for found in submap.candidates(hits, prior, _reach(motion, s)):
-        dissent = _dissent(found, prior, wheels, owed) - _dissent(best, prior, wheels, owed)
-        if found.support > best.support + _GAIN + dissent / _NATS_PER_SUPPORT:
+        log_odds = _log_odds_against(found, prior, wheels, offset) - _log_odds_against(best, prior, wheels, offset)
+        if found.support > best.support + _GAIN + log_odds / _NATS_PER_SUPPORT:
             best = found
     return None if best is near else best
 
 
-def left_by(result: Match, prior: Prior) -> FloatArray:
+def offset_of(result: Match, prior: Prior) -> FloatArray:
     """Return by how much a match is off the motion, shape (3,)."""
     error: FloatArray = result.pose - prior.pose
     error[2] = se2.wrap(error[2])
     return error
 
 
-def _dissent(result: Match, prior: Prior, wheels: WheelModel, owed: FloatArray) -> float:
+def _log_odds_against(result: Match, prior: Prior, wheels: WheelModel, offset: FloatArray) -> float:
     """Return how much (nats) the wheels speak against a pose."""
-    return wheels.dissent_nats(left_by(result, prior) + owed, prior.information)
+    return wheels.log_odds_against(offset_of(result, prior) + offset, prior.information)
 
 
 def _reach(motion: Motion, s: SearchSettings) -> FloatArray:
@@ -71,5 +74,5 @@ def _reach(motion: Motion, s: SearchSettings) -> FloatArray:
     widest = s.reach_m, math.radians(s.turn_deg)
     if motion.after_gap:
         return np.array(widest)
-    shift = min(max(3.0 * float(sigma[:2].max()), 0.3), widest[0])
-    return np.array([shift, min(max(3.0 * float(sigma[2]), math.radians(20.0)), widest[1])])
+    shift = min(max(_REACH_SIGMAS * float(sigma[:2].max()), _LEAST_REACH_M), widest[0])
+    return np.array([shift, min(max(_REACH_SIGMAS * float(sigma[2]), _LEAST_TURN_RAD), widest[1])])

@@ -8,7 +8,10 @@ from lhdmap.messages import FloatArray
 from lhdmap.odometry.steps import WheelStep
 
 _STILL = 1e-6  # m, rad: encoders of a machine that creeps tell more
-_MOVES_MPS, _TURNS_RPS = 0.15, math.radians(6.0)
+_MOVES_MPS, _TURNS_RPS = (
+    0.15,
+    math.radians(6.0),
+)  # of a machine that surely moves
 _LONGEST_S = 0.8  # wheels that stand for longer do stand: the scans may be wrong where walls do not hold them
 
 

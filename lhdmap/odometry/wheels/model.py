@@ -4,10 +4,10 @@ A step of the wheels goes through four questions, in this order, and the first "
 
 1. Is it a measurement of this step, or a pose that is repeated while the machine moves (`StaleWheels`)?
 2. Have walls that held the motion contradicted the wheels lately (`WheelTrust`)?
-3. Does it agree with the motion before (`WheelGate`)? Slip does not, for seconds; other dissent is believed after a moment.
+3. Does it agree with the motion before (`WheelGate`)? Slip does not, for seconds; other contradiction is believed after a moment.
 4. How well? Scale and turn that walls have taught are applied (`WheelTurn`; the scale of the speed is in the motion's state).
 
-Where a scan fits elsewhere than foretold, `dissent_nats` says how much the wheels speak against it.
+Where a scan fits elsewhere than predicted, `log_odds_against` says how much the wheels speak against it.
 """
 
 from __future__ import annotations
@@ -21,16 +21,16 @@ from lhdmap.geometry import se2
 from lhdmap.messages import FloatArray
 from lhdmap.odometry.motion import FORWARD, TURNING, Motion
 from lhdmap.odometry.settings import OdometrySettings
-from lhdmap.odometry.stale import StaleWheels
 from lhdmap.odometry.steps import Matched, WheelStep
-from lhdmap.odometry.stretch import Stretch
-from lhdmap.odometry.wheel_gate import WheelGate
-from lhdmap.odometry.wheel_trust import WheelTrust
-from lhdmap.odometry.wheel_turn import WheelTurn
+from lhdmap.odometry.wheels.gate import WheelGate
+from lhdmap.odometry.wheels.stale import StaleWheels
+from lhdmap.odometry.wheels.stretch import Stretch
+from lhdmap.odometry.wheels.trust import WheelTrust
+from lhdmap.odometry.wheels.turn import WheelTurn
 
-_SHORTEST_STEP_S = 1e-3
-_BOTH_WAYS_M = 0.03
-_SOON_M = 0.5  # wheels that are wrong pull the first scans off
+_SHORTEST_STEP_S = 1e-3  # a displacement over less gives no speed
+_OTHER_WAY_M = 0.03  # between two scans, by wheels and by walls: more than noise makes of either
+_SOON_M = 0.5  # stretch of the first comparison of speeds: wheels that are wrong pull the first scans off
 _FREEDOM = 4.0  # of Student's t: with slip and lag, large errors are likelier than normal
 
 
@@ -39,7 +39,7 @@ class WheelUse(StrEnum):
 
     NONE = "none"  # nothing was measured
     USED = "used"
-    BELIEVED = "believed against the motion"  # dissent for long where walls do not hold it
+    BELIEVED = "believed against the motion"  # contradicted it for long where walls do not hold it
     REPEATED = "left out: repeated"
     CONTRADICTED = "left out: contradicts walls"
     SLIPS = "left out: slip"
@@ -91,7 +91,7 @@ class WheelModel:
     def _fuse_turn(self, wheels: WheelStep, measured_rad: float, dt_s: float) -> None:
         """Tell the motion the wheels' turn, put right by what walls told of it."""
         noise_rad = math.hypot(wheels.turn_sigma_rad, self._settings.wheel_turn_noise_rps * dt_s)
-        turn_rad, off_rad = self.turn.corrected(measured_rad, self._motion.way_forward_m)
+        turn_rad, off_rad = self.turn.corrected(measured_rad, self._motion.step_forward_m)
         self.gate.fuse(TURNING, turn_rad / dt_s, math.hypot(noise_rad, off_rad) / dt_s, scaled=False)
         self._good.measured(wheels.forward_m, measured_rad, noise_rad)
 
@@ -114,8 +114,8 @@ class WheelModel:
         """What wheels measure over what the machine drives, as walls have taught it."""
         return self._motion.wheel_scale
 
-    def dissent_nats(self, error: FloatArray, information: FloatArray) -> float:
-        """Return how much (nats) wheels that measured the step speak against a pose that is `error` (3,) off the prediction."""
+    def log_odds_against(self, error: FloatArray, information: FloatArray) -> float:
+        """Return the log-odds (nats) of the wheels' step against a pose that is `error` (3,) off the prediction; 0 without one."""
         if not self._motion.measured:
             return 0.0
         return 0.5 * _FREEDOM * math.log1p(float(error @ information @ error) / _FREEDOM)
@@ -123,7 +123,7 @@ class WheelModel:
     def _other_way(self, pose: FloatArray) -> bool:
         """Return whether since the last match wheels went forward and the machine back, or the other way round."""
         walls_m = float(se2.between(self._at, pose)[0])
-        return walls_m * self._since_m < 0.0 and min(abs(walls_m), abs(self._since_m)) > _BOTH_WAYS_M
+        return walls_m * self._since_m < 0.0 and min(abs(walls_m), abs(self._since_m)) > _OTHER_WAY_M
 
     def warnings(self) -> list[str]:
         """Return what a user should know of the wheels."""

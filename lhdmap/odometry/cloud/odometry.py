@@ -8,47 +8,23 @@ from typing import NamedTuple
 import numpy as np
 
 from lhdmap.geometry import se3
+from lhdmap.geometry.twist import exp
 from lhdmap.messages import FloatArray, PointCloud
-from lhdmap.odometry.cloud_matchers import Cloud, CloudMatcher, KissMatcher, Prediction, VgicpMatcher, prepare
-from lhdmap.odometry.cloud_motion import CloudMotion, CloudPrior, exp
-from lhdmap.odometry.cloud_planes import PlaneFit
-from lhdmap.odometry.cloud_settings import CloudOdometrySettings
-from lhdmap.odometry.cloud_sweep import Sweep, middle_s, sweep_of
+from lhdmap.odometry.cloud.matchers import Cloud, CloudMatcher, KissMatcher, Prediction, VgicpMatcher, prepare
+from lhdmap.odometry.cloud.motion import CloudMotion, CloudPrior
+from lhdmap.odometry.cloud.planes import PlaneFit
+from lhdmap.odometry.cloud.settings import CloudOdometrySettings
+from lhdmap.odometry.cloud.steps import CloudStep, marginal_information, starts_along, travel_m, turn_rad
+from lhdmap.odometry.cloud.sweep import Sweep, SweepClock, sweep_of
 from lhdmap.scan_matching.scan_points import NO_BOXES
 
-_FIRST_CLOUDS = 10
-_LOST_BEFORE_RESTART = 10
+_FIRST_CLOUDS = 10  # enter the map and are processed at any speed: one cloud is no map
+_LOST_BEFORE_RESTART = 10  # clouds: a second at 10 Hz
 _BODY = [3, 4, 2]  # forward, lateral, heading as components of a twist
 _SMEAR_M = 0.02  # error of the sweep's correction that is worth a second match
-_SHORTEST_S = 0.05
+_SHORTEST_S = 0.05  # between clouds: stamps that bunch make no speed
 _BY_DEFINITION = 1e8 * np.eye(6)  # information of the pose that defines a frame
 _WIDE_PRIOR = 0.01  # a jump contradicts the prior by definition: it must not hold the match back
-
-
-class CloudStep(NamedTuple):
-    """Outcome of one cloud; as `OdometryStep`, in space.
-
-    `T_odom_base`: pose (4, 4) at the stamp; `covariance`: (6, 6) of the pose against the local map, that is of the
-    step, as a twist in body axes, rotation (rad) before translation (m); `velocity`: forward, lateral (m/s), turning
-    (rad/s); `information`: (3,) along, across (1/m²) and heading (1/rad²) of this cloud against the map, the other five
-    unknown; `residual_m`: rms distance of the points that agree with the map; `support`: their share; `degenerate`: a
-    direction was not observed; `substitute`: what stood in for it (`wheels`, `motion` or empty); `processed`: False
-    where the adaptive rate only predicted; `lost`: the cloud did not fit the map where it could be (the pose is the
-    prediction), or only after a jump that no machine makes.
-    """
-
-    stamp_ns: int
-    T_odom_base: FloatArray
-    covariance: FloatArray
-    velocity: FloatArray
-    information: FloatArray
-    residual_m: float
-    support: float
-    degenerate: bool
-    substitute: str
-    processed: bool
-    lost: bool
-    wheels: str = "none"
 
 
 class _First(NamedTuple):
@@ -80,8 +56,7 @@ class CloudOdometry:
         self._matcher: CloudMatcher = (
             KissMatcher(self._settings) if self._settings.method == "kiss_icp" else VgicpMatcher(self._settings)
         )
-        self._last_ns: int | None = None
-        self._middle_s = 0.0
+        self._clock = SweepClock()
         self._first: _First | None = None
         self._processed_pose = self._inserted_pose = np.eye(4)
         self._wait_s = 0.0
@@ -116,22 +91,19 @@ class CloudOdometry:
         limits_m = (self._settings.min_range_m, self._settings.max_range_m)
         placed = self._place(sweep_of(cloud, T_base_sensor, limits_m, boxes_m))
         covariance = self._motion.P[:6, :6].copy()
-        travel_m = _travel_m(se3.inverse(self._processed_pose) @ self._motion.pose)
         if placed.fit is not None:
-            self._motion.forget(min(travel_m / self._settings.memory_m, 1.0))
+            moved_m = travel_m(se3.inverse(self._processed_pose) @ self._motion.pose)
+            self._motion.forget(min(moved_m / self._settings.memory_m, 1.0))
         self._processed += 1
         self._processed_pose, self._wait_s = self._motion.pose, 0.0
         return self._step(cloud.stamp_ns, placed, covariance)
 
     def _predict(self, cloud: PointCloud, prior: CloudPrior | None, T_level_base: FloatArray | None) -> None:
-        """Move the motion model to the middle of the sweep; a stamp that runs backwards counts as no time."""
-        stamp_ns, first = cloud.stamp_ns, self._last_ns is None
-        dt_s = 0.0 if self._last_ns is None else max(stamp_ns - self._last_ns, 0) * 1e-9
-        self._last_ns = stamp_ns if self._last_ns is None else max(stamp_ns, self._last_ns)
-        middle = middle_s(cloud) if len(cloud.points_m) else self._middle_s
+        """Move the motion model to the middle of the sweep."""
+        first = not self._clock.runs
+        dt_s, to_middle_s = self._clock.step(cloud)
         self._wheels_used = prior is not None and self._motion.fuse_prior(prior, dt_s)
-        self._motion.predict(0.0 if first else max(dt_s + middle - self._middle_s, 0.0))
-        self._middle_s = middle
+        self._motion.predict(to_middle_s)
         self._wait_s += dt_s
         if T_level_base is not None and np.isfinite(T_level_base).all():
             self._level(T_level_base, first=first)
@@ -148,7 +120,7 @@ class CloudOdometry:
         """Return whether this cloud is to be processed: after enough travel, turn or time, the first ones always."""
         s = self._settings
         step = se3.inverse(self._processed_pose) @ self._motion.pose
-        moved = _travel_m(step) >= s.step_m or _turn_rad(step) >= math.radians(s.step_deg)
+        moved = travel_m(step) >= s.step_m or turn_rad(step) >= math.radians(s.step_deg)
         return moved or self._wait_s >= s.step_s or self._inserts < _FIRST_CLOUDS or self._lost_in_a_row > 0
 
     def _place(self, sweep: Sweep) -> _Placed:
@@ -174,7 +146,7 @@ class CloudOdometry:
 
     def _begin(self, sweep: Sweep, cloud: Cloud) -> _Placed:
         """Start the map with one cloud at the predicted pose."""
-        self._first = _First(sweep, self._middle_s, self._motion.twist) if self._processed == 0 else None
+        self._first = _First(sweep, self._clock.middle_s, self._motion.twist) if self._processed == 0 else None
         self._insert(cloud)
         return _Placed(PlaneFit(self._motion.pose, _BY_DEFINITION, 0.0, 1.0))
 
@@ -183,10 +155,10 @@ class CloudOdometry:
         s, motion = self._settings, self._motion
         sigma_m = float(np.sqrt(motion.P[3, 3]))
         reach_m = min(3.0 * sigma_m, s.reach_m) if sigma_m > 0.5 * s.voxel_m else 0.0
-        near = Prediction(motion.pose, motion.prior_information, _starts(motion.pose, reach_m, s.voxel_m))
+        near = Prediction(motion.pose, motion.prior_information, starts_along(motion.pose, reach_m, s.voxel_m))
         fit = self._matcher.match(cloud, near)
         if not self._trusted(fit):
-            starts = _starts(motion.pose, s.reach_m, s.voxel_m, turned=True)
+            starts = starts_along(motion.pose, s.reach_m, s.voxel_m, turned=True)
             fit = self._matcher.match(cloud, Prediction(motion.pose, _WIDE_PRIOR * near.information, starts))
         return fit if self._trusted(fit) else None
 
@@ -196,7 +168,7 @@ class CloudOdometry:
 
     def _jumped(self, fit: PlaneFit) -> bool:
         """Return whether the fit is farther from the last pose than the machine can have moved."""
-        moved_m = _travel_m(se3.inverse(self._processed_pose) @ fit.pose)
+        moved_m = travel_m(se3.inverse(self._processed_pose) @ fit.pose)
         return moved_m > self._settings.max_speed_mps * max(self._wait_s, _SHORTEST_S)
 
     def _again(self, sweep: Sweep, change: FloatArray, prior: FloatArray) -> tuple[Cloud, PlaneFit] | None:
@@ -235,7 +207,7 @@ class CloudOdometry:
         s = self._settings
         self._lost_in_a_row = 0
         step = se3.inverse(self._inserted_pose) @ self._motion.pose
-        moved = _travel_m(step) >= s.insert_m or _turn_rad(step) >= math.radians(s.insert_deg)
+        moved = travel_m(step) >= s.insert_m or turn_rad(step) >= math.radians(s.insert_deg)
         if moved or self._inserts < _FIRST_CLOUDS:
             self._insert(cloud)
         return _Placed(fit)
@@ -255,7 +227,7 @@ class CloudOdometry:
         self._inserted_pose = self._motion.pose
 
     def _step(self, stamp_ns: int, placed: _Placed | None, covariance: FloatArray) -> CloudStep:
-        pose = self._motion.pose @ exp(-self._middle_s * self._motion.twist)
+        pose = self._motion.pose @ exp(-self._clock.middle_s * self._motion.twist)
         fit, lost = placed or _Placed(None)
         information = np.zeros(3) if fit is None else marginal_information(fit.information)[_BODY]
         weak = lost or (fit is not None and self._weak(information))
@@ -278,27 +250,3 @@ class CloudOdometry:
         s = self._settings
         limits = np.array([s.weak_sigma_m, s.weak_sigma_m, math.radians(s.weak_sigma_deg)])
         return bool((information * limits**2 < 1.0).any())
-
-
-def marginal_information(H: FloatArray) -> FloatArray:
-    """Return for each of the six components the information left when the other five are unknown, shape (6,)."""
-    return 1.0 / np.diag(np.linalg.inv(H + 1e-6 * np.eye(6)))
-
-
-def _starts(pose: FloatArray, reach_m: float, spacing_m: float, *, turned: bool = False) -> tuple[FloatArray, ...]:
-    """Return poses (4, 4) along the machine's axis to either side of `pose`, and turned ones where wanted."""
-    count = math.ceil(reach_m / spacing_m - 0.5)
-    shifts = [k * spacing_m for i in range(1, count + 1) for k in (i, -i)]
-    turns = [math.radians(turn_deg) for turn_deg in (10.0, -10.0, 20.0, -20.0)] if turned else []
-    twists = [(0.0, 0.0, 0.0, shift, 0.0, 0.0) for shift in shifts] + [
-        (0.0, 0.0, turn, 0.0, 0.0, 0.0) for turn in turns
-    ]
-    return tuple(pose @ exp(np.array(twist)) for twist in twists)
-
-
-def _travel_m(T: FloatArray) -> float:
-    return float(np.linalg.norm(T[:3, 3]))
-
-
-def _turn_rad(T: FloatArray) -> float:
-    return math.acos(min(max(0.5 * (float(np.trace(T[:3, :3])) - 1.0), -1.0), 1.0))

@@ -12,14 +12,15 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 
 from lhdmap.geometry import se3
+from lhdmap.geometry.twist import exp, log, orthonormal
 from lhdmap.messages import FloatArray
-from lhdmap.odometry.cloud_motion import exp, log, orthonormal
-from lhdmap.odometry.cloud_planes import PlaneFit, PlaneMap, PlaneNoise
-from lhdmap.odometry.cloud_settings import CloudOdometrySettings
+from lhdmap.odometry.cloud.planes import PlaneFit, PlaneMap, PlaneNoise
+from lhdmap.odometry.cloud.settings import CloudOdometrySettings
 
-_NEIGHBOURS = 20
-_LEAST_POINTS = 100
+_NEIGHBOURS = 20  # of a point that its covariance is taken of: the library's default
+_LEAST_POINTS = 100  # of a cloud: a blackout or a lens full of mud leaves fewer
 _COARSE = 3.0  # voxels of the map that wide starts are matched against first, in voxels of the fine one
+_BETTER = 0.01  # support by which a wide start must fit better than the prediction: less is chance
 _FAR = 1e3  # metres that a library may move a pose before the result is taken for nonsense
 
 
@@ -98,7 +99,7 @@ class VgicpMatcher:
         for start in predicted.starts:
             near = self._align(self._coarse, cloud, start, _COARSE * self._settings.voxel_m)
             found = self._fit(cloud, self._align(self._fine, cloud, near, self._settings.voxel_m), predicted)
-            best = found if found.support > best.support + 0.01 else best
+            best = found if found.support > best.support + _BETTER else best
         return best
 
     def judge(self, cloud: Cloud, pose: FloatArray) -> PlaneFit:

@@ -7,24 +7,34 @@ harm: it is compared only. Over many minutes it is the better one: that is the s
 from __future__ import annotations
 
 import math
-from collections import deque
-
-import numpy as np
 
 from lhdmap.geometry import se2
 from lhdmap.messages import FloatArray
 from lhdmap.odometry.motion import TURNING, Motion
+from lhdmap.odometry.wheels.tally import Tally
 
-_STRETCH_S = 1.0
+_STRETCH_S = 1.0  # compared at once: long against the time between scans, short against a bend
 _TURNS_RAD = math.radians(3.0)  # a stretch that turns less tells of no scale
-_AGREES = (0.9, 1.1)
-_TRUST_RAD, _MEMORY_RAD = math.radians(20.0), math.radians(120.0)
+_AGREES = (
+    0.9,
+    1.1,
+)  # its turn over that of the walls: cheap gyroscopes are off by 3 %, wrong units and axes by far more
+_TRUST_RAD, _MEMORY_RAD = (
+    math.radians(20.0),
+    math.radians(120.0),
+)  # turned rightly until it is believed; that count as lately
+_SHARE_AGAINST = 0.25  # of what speaks for it: one stretch in five may be the walls' fault
 _STILL_RAD = math.radians(0.5)  # what a stretch may be off that hardly turns
 _NOISE_RAD = math.radians(0.1)  # of a comparison: scan times, and what scans are off
+# Bias at the start and its walk (per second): a cheap MEMS gyroscope that warms up, 0.1°/s in an hour.
 _BIAS_STD_RPS, _BIAS_WALK_RPS = math.radians(1.0), math.radians(0.002)
 _STEP_RAD, _RATE_RPS = math.radians(0.05), math.radians(0.05)  # what a turn by it may be off, and for each second of it
-_LONG_S, _GATE_SIGMAS, _TELL_RAD = 0.5, 4.0, math.radians(90.0)
-_MOST_RATIOS = 500
+_LONG_S = 0.5  # time between two scans after which it is asked even where the walls held the heading
+_GATE_SIGMAS = 4.0  # as that of the wheels
+_TELL_RAD, _TELL_SHARE = (
+    math.radians(90.0),
+    0.2,
+)  # contradicted at least, and of what was compared, until a user is told
 
 
 class GyroTurn:
@@ -33,18 +43,17 @@ class GyroTurn:
     def __init__(self, motion: Motion) -> None:
         self._motion = motion
         self._bias, self._variance = 0.0, _BIAS_STD_RPS**2
-        self._for_rad = self._against_rad = self._compared_rad = self._contradicted_rad = 0.0
+        self._tally = Tally(_MEMORY_RAD)
         self._held = True
         self._gyro_rad = self._walls_rad = self._stretch_s = 0.0
         self._before: FloatArray | None = None
-        self._ratios: deque[float] = deque(maxlen=_MOST_RATIOS)
         self.used = 0
         self.turn_rad: float | None = None  # of the last step, its bias taken off; None where it is not believed
 
     @property
     def believed(self) -> bool:
         """Whether it has turned as the walls did, lately and far enough."""
-        return self._for_rad > max(_TRUST_RAD, 4.0 * self._against_rad)
+        return self._tally.lately_for > max(_TRUST_RAD, self._tally.lately_against / _SHARE_AGAINST)
 
     def fuse(self, turn_rad: float | None, dt_s: float) -> None:
         """Take the turn since the scan before; it is used where the walls did not hold the heading there, or long ago."""
@@ -56,12 +65,12 @@ class GyroTurn:
         self._stretch_s += dt_s
         if not self.believed:
             return
-        self.turn_rad = way = turn_rad - self._bias * dt_s
+        self.turn_rad = turned_rad = turn_rad - self._bias * dt_s
         if self._held and dt_s < _LONG_S:
             return
         _, direction = self._motion.begin_measurement(TURNING)
         sigma = math.hypot(_STEP_RAD, (_RATE_RPS + math.sqrt(self._variance)) * dt_s)
-        self.used += self._motion.measure_way(direction, way, sigma**2, False, _GATE_SIGMAS)
+        self.used += self._motion.measure(direction, turned_rad, sigma**2, False, _GATE_SIGMAS)
 
     def learn(self, pose: FloatArray, *, held: bool) -> None:
         """Compare with the pose (3,) after a scan; `held`: the walls hold its heading."""
@@ -94,13 +103,7 @@ class GyroTurn:
         size = max(abs(self._walls_rad), abs(off_rad))
         ratio = 1.0 + off_rad / self._walls_rad if abs(self._walls_rad) > _TURNS_RAD else math.nan
         agrees = _AGREES[0] < ratio < _AGREES[1] or abs(off_rad) <= _STILL_RAD
-        keep = math.exp(-size / _MEMORY_RAD)
-        self._for_rad = keep * self._for_rad + size * agrees
-        self._against_rad = keep * self._against_rad + size * (not agrees)
-        self._compared_rad += size
-        self._contradicted_rad += size * (not agrees)
-        if not agrees and math.isfinite(ratio):
-            self._ratios.append(ratio)
+        self._tally.take(size, ratio, agrees=agrees)
 
     def _restart(self) -> None:
         self._before = None
@@ -108,12 +111,13 @@ class GyroTurn:
 
     def warning(self) -> str | None:
         """Return what a user should know of it."""
-        if self._contradicted_rad < max(_TELL_RAD, 0.2 * self._compared_rad):
+        tally = self._tally
+        if tally.against < max(_TELL_RAD, _TELL_SHARE * tally.compared):
             return None
-        ratio = float(np.median(self._ratios)) if self._ratios else math.nan
+        ratio = tally.ratio()
         told = f", and turns {ratio:.2g} times as far{_reason(ratio)}" if math.isfinite(ratio) else ""
         return (
-            f"gyroscope: over {math.degrees(self._contradicted_rad):.0f} of {math.degrees(self._compared_rad):.0f}° of turning "
+            f"gyroscope: over {math.degrees(tally.against):.0f} of {math.degrees(tally.compared):.0f}° of turning "
             f"it contradicts the scans{told}"
         )
 

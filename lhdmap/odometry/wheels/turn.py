@@ -1,6 +1,6 @@
 """How the wheels' turn is off, learned while the walls tell the turn: worn or unequal wheels, a joint whose zero is off.
 
-    measured turn = scale · turn + curvature · way
+    measured turn = scale · turn + curvature · distance
 
 Compared over stretches, not from scan to scan: wheel poses come late by a part of a scan's time, and a least-squares fit of
 late turns to true ones makes the scale too small.
@@ -12,11 +12,11 @@ import math
 
 import numpy as np
 
-from lhdmap.odometry.stretch import Compared
+from lhdmap.odometry.wheels.stretch import Compared
 
 _EDGES_RAD = math.radians(1.0)  # at both ends of a stretch the wheels are late or early
-_WANDER_PER_SQRT_M = 1e-4
-_GATE_SIGMAS = 3.0
+_WANDER_PER_SQRT_M = 1e-4  # of both: tyres wear and warm up, 1 % in 10 km
+_GATE_SIGMAS = 3.0  # a stretch that is farther off was slip, or a wrong match: one in 400 by chance
 
 
 class WheelTurn:

@@ -14,15 +14,17 @@ import numba as nb
 import numpy as np
 
 from lhdmap.messages import FloatArray, LaserScan
-from lhdmap.scan_matching.matching import Hits, Match, MatchModel, line_weight, slanted
+from lhdmap.scan_matching.matching import Hits, Match, MatchModel
 from lhdmap.scan_matching.scan_points import planar_points
+from lhdmap.scan_matching.surface_map import CENTRE_X, CENTRE_Y, NORMAL_X, NORMAL_Y, SERVED
+from lhdmap.scan_matching.wall_lines import line_weight, slanted
 
-NO_POINTS = np.zeros((0, 3))
-_FIRST_STD_RAD = math.radians(0.2)
+NO_POINTS = np.zeros((0, 3))  # hits of no scan
+_FIRST_STD_RAD = math.radians(0.2)  # how far an encoder's zero is off: an installer's
 _SPREAD_RAD = 0.01  # of one comparison of joint and map: the map's own bend, alike for many scans, not the scan's noise
-_WANDER_RAD = 1e-4
-_OWN_ZERO = 0.1
-_FEWEST_INFORMATION = 1e4  # 1/rad²
+_WANDER_RAD = 1e-4  # by scan: so that it follows a joint that wears
+_OWN_ZERO = 0.1  # of the offset that the encoder's own zero takes back in each update
+_FEWEST_INFORMATION = 1e4  # 1/rad², 0.6°: a scan that tells less tells only its noise
 
 
 class RearView(NamedTuple):
@@ -45,7 +47,7 @@ class Behind(NamedTuple):
     joint_x_m: float
 
 
-NOTHING_BEHIND = Behind(NO_POINTS, 0.0)
+NOTHING_BEHIND = Behind(NO_POINTS, 0.0)  # where no rear scanner helps
 
 
 def behind(view: RearView, velocity: FloatArray, height_m: float, floor_m: float, most: int) -> Behind:
@@ -95,11 +97,11 @@ def _joint_equation(found, hits, model, fine_m, joint_x_m):  # type: ignore[no-u
     c, s = math.cos(pose[2]), math.sin(pose[2])
     slope = information = 0.0
     for i in range(hits.front, points.shape[0]):
-        if lines[i, 6] == 0.0:
+        if lines[i, SERVED] == 0.0:
             continue
         rx, ry = c * points[i, 0] - s * points[i, 1], s * points[i, 0] + c * points[i, 1]
-        nx, ny = lines[i, 2], lines[i, 3]
-        d = nx * (pose[0] + rx - lines[i, 0]) + ny * (pose[1] + ry - lines[i, 1])
+        nx, ny = lines[i, NORMAL_X], lines[i, NORMAL_Y]
+        d = nx * (pose[0] + rx - lines[i, CENTRE_X]) + ny * (pose[1] + ry - lines[i, CENTRE_Y])
         d += slanted(hits, i, lines[i], c, s, nx, ny)
         incidence2 = (nx * rx + ny * ry) ** 2 / (rx * rx + ry * ry + 1e-12)
         w = line_weight(lines[i], d * d, incidence2, fine_m, model)[1]

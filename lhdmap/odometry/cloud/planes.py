@@ -13,14 +13,14 @@ import numpy as np
 import numpy.typing as npt
 
 from lhdmap.geometry import se3
+from lhdmap.geometry.twist import exp, log, orthonormal
 from lhdmap.messages import FloatArray
-from lhdmap.odometry.cloud_motion import exp, log, orthonormal
 
-_SHIFT, _BITS = 1 << 20, 21
+_SHIFT, _BITS = 1 << 20, 21  # a cell's place in a key of 63 bits: a million cells to each side
 _CUTOFF = 3.0  # sigmas beyond which a point has no weight
 _MEDIAN = 0.6745  # median of |x| in sigmas for a normal distribution
-_ROUNDS = 5
-_SMALL_STEP = 1e-4
+_ROUNDS = 5  # of the fit at most
+_SMALL_STEP = 1e-4  # rad and m: a tenth of what a fit is off
 
 
 class PlaneFit(NamedTuple):

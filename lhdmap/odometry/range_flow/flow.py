@@ -6,7 +6,7 @@ a scanner that moves with (v_x, v_y, w) in its own frame,
     (cos th + R_th sin th / r) v_x + (sin th - R_th cos th / r) v_y - R_th w + R_t = 0
 
 The scanner is the origin, so the term x sin th - y cos th of the general form is zero; mounts are applied outside. What
-differs from the published method: gradients are least squares lines over a width in metres (`flow_scan`); scans are warped
+differs from the published method: gradients are least squares lines over a width in metres (`scan`); scans are warped
 exactly, as chains of wall segments, and in both directions, so that the estimate does not lock to the beams' spacing.
 """
 
@@ -20,13 +20,14 @@ import numpy as np
 
 from lhdmap.geometry import se2
 from lhdmap.messages import FloatArray
-from lhdmap.odometry.flow_rows import ROWS, SUMS, add_up, add_up_noise, warp
-from lhdmap.odometry.flow_scan import Pyramid
-from lhdmap.scan_matching.matching import solve3
+from lhdmap.odometry.range_flow.rows import ROWS, SUMS, add_up, add_up_noise, warp
+from lhdmap.odometry.range_flow.scan import Pyramid
+from lhdmap.scan_matching.equations import solve3
 
-_FEWEST_BEAMS = 12
+_FEWEST_BEAMS = 12  # equations: four for each unknown
 _CONVERGED_M = 5e-4  # a quarter of a pair's error: measured, stopping later gains nothing
-_REWEIGHTINGS = 4  # on one warp
+_REWEIGHTINGS = 4  # on one warp at most
+_LEAST_SCALE = 0.25  # of the variances: a scan against itself has no residuals, and no scale
 _HEADING_ARM_M = 4.0  # by which a turn counts as a step
 
 
@@ -90,7 +91,7 @@ def _solve(reference, current, start, guess, prior_information, noise_m, iterati
             weights, squares = _normal_equations(table, middle, end, turn, twist, scale, H, b)
             change = solve3(H + prior_information, b + toward) - twist
             twist += change
-            scale = max(squares / max(weights, 1.0), 0.25)
+            scale = max(squares / max(weights, 1.0), _LEAST_SCALE)
             if _size_m(change) < _CONVERGED_M:
                 break
         pose = se2.compose(twist, pose)

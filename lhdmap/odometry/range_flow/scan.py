@@ -10,15 +10,21 @@ import numpy as np
 from lhdmap.messages import FloatArray
 
 JUMP_SLOPE = 14.0  # neighbours whose line to each other is steeper than this against the beam do not share a wall
-_MOST_NEIGHBOURS = 24
-_FEWEST_BEAMS = 20
+_MOST_NEIGHBOURS = 24  # to each side that a line is fitted to: bounds the time where walls are near and dense
+_FEWEST_BEAMS = 20  # of a coarse level: with fewer there are no lines
+_GAP_SPACINGS, _STEP_M = (
+    2.6,
+    0.05,
+)  # two beams missing at most, and a jump of the range that is only noise, within one wall
+_FIRST_WEIGHT = 0.2  # at least, of the two neighbours: where walls are sparse they still give the slope
+_LEAST_SPREAD_M2 = 1e-10  # of hits across the beam: with less they are one point
 
 # Columns of a level, an array of shape (N, 6) with beams in rising angle. X, Y: the beam's end at its local least squares
 # range, metres about the scanner; SLOPE: dR/dtheta / R of the wall there (0: no wall line); GAIN: variance of that slope
 # for a range noise of 1 m; BEND: mean square of the hits about that line, m²; WALL: 1 where beams i and i + 1 see the same
 # wall and both have its line.
 X, Y, SLOPE, GAIN, BEND, WALL = range(6)
-_COLUMNS = 6
+_COLUMNS = 6  # their number
 
 
 class Pyramid:
@@ -86,7 +92,7 @@ def _joined(x, y, r):  # type: ignore[no-untyped-def]
     joined = np.zeros(n, dtype=np.bool_)
     for i in range(n - 1):
         step = abs(r[i + 1] - r[i])
-        joined[i] = gap[i] < 2.6 * spacing and step < JUMP_SLOPE * min(r[i], r[i + 1]) * gap[i] + 0.05
+        joined[i] = gap[i] < _GAP_SPACINGS * spacing and step < JUMP_SLOPE * min(r[i], r[i + 1]) * gap[i] + _STEP_M
     return joined
 
 
@@ -127,7 +133,7 @@ def _moments(x, y, joined, width_m):  # type: ignore[no-untyped-def]
                     break
                 near = max(1.0 - d2 / limit, 0.0)
                 w = near * near
-                w = max(w, 0.2) if step == 1 else w  # sparse walls: the two neighbours still give the slope
+                w = max(w, _FIRST_WEIGHT) if step == 1 else w
                 w0 += w
                 wx += w * dx
                 wy += w * dy
@@ -152,7 +158,7 @@ def _fit_lines(x, y, r, moments, level):  # type: ignore[no-untyped-def]
         suu = c * c * sxx + 2.0 * c * s * sxy + s * s * syy
         stt = s * s * sxx - 2.0 * c * s * sxy + c * c * syy
         stu = c * s * (syy - sxx) + (c * c - s * s) * sxy
-        lined = stt >= 1e-10
+        lined = stt >= _LEAST_SPREAD_M2
         b = stu / stt if lined else 0.0
         smooth = c * mx + s * my - b * (c * my - s * mx) if lined else 0.0
         level[i, X], level[i, Y] = x[i] + smooth * c, y[i] + smooth * s

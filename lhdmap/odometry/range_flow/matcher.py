@@ -12,13 +12,13 @@ import numpy as np
 
 from lhdmap.geometry import se2
 from lhdmap.messages import FloatArray
-from lhdmap.odometry.flow_reference import FlowReference, compare, correct_by, scanner_pyramid
-from lhdmap.odometry.flow_scan import Pyramid
 from lhdmap.odometry.motion import Motion
+from lhdmap.odometry.range_flow.reference import FlowReference, compare, correct_by, scanner_pyramid
+from lhdmap.odometry.range_flow.scan import Pyramid
 from lhdmap.odometry.settings import OdometrySettings, RangeFlowSettings
 from lhdmap.odometry.steps import BY_DEFINITION, Matched
 
-_FEWEST_HITS = 12
+_FEWEST_HITS = 12  # as many as one comparison needs at least (`flow`)
 
 
 class FlowMatcher:

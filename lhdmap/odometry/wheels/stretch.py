@@ -9,11 +9,11 @@ import numpy as np
 from lhdmap.geometry import se2
 from lhdmap.messages import FloatArray
 
-_STRETCH_RAD = 0.6
+_STRETCH_RAD = 0.6  # a turn also ends a stretch: half a right angle is far more than wheels are late
 
 
 class Compared(NamedTuple):
-    """Forward way (m) and turn (rad) of one stretch: by wheels, with the variance of their turn (rad²), and by walls.
+    """Forward distance (m) and turn (rad) of one stretch: by wheels, with the variance of their turn (rad²), and by walls.
 
     `length_m`: what was driven by the walls, forward and back.
     """

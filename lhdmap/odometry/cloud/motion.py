@@ -12,13 +12,20 @@ from typing import NamedTuple
 import numpy as np
 
 from lhdmap.geometry import se3
+from lhdmap.geometry.twist import adjoint, exp, log, orthonormal, skew
 from lhdmap.messages import FloatArray
-from lhdmap.odometry.cloud_settings import CloudOdometrySettings
+from lhdmap.odometry.cloud.settings import CloudOdometrySettings
 
-_GATE_SIGMAS = 4.0
-_LONGEST_STEP_S = 3.0
-_GAP_VARIANCE = np.diag([0.01, 0.01, 0.5, 4.0, 0.1, 0.1])
-_JUMP_VARIANCE = np.diag([1e-4] * 3 + [1e-2] * 3)
+_GATE_SIGMAS = 4.0  # wheels that are farther off than one in ten thousand by chance slip
+_LONGEST_STEP_S = 3.0  # a machine brakes to rest within it: after a longer gap the old velocity says little
+_GAP_VARIANCE = np.diag(
+    [0.01, 0.01, 0.5, 4.0, 0.1, 0.1]
+)  # of the velocity after a gap, as in the plane; hardly any tilt
+_JUMP_VARIANCE = np.diag(
+    [1e-4] * 3 + [1e-2] * 3
+)  # of the pose after a jump: half a degree, 10 cm, what one match gives
+# Of pose and velocity at the start: the pose defines `odom`, the machine may drive already (3 m/s, 0.7 rad/s).
+_STARTING_VARIANCES = [1e-10] * 3 + [1e-8] * 3 + [0.05, 0.05, 0.5, 9.0, 0.25, 0.05]
 _PLANAR = [3, 4, 2]  # forward, lateral, heading as components of a twist
 
 
@@ -31,62 +38,6 @@ class CloudPrior(NamedTuple):
 
     T_previous_base: FloatArray
     covariance: FloatArray
-
-
-def skew(vectors: FloatArray) -> FloatArray:
-    """Return the cross product matrix of a vector, shape (3, 3)."""
-    x, y, z = vectors
-    return np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-
-
-def exp(twist: FloatArray) -> FloatArray:
-    """Return the motion (4, 4) of a twist (6,): rotation vector and translation."""
-    angle = float(np.linalg.norm(twist[:3]))
-    K = skew(twist[:3])
-    a, b, c = _series(angle)
-    T = np.eye(4)
-    T[:3, :3] += a * K + b * K @ K
-    T[:3, 3] = (np.eye(3) + b * K + c * K @ K) @ twist[3:]
-    return T
-
-
-def log(T: FloatArray) -> FloatArray:
-    """Return the twist (6,) of a motion (4, 4); its angle is below pi."""
-    R = T[:3, :3]
-    axis = 0.5 * np.array([R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1]])
-    sine = float(np.linalg.norm(axis))
-    angle = math.atan2(sine, 0.5 * (float(np.trace(R)) - 1.0))
-    if sine > 1e-9:
-        axis = axis * (angle / sine)
-    elif angle > 1.0:  # half a turn: the axis is the eigenvector of the symmetric part
-        axis = angle * np.linalg.eigh(R + R.T)[1][:, 2]
-    K = skew(axis)
-    _, b, c = _series(angle)
-    return np.concatenate([axis, np.linalg.solve(np.eye(3) + b * K + c * K @ K, T[:3, 3])])
-
-
-def _series(angle: float) -> tuple[float, float, float]:
-    """Return sin(a)/a, (1 - cos a)/a² and (a - sin a)/a³."""
-    if angle < 1e-4:
-        return 1.0 - angle**2 / 6.0, 0.5 - angle**2 / 24.0, 1.0 / 6.0 - angle**2 / 120.0
-    return math.sin(angle) / angle, (1.0 - math.cos(angle)) / angle**2, (angle - math.sin(angle)) / angle**3
-
-
-def orthonormal(T: FloatArray) -> FloatArray:
-    """Return the pose (4, 4) with its rotation made exact: products of many rotations drift away from one."""
-    U, _, Vt = np.linalg.svd(T[:3, :3])
-    out = T.copy()
-    out[:3, :3] = U @ Vt
-    return out
-
-
-def adjoint(T_a_b: FloatArray) -> FloatArray:
-    """Return the matrix (6, 6) that takes twists in b to twists in a."""
-    R = T_a_b[:3, :3]
-    out = np.zeros((6, 6))
-    out[:3, :3] = out[3:, 3:] = R
-    out[3:, :3] = skew(T_a_b[:3, 3]) @ R
-    return out
 
 
 class CloudMotion:
@@ -104,7 +55,7 @@ class CloudMotion:
         self._tilt_variance = math.radians(s.tilt_sigma_deg) ** 2
         self.pose: FloatArray = np.eye(4)
         self.twist: FloatArray = np.zeros(6)
-        self.P: FloatArray = np.diag([1e-10] * 3 + [1e-8] * 3 + [0.05, 0.05, 0.5, 9.0, 0.25, 0.05])
+        self.P: FloatArray = np.diag(_STARTING_VARIANCES)
 
     @property
     def prior_information(self) -> FloatArray:

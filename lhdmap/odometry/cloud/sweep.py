@@ -8,7 +8,7 @@ import numpy as np
 
 from lhdmap.messages import FloatArray, PointCloud
 
-_LONGEST_S = 1.0
+_LONGEST_S = 1.0  # of a sweep: times that are farther from the stamp are in a wrong unit
 
 
 class Sweep(NamedTuple):
@@ -65,3 +65,27 @@ def sweep_of(cloud: PointCloud, T_base_sensor: FloatArray, limits_m: tuple[float
     for box in boxes_m:
         near &= ~((points_base >= box[:3]) & (points_base <= box[3:])).all(axis=1)
     return Sweep(points_base[near], times[kept][near] - middle_s(cloud) if timed else np.zeros(0))
+
+
+class SweepClock:
+    """Times of the sweeps: `middle_s`, of the last one after its stamp; `runs`: there was one."""
+
+    def __init__(self) -> None:
+        self.middle_s = 0.0
+        self._last_ns: int | None = None
+
+    @property
+    def runs(self) -> bool:
+        """Whether a cloud has come."""
+        return self._last_ns is not None
+
+    def step(self, cloud: PointCloud) -> tuple[float, float]:
+        """Return the time from stamp to stamp and from middle to middle of the sweeps, s; 0 for the first.
+
+        A stamp that runs backwards counts as no time; a cloud without points has its middle where the last one had.
+        """
+        first, last_ns = self._last_ns is None, cloud.stamp_ns if self._last_ns is None else self._last_ns
+        dt_s = max(cloud.stamp_ns - last_ns, 0) * 1e-9
+        self._last_ns = max(cloud.stamp_ns, last_ns)
+        before_s, self.middle_s = self.middle_s, middle_s(cloud) if len(cloud.points_m) else self.middle_s
+        return dt_s, 0.0 if first else max(dt_s + self.middle_s - before_s, 0.0)
