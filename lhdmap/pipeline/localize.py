@@ -230,18 +230,18 @@ class Localizer:
         self._stamp_ns = stamp_ns
         self._began_ns = stamp_ns if self._began_ns is None else self._began_ns
         if self._before is not None:
-            moved = se2.between(self._before, step.T_odom_base)
+            moved = se2.between(self._before, step.pose_odom_base)
             self._travelled_m += math.hypot(moved[0], moved[1])
             if self._tracker is not None:
                 self._tracker.predict(moved, *self._carried(step))
         self._time_ns = step.time_ns
-        self._before = step.T_odom_base.copy()
+        self._before = step.pose_odom_base.copy()
         predicted = self._belief()
         source, points = "", np.zeros((0, 2))
         if step.processed:
             points, front = self._hits(step, odometry)
             told, told_front = self._of_the_map(points, front)
-            self._finder.add(step.T_odom_base, told)
+            self._finder.add(step.pose_odom_base, told)
             source = self._correct(told, told_front) if len(told) > _LEAST_LEFT * len(points) else "odometry"
             self._judge()
             self._look_near(stamp_ns, told)
@@ -252,7 +252,7 @@ class Localizer:
             self._row(stamp_ns, step, source, 1e3 * (time.perf_counter() - began - self._finder.waited_s + waited_s))
         )
         if self._lag is not None:
-            said = Step(len(self.rows) - 1, step.T_odom_base, step.error.covariance, odometry.gyro.turn_rad)
+            said = Step(len(self.rows) - 1, step.pose_odom_base, step.error.covariance, odometry.gyro.turn_rad)
             self._smooth(self._lag, said, predicted)
         self._set_against_the_map(stamp_ns, points)  # the place has not waited for it
         if self._listener is not None:
@@ -395,7 +395,7 @@ class Localizer:
 
     def _look_around(self, stamp_ns: int, step: OdometryStep) -> None:
         """Take over what a search has said, and begin the next one that is due."""
-        said = self._finder.answer(stamp_ns, step.T_odom_base)
+        said = self._finder.answer(stamp_ns, step.pose_odom_base)
         if said is not None and said.purpose == self._purpose:
             self._take_over(said)
         if self._trial is not None and self._travelled_m - self._trial.since_m < self._settings.confirm_m:
@@ -404,9 +404,9 @@ class Localizer:
         claimed = None if tracker is None else np.append(tracker.pose, tracker.height_m)
         came = None
         if self._status == TRACKING and tracker is not None:
-            T_map_odom = se2.compose(tracker.pose, se2.inverse(step.T_odom_base))
-            came = partial(self.world.stands_in, T_map_odom, tracker.height_m)
-        self._finder.ask(self._purpose, stamp_ns, self._travelled_m, step.T_odom_base, claimed, came)
+            pose_map_odom = se2.compose(tracker.pose, se2.inverse(step.pose_odom_base))
+            came = partial(self.world.stands_in, pose_map_odom, tracker.height_m)
+        self._finder.ask(self._purpose, stamp_ns, self._travelled_m, step.pose_odom_base, claimed, came)
 
     @property
     def _purpose(self) -> str:

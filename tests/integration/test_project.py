@@ -9,9 +9,10 @@ import numpy as np
 import pytest
 from lhdmap.errors import InputError
 from lhdmap.geometry import se3
+from lhdmap.geometry.articulated import T_base_rear, T_rear_base
 from lhdmap.integration.beams import beam_table, scan_points, sweep_stamps_ns, table_of
 from lhdmap.integration.project import Counts, Limits, SweepPoints, SweepPoses, project_cloud, project_scan
-from lhdmap.integration.self_filter import Rig, base_to_rear, rear_to_base, rig_of, self_hits
+from lhdmap.integration.self_filter import Rig, rig_of, self_hits
 from lhdmap.kinematics import T_base_rear
 from lhdmap.machine import BodyBox, Machine
 from lhdmap.messages import FloatArray, LaserScan, Mount, PointCloud
@@ -86,8 +87,8 @@ def test_the_rear_body_is_where_the_kinematics_put_it(articulation: float) -> No
     machine = Machine()
     size = machine.dimensions
     lengths = (size.joint_to_front_axle_m, size.joint_to_rear_axle_m)
-    assert base_to_rear(articulation, *lengths) == pytest.approx(T_base_rear(articulation, machine), abs=1e-12)
-    product = base_to_rear(articulation, *lengths) @ rear_to_base(articulation, *lengths)
+    assert T_base_rear(articulation, *lengths) == pytest.approx(T_base_rear(articulation, machine), abs=1e-12)
+    product = T_base_rear(articulation, *lengths) @ T_rear_base(articulation, *lengths)
     assert product == pytest.approx(np.eye(4), abs=1e-12)
 
 

@@ -71,10 +71,10 @@ def planar(walls: str, course: str, seed: int, *, wheels: bool = False) -> Drive
     steps = [driven.steps[k] for k in used]
     keys = KeyScans(SmoothingSettings())
     for step in steps:
-        keys.update(step.time_ns, step.T_odom_base, _HIT, step.error, unseen=step.unseen)
+        keys.update(step.time_ns, step.pose_odom_base, _HIT, step.error, unseen=step.unseen)
     expected = expected_error(keys, None)
     assert expected is not None
-    true, estimate = truth[used], np.array([step.T_odom_base for step in steps])
+    true, estimate = truth[used], np.array([step.pose_odom_base for step in steps])
     return Driven(true, estimate, steps, expected, (*_end_error(true, estimate), None))
 
 

@@ -93,11 +93,11 @@ class Locating(Process):
         if not step.processed:
             return
         points = np.concatenate([part[:, :2] for part in (odometry.points, odometry.points_behind)])
-        self._seen.append(Seen(stamp_ns, step.T_odom_base.copy(), points, *self._apart(step), len(odometry.points)))
+        self._seen.append(Seen(stamp_ns, step.pose_odom_base.copy(), points, *self._apart(step), len(odometry.points)))
 
     def _apart(self, step: OdometryStep) -> tuple[float, float]:
         """Return by how much pose and scan disagree; infinite where the scan does not fit at all."""
-        by_wheels = self._agreement.of_motion(step.time_ns, step.T_odom_base)
+        by_wheels = self._agreement.of_motion(step.time_ns, step.pose_odom_base)
         fix = self.localizer.fix
         by_map = (0.0, 0.0)
         if fix is not None:
