@@ -5,7 +5,7 @@ It is not safe where the slope is the only evidence: of a bare wall or a hang-up
 
 from __future__ import annotations
 
-from lhdmap.pile.figure9_settings import Figure9Constants
+from lhdmap.pile.figure9.settings import Figure9Constants
 from lhdmap.pile.judge import Bounds, shares
 
 

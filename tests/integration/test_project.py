@@ -8,8 +8,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 from lhdmap.errors import InputError
-from lhdmap.geometry import se3
-from lhdmap.geometry.articulated import T_base_rear, T_rear_base
+from lhdmap.geometry import articulated, se3
 from lhdmap.integration.beams import beam_table, scan_points, sweep_stamps_ns, table_of
 from lhdmap.integration.project import Counts, Limits, SweepPoints, SweepPoses, project_cloud, project_scan
 from lhdmap.integration.self_filter import Rig, rig_of, self_hits
@@ -87,8 +86,8 @@ def test_the_rear_body_is_where_the_kinematics_put_it(articulation: float) -> No
     machine = Machine()
     size = machine.dimensions
     lengths = (size.joint_to_front_axle_m, size.joint_to_rear_axle_m)
-    assert T_base_rear(articulation, *lengths) == pytest.approx(T_base_rear(articulation, machine), abs=1e-12)
-    product = T_base_rear(articulation, *lengths) @ T_rear_base(articulation, *lengths)
+    assert articulated.T_base_rear(articulation, *lengths) == pytest.approx(T_base_rear(articulation, machine), abs=1e-12)
+    product = articulated.T_base_rear(articulation, *lengths) @ articulated.T_rear_base(articulation, *lengths)
     assert product == pytest.approx(np.eye(4), abs=1e-12)
 
 

@@ -11,8 +11,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from lhdmap.geometry.se3 import from_rpy
 from lhdmap.messages import FloatArray
-from lhdmap.pile import figure9_stage
-from lhdmap.pile.figure9 import (
+from lhdmap.pile.figure9 import stage as figure9_stage
+from lhdmap.pile.figure9.fit import largest_cluster, plane_inclination_deg, voxelised
+from lhdmap.pile.figure9.method import (
     distance_to_center_m,
     drift_heading_rad,
     figure9,
@@ -20,8 +21,7 @@ from lhdmap.pile.figure9 import (
     mean_normal_inclination_deg,
     segment,
 )
-from lhdmap.pile.figure9_fit import largest_cluster, plane_inclination_deg, voxelised
-from lhdmap.pile.figure9_settings import Figure9Constants, RepairedConstants
+from lhdmap.pile.figure9.settings import Figure9Constants, RepairedConstants
 from lhdmap.pile.result import PileEstimate
 from lhdmap.pile.settings import PileSettings
 from lhdmap.pile.slope_status import status_of, status_probabilities

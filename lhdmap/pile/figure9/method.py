@@ -15,8 +15,8 @@ import numpy.typing as npt
 
 from lhdmap.integration.normals import estimate_normals
 from lhdmap.messages import FloatArray
-from lhdmap.pile.figure9_fit import largest_cluster, plane_inclination_deg, voxelised
-from lhdmap.pile.figure9_settings import Figure9Constants
+from lhdmap.pile.figure9.fit import largest_cluster, plane_inclination_deg, voxelised
+from lhdmap.pile.figure9.settings import Figure9Constants
 from lhdmap.pile.result import PileEstimate
 from lhdmap.pile.slope_status import status_of
 

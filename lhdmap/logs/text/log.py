@@ -15,7 +15,7 @@ from lhdmap.logs.base import RUN, TopicInfo, run_stride, span_s
 from lhdmap.logs.clock import ClockStep
 from lhdmap.logs.findings import Findings
 from lhdmap.logs.stamps import StampKeeper, TopicStamps
-from lhdmap.logs.text_lines import text_lines
+from lhdmap.logs.text.lines import text_lines
 from lhdmap.messages import Message, Record
 
 

@@ -15,9 +15,9 @@ import numpy.typing as npt
 
 from lhdmap.integration.normals import estimate_normals
 from lhdmap.messages import FloatArray
-from lhdmap.pile.figure9_fit import face_plane, plane_inclination_deg, voxelised
-from lhdmap.pile.figure9_settings import Figure9Constants
-from lhdmap.pile.height_map import Mask
+from lhdmap.pile.clouds.height_map import Mask
+from lhdmap.pile.figure9.fit import face_plane, plane_inclination_deg, voxelised
+from lhdmap.pile.figure9.settings import Figure9Constants
 from lhdmap.pile.result import PileEstimate
 from lhdmap.pile.slope_status import status_probabilities
 

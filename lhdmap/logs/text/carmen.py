@@ -12,11 +12,11 @@ from collections.abc import Collection, Iterator
 import numpy as np
 
 from lhdmap.errors import InputError
-from lhdmap.logs import carmen_lines as lines
 from lhdmap.logs.base import TopicInfo
-from lhdmap.logs.carmen_survey import FRAMES, PARSERS, CarmenSurvey, survey
 from lhdmap.logs.findings import Findings
-from lhdmap.logs.text_log import Found, TextLog, Wanted, every
+from lhdmap.logs.text import carmen_lines as lines
+from lhdmap.logs.text.carmen_survey import FRAMES, PARSERS, CarmenSurvey, survey
+from lhdmap.logs.text.log import Found, TextLog, Wanted, every
 from lhdmap.messages import GroundTruth, LaserScan, Mount, WheelPose
 from lhdmap.roles import ODOMETRY, ROLES, SCAN, TRANSFORMS
 

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 import numpy as np
 import numpy.typing as npt
 
-from lhdmap.logs.finding import Finding, Severity
+from lhdmap.logs.doctor.finding import Finding, Severity
 from lhdmap.messages import Float32Array, LaserScan
 
 _SAMPLES = 256  # scans kept for the statistics of single beams

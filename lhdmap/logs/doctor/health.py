@@ -11,15 +11,15 @@ from pathlib import Path
 from lhdmap.errors import InputError
 from lhdmap.logs.base import LogReader
 from lhdmap.logs.decoders import DECODERS
-from lhdmap.logs.finding import Finding, Severity
+from lhdmap.logs.doctor.finding import Finding, Severity
+from lhdmap.logs.doctor.scans import ScanWatch
+from lhdmap.logs.doctor.stamps import StampWatch
+from lhdmap.logs.doctor.values import ValueWatch
 from lhdmap.logs.formats import open_log
 from lhdmap.logs.inventory import Inventory, take_inventory
-from lhdmap.logs.scan_health import ScanWatch
 from lhdmap.logs.scan_repair import AS_IT_IS
-from lhdmap.logs.stamp_health import StampWatch
 from lhdmap.logs.survey import Survey, take_survey
 from lhdmap.logs.topics import is_ground_truth, missing_scanner, roles_and_doubt
-from lhdmap.logs.value_health import ValueWatch
 from lhdmap.messages import LaserScan, Message, Record
 from lhdmap.roles import CLOUD, SCAN
 

@@ -11,9 +11,9 @@ import numpy as np
 
 from lhdmap.errors import InputError
 from lhdmap.geometry import se3
-from lhdmap.logs import carmen_lines as lines
 from lhdmap.logs.findings import Findings
-from lhdmap.logs.text_lines import text_lines
+from lhdmap.logs.text import carmen_lines as lines
+from lhdmap.logs.text.lines import text_lines
 from lhdmap.messages import Float32Array, FloatArray
 
 Parser = Callable[[list[bytes]], lines.LaserLine]

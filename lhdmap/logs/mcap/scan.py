@@ -10,9 +10,9 @@ import re
 from typing import BinaryIO
 
 from lhdmap.errors import InputError
-from lhdmap.logs import mcap_records as rec
 from lhdmap.logs.blocks import MAX_TIME_NS, Block
 from lhdmap.logs.findings import Findings
+from lhdmap.logs.mcap import records as rec
 
 STRETCH_BYTES = 1 << 20
 _LEAST = {

@@ -6,7 +6,7 @@ import heapq
 
 import numpy as np
 
-from lhdmap.logs.finding import Finding, Severity
+from lhdmap.logs.doctor.finding import Finding, Severity
 from lhdmap.logs.stamps import TopicStamps
 
 _SAMPLES = 4096

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from lhdmap.messages import FloatArray
-from lhdmap.pile.height_map import HeightMap, Mask
+from lhdmap.pile.clouds.height_map import HeightMap, Mask
 
 _MOST_APART_DEG = 15.0
 _FLATTEST_DEG = 10.0

@@ -11,7 +11,7 @@ import struct
 from lhdmap.errors import InputError
 from lhdmap.logs.base import Channel
 from lhdmap.logs.blocks import Entry
-from lhdmap.logs.mcap_records import ros2_type
+from lhdmap.logs.mcap.records import ros2_type
 
 MAGIC = b"#ROSBAG V2.0\n"
 MESSAGE, BAG_HEADER, INDEX, CHUNK, CHUNK_INFO, CONNECTION = 2, 3, 4, 5, 6, 7

@@ -12,8 +12,8 @@ import numpy as np
 
 from lhdmap.geometry import se3
 from lhdmap.messages import FloatArray
-from lhdmap.pile.figure9 import figure9, loop_ends
-from lhdmap.pile.figure9_settings import Figure9Constants
+from lhdmap.pile.figure9.method import figure9, loop_ends
+from lhdmap.pile.figure9.settings import Figure9Constants
 from lhdmap.pile.result import Approach, PileReport, Snapshot
 from lhdmap.pile.settings import PileSettings
 from lhdmap.pile.stage import ScanHits

@@ -10,7 +10,7 @@ from lhdmap.errors import InputError
 from lhdmap.logs.base import Channel
 from lhdmap.logs.blocks import MAX_TIME_NS
 from lhdmap.logs.container import Contents
-from lhdmap.logs.sqlite_pages import Pages, Place, Row
+from lhdmap.logs.sqlite.pages import Pages, Place, Row
 
 
 class _Found(NamedTuple):

@@ -16,8 +16,8 @@ import numpy as np
 from lhdmap.errors import InputError
 from lhdmap.logs.base import TopicInfo
 from lhdmap.logs.findings import Findings
-from lhdmap.logs.text_lines import text_lines
-from lhdmap.logs.text_log import Found, TextLog, Wanted, every
+from lhdmap.logs.text.lines import text_lines
+from lhdmap.logs.text.log import Found, TextLog, Wanted, every
 from lhdmap.messages import Float32Array, LaserScan, WheelPose
 from lhdmap.roles import ODOMETRY, SCAN
 

@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from lhdmap.geometry.plane import MAD_TO_STD, Weights, robust_plane
 from lhdmap.messages import FloatArray
-from lhdmap.pile.height_map import HeightMap
+from lhdmap.pile.clouds.height_map import HeightMap
 
 _FLAT_DEG = 8.0
 _ROUNDS = 6  # of the plane through the level cells

@@ -17,7 +17,7 @@ from lhdmap.logs.compression import inflated
 from lhdmap.logs.container import Contents
 from lhdmap.logs.findings import Findings
 from lhdmap.logs.order import clock_was_set_back
-from lhdmap.logs.sqlite_salvage import Salvage
+from lhdmap.logs.sqlite.salvage import Salvage
 
 MAGIC = b"SQLite format 3\0"
 _MAX_MESSAGE_BYTES = 256 << 20

@@ -15,11 +15,11 @@ import numpy as np
 from lhdmap.errors import InputError
 from lhdmap.integration.cloud_io import read_cloud
 from lhdmap.messages import FloatArray
-from lhdmap.pile.figure9_settings import Figure9Constants
-from lhdmap.pile.heap_axes import isolated, rotation_to_up, vertical_axis
-from lhdmap.pile.heap_faces import HeapFace, find_faces
-from lhdmap.pile.heap_floor import Floor, find_floor
-from lhdmap.pile.height_map import HeightMap, Mask, height_map
+from lhdmap.pile.clouds.axes import isolated, rotation_to_up, vertical_axis
+from lhdmap.pile.clouds.faces import HeapFace, find_faces
+from lhdmap.pile.clouds.floor import Floor, find_floor
+from lhdmap.pile.clouds.height_map import HeightMap, Mask, height_map
+from lhdmap.pile.figure9.settings import Figure9Constants
 from lhdmap.pile.result import AttackPoint, Boulder, PileEstimate
 from lhdmap.pile.slope_status import status_probabilities
 
@@ -83,8 +83,8 @@ def measure_cloud(points_m: FloatArray, up: str = "auto", empty_m: FloatArray | 
         InputError: fewer than 200 points.
         UsageError: the axis has no such name.
     """
-    from lhdmap.pile.drift_cloud import drift_shell, measure_drift
-    from lhdmap.pile.drift_rocks import with_rocks
+    from lhdmap.pile.clouds.drift import drift_shell, measure_drift
+    from lhdmap.pile.clouds.drift_rocks import with_rocks
 
     if len(points_m) < FEWEST_POINTS:
         raise InputError(f"the cloud has {len(points_m)} points; at least {FEWEST_POINTS} were wanted")

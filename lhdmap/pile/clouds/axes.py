@@ -6,7 +6,7 @@ import numpy as np
 
 from lhdmap.errors import UsageError
 from lhdmap.messages import FloatArray
-from lhdmap.pile.height_map import Mask
+from lhdmap.pile.clouds.height_map import Mask
 
 AXES = ("x", "y", "z", "-x", "-y", "-z")
 _NEIGHBOUR = 6

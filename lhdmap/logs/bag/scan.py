@@ -6,7 +6,7 @@ import re
 from typing import BinaryIO, NamedTuple
 
 from lhdmap.errors import InputError
-from lhdmap.logs import bag_records as rec
+from lhdmap.logs.bag import records as rec
 from lhdmap.logs.base import Channel
 from lhdmap.logs.blocks import MAX_TIME_NS, Block
 from lhdmap.logs.findings import Findings

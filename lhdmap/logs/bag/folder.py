@@ -9,14 +9,14 @@ from operator import itemgetter
 from pathlib import Path
 
 from lhdmap.errors import InputError
-from lhdmap.logs.bag_metadata import NAME, bare, files_of, storage
+from lhdmap.logs.bag.metadata import NAME, bare, files_of, storage
 from lhdmap.logs.base import Channel
 from lhdmap.logs.container import Container, Contents, OpenContainer
 from lhdmap.logs.findings import Findings
-from lhdmap.logs.mcap_log import McapFile
+from lhdmap.logs.mcap.log import McapFile
 from lhdmap.logs.order import pieces_fit
 from lhdmap.logs.packed import PackedFile
-from lhdmap.logs.sqlite_log import SqliteFile
+from lhdmap.logs.sqlite.log import SqliteFile
 
 _PARTS: dict[str, OpenContainer] = {".mcap": McapFile, ".db3": SqliteFile}
 _SHIFT = 1 << 32

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from lhdmap.logs.finding import Finding, Severity
+from lhdmap.logs.doctor.finding import Finding, Severity
 from lhdmap.messages import GroundTruth, Inclination, Joints, Message, PointCloud, Pressure, Tachometer, WheelPose
 
 _MANY = 50

@@ -6,8 +6,8 @@ from pathlib import Path
 from typing import BinaryIO
 
 from lhdmap.errors import InputError
-from lhdmap.logs import bag_records as rec
-from lhdmap.logs.bag_scan import Scan
+from lhdmap.logs.bag import records as rec
+from lhdmap.logs.bag.scan import Scan
 from lhdmap.logs.blocks import Entry
 from lhdmap.logs.container import BlockFile, Contents
 from lhdmap.logs.findings import Findings

@@ -8,12 +8,12 @@ from pathlib import Path
 from typing import BinaryIO
 
 from lhdmap.errors import InputError
-from lhdmap.logs import mcap_records as rec
 from lhdmap.logs.blocks import Entry
 from lhdmap.logs.compression import inflated
 from lhdmap.logs.container import BlockFile, Contents
 from lhdmap.logs.findings import Findings
-from lhdmap.logs.mcap_scan import Scan
+from lhdmap.logs.mcap import records as rec
+from lhdmap.logs.mcap.scan import Scan
 
 _FOOTER_BYTES = rec.HEAD.size + 20
 _MAX_SUMMARY_BYTES = 256 << 20
