@@ -86,7 +86,9 @@ def test_the_rear_body_is_where_the_kinematics_put_it(articulation: float) -> No
     machine = Machine()
     size = machine.dimensions
     lengths = (size.joint_to_front_axle_m, size.joint_to_rear_axle_m)
-    assert articulated.T_base_rear(articulation, *lengths) == pytest.approx(T_base_rear(articulation, machine), abs=1e-12)
+    assert articulated.T_base_rear(articulation, *lengths) == pytest.approx(
+        T_base_rear(articulation, machine), abs=1e-12
+    )
     product = articulated.T_base_rear(articulation, *lengths) @ articulated.T_rear_base(articulation, *lengths)
     assert product == pytest.approx(np.eye(4), abs=1e-12)
 

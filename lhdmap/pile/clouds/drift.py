@@ -15,9 +15,9 @@ import numpy.typing as npt
 
 from lhdmap.integration.normals import estimate_normals
 from lhdmap.messages import FloatArray
+from lhdmap.pile.bounds import BOUNDS
 from lhdmap.pile.clouds.height_map import Mask
 from lhdmap.pile.figure9.fit import face_plane, plane_inclination_deg, voxelised
-from lhdmap.pile.figure9.settings import Figure9Constants
 from lhdmap.pile.result import PileEstimate
 from lhdmap.pile.slope_status import status_probabilities
 
@@ -260,7 +260,7 @@ def _closes(slope: Slope, around: Shell, before: FloatArray) -> bool:
 def _estimate(slope: Slope) -> PileEstimate:
     points, width = slope.points, slope.left_m - slope.right_m
     residuals = (slope.x_at(points[:, 2]) - points[:, 0]) * -math.sin(math.radians(slope.inclination_deg))
-    share = status_probabilities(slope.inclination_deg, _MODEL_STD_DEG, Figure9Constants())
+    share = status_probabilities(slope.inclination_deg, _MODEL_STD_DEG, BOUNDS)
     y = np.linspace(slope.left_m, slope.right_m, 15)
     toe = np.column_stack([np.full(15, slope.x_at(slope.floor_m)), y, np.full(15, slope.floor_m)]) @ slope.R
     top = float(np.percentile(points[:, 2], 97.0)) - slope.floor_m

@@ -15,11 +15,11 @@ import numpy as np
 from lhdmap.errors import InputError
 from lhdmap.integration.cloud_io import read_cloud
 from lhdmap.messages import FloatArray
+from lhdmap.pile.bounds import BOUNDS
 from lhdmap.pile.clouds.axes import isolated, rotation_to_up, vertical_axis
 from lhdmap.pile.clouds.faces import HeapFace, find_faces
 from lhdmap.pile.clouds.floor import Floor, find_floor
 from lhdmap.pile.clouds.height_map import HeightMap, Mask, height_map
-from lhdmap.pile.figure9.settings import Figure9Constants
 from lhdmap.pile.result import AttackPoint, Boulder, PileEstimate
 from lhdmap.pile.slope_status import status_probabilities
 
@@ -216,7 +216,7 @@ def _without_face(heap: Heap, points_m: FloatArray, reason: str) -> PileEstimate
 def _estimate(heap: Heap, points_m: FloatArray) -> PileEstimate:
     volume, volume_std = volume_m3(heap, points_m)
     face = heap.faces[0]
-    share = status_probabilities(-face.slope_deg, face.slope_std_deg, Figure9Constants())
+    share = status_probabilities(-face.slope_deg, face.slope_std_deg, BOUNDS)
     toe, left, right = _toe(heap, face)
     points = _cell_points(heap, face.cells)
     return PileEstimate(

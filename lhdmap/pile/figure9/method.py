@@ -162,7 +162,7 @@ def _estimate(found: Segmentation, T_map_base: FloatArray, constants: Figure9Con
         inclination = mean_normal_inclination_deg(in_axes, constants.slope_radius_m, viewpoint)
     else:
         inclination = plane_inclination_deg(in_axes)
-    status = status_of(inclination, constants)
+    status = status_of(inclination, constants.bounds)
     return PileEstimate(
         status=status,
         probabilities={status: 1.0},

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from lhdmap.pile.bounds import BOUNDS, StatusBounds
 from lhdmap.settings import setting
 
 FIG_9 = "autonomous loading, Fig. 9"
@@ -87,10 +88,17 @@ class Figure9Constants:
     slope_radius_m: float = setting(
         3.0, unit="m", source=FIG_9, minimum=0.05, maximum=20.0, doc="Radius of the final normals."
     )
-    shallow_deg: float = setting(28.0, unit="deg", source=RULE, doc="Below this the pile is too shallow.")
-    steep_deg: float = setting(60.0, unit="deg", source=RULE, doc="Above this it hangs up.")
-    wall_deg: float = setting(81.0, unit="deg", source=RULE, doc="Above this it is a wall,")
-    overhang_deg: float = setting(98.0, unit="deg", source=RULE, doc="up to this; beyond, it hangs over.")
+    shallow_deg: float = setting(BOUNDS.shallow_deg, unit="deg", source=RULE, doc="Below this the pile is too shallow.")
+    steep_deg: float = setting(BOUNDS.steep_deg, unit="deg", source=RULE, doc="Above this it hangs up.")
+    wall_deg: float = setting(BOUNDS.upright_deg, unit="deg", source=RULE, doc="Above this it is a wall,")
+    overhang_deg: float = setting(
+        BOUNDS.overhang_deg, unit="deg", source=RULE, doc="up to this; beyond, it hangs over."
+    )
+
+    @property
+    def bounds(self) -> StatusBounds:
+        """The four bounds of the status."""
+        return StatusBounds(self.shallow_deg, self.steep_deg, self.wall_deg, self.overhang_deg)
 
 
 @dataclass(frozen=True, slots=True)
