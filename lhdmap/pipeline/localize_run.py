@@ -21,9 +21,9 @@ from lhdmap.machine import Machine
 from lhdmap.messages import FloatArray
 from lhdmap.outputs import free_folder
 from lhdmap.pipeline.build import Progress
+from lhdmap.pipeline.inputs import ROLES_READ
 from lhdmap.pipeline.localize import KnownMap, Localizer
 from lhdmap.pipeline.mounts import machine_of
-from lhdmap.pipeline.outcome import ROLES_READ
 from lhdmap.report.localization_data import LocalizationData
 from lhdmap.report.localization_page import write_localization_report
 from lhdmap.report.localization_recording import record_localization

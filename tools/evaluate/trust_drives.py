@@ -15,8 +15,8 @@ from lhdmap.machine import Machine
 from lhdmap.messages import FloatArray
 from lhdmap.odometry.planar import PlanarOdometry
 from lhdmap.odometry.steps import OdometryStep
+from lhdmap.pipeline.inputs import ROLES_READ
 from lhdmap.pipeline.mapping import MappingPipeline, feed
-from lhdmap.pipeline.outcome import ROLES_READ
 from lhdmap.pipeline.track import Rows, resample
 from lhdmap.simulation.drive import simulate_drift
 from lhdmap.simulation.planar import PlanarScanner, drift_world, drive_along, simulate_scans
