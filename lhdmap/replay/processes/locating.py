@@ -16,7 +16,8 @@ from lhdmap.messages import FloatArray
 from lhdmap.navigation.along import Located
 from lhdmap.odometry.planar import PlanarOdometry
 from lhdmap.odometry.steps import OdometryStep
-from lhdmap.pipeline.localize import KnownMap, Localizer
+from lhdmap.pipeline.known_map import KnownMap
+from lhdmap.pipeline.localize import Localizer, LocalizerOptions
 from lhdmap.replay.journal import Scribe
 from lhdmap.replay.process import LOADING, LOCATED, MILLISECOND_NS, PILE, POSE, SEEN, Outgoing, Process, Received
 from lhdmap.replay.processes.perception import PERCEPTION
@@ -49,7 +50,9 @@ class Locating(Process):
         """`pile`: looks for piles on the way; each new estimate is told."""
         self._scribe, self._pile, self._told_ns = scribe, pile, 0
         self._seen: list[Seen] = []
-        self.localizer = Localizer(known, live(settings), machine, start, listener=self._listen, pile=pile)
+        self.localizer = Localizer(
+            known, live(settings), machine, start, LocalizerOptions(listener=self._listen, pile=pile)
+        )
         self._agreement = Agreement(self.localizer.pipeline.front_end.wheels.motion_between)
         scribe.goes("waiting", "no scan yet")
 
