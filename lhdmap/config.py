@@ -25,7 +25,7 @@ from lhdmap.navigation.settings import NavigationSettings
 from lhdmap.odometry.cloud.settings import CloudOdometrySettings
 from lhdmap.odometry.settings import AnchorSettings, OdometrySettings, RangeFlowSettings, SearchSettings
 from lhdmap.odometry.trust_settings import TrustSettings
-from lhdmap.pile.figure9_settings import Figure9Constants, RepairedConstants
+from lhdmap.pile.figure9.settings import Figure9Constants, RepairedConstants
 from lhdmap.pile.settings import PileSettings
 from lhdmap.proprioception.attitude import AttitudeSettings
 from lhdmap.proprioception.gyro import GyroSettings

@@ -12,8 +12,8 @@ from lhdmap.cli.console import Console
 from lhdmap.cli.options import add_topics, topic_overrides
 from lhdmap.errors import InputError
 from lhdmap.logs.base import LogReader
-from lhdmap.logs.finding import Finding, Severity
-from lhdmap.logs.health import Examination, Verdict, examine
+from lhdmap.logs.doctor.finding import Finding, Severity
+from lhdmap.logs.doctor.health import Examination, Verdict, examine
 from lhdmap.logs.inventory import Inventory, TopicSummary
 from lhdmap.messages import Record
 from lhdmap.names import name_of

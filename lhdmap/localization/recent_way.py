@@ -47,14 +47,14 @@ class RecentWay:
         self._ahead_m = self._travelled_m = 0.0
         self._taken_m, self._block_m = -math.inf, 0.0
 
-    def add(self, T_odom_base: FloatArray, points: FloatArray) -> None:
+    def add(self, pose_odom_base: FloatArray, points: FloatArray) -> None:
         """Take the hits (N, 2) of a scan in the machine's frame, at a pose (3,) in `odom`."""
         forward = 0.0
         if self._pose is not None:
-            step = se2.between(self._pose, T_odom_base)
+            step = se2.between(self._pose, pose_odom_base)
             self._travelled_m += math.hypot(step[0], step[1])
             forward = math.copysign(math.hypot(step[0], step[1]), step[0])
-        self._pose = T_odom_base.copy()
+        self._pose = pose_odom_base.copy()
         self._ahead_m += forward
         if self._travelled_m - self._taken_m < _EVERY_M:
             return

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from lhdmap.logs.finding import Finding, Severity
+from lhdmap.logs.doctor.finding import Finding, Severity
 from lhdmap.logs.scan_repair import ScanRepair, Stream, stream_of
 from lhdmap.messages import LaserScan
 

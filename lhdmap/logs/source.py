@@ -16,7 +16,7 @@ import numpy.typing as npt
 
 from lhdmap.errors import InputError, UsageError
 from lhdmap.logs.base import LogReader, TopicInfo
-from lhdmap.logs.finding import Severity
+from lhdmap.logs.doctor.finding import Severity
 from lhdmap.logs.formats import open_log
 from lhdmap.logs.inventory import Inventory, take_inventory
 from lhdmap.logs.kinds import of_one_type

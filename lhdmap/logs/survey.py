@@ -10,12 +10,12 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 from lhdmap.logs.base import LogReader
-from lhdmap.logs.finding import Finding, Severity
+from lhdmap.logs.doctor.finding import Finding, Severity
+from lhdmap.logs.doctor.scans import fatal_findings
+from lhdmap.logs.doctor.values import ValueWatch
 from lhdmap.logs.frames import FrameTree
-from lhdmap.logs.scan_health import fatal_findings
 from lhdmap.logs.scan_kinds import kinds_of
 from lhdmap.logs.scan_repair import AS_IT_IS, ScanRepair
-from lhdmap.logs.value_health import ValueWatch
 from lhdmap.messages import LaserScan, Message, Mount
 from lhdmap.roles import ROLES, TRANSFORMS, judged_as
 

@@ -93,7 +93,7 @@ def _between(processed: Sequence[OdometryStep]) -> FloatArray | None:
     dt_s = (processed[-1].time_ns - processed[0].time_ns) * 1e-9 if len(processed) > 1 else 0.0
     if not 0.0 < dt_s < _LONGEST_SPAN_S:
         return None
-    step = se2.between(processed[0].T_odom_base, processed[-1].T_odom_base)
+    step = se2.between(processed[0].pose_odom_base, processed[-1].pose_odom_base)
     middle = 0.5 * step[2]
     c, s = np.cos(middle), np.sin(middle)
     return np.array([c * step[0] + s * step[1], -s * step[0] + c * step[1], step[2]]) / dt_s

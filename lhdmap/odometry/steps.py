@@ -47,7 +47,7 @@ class Matched(NamedTuple):
 class OdometryStep(NamedTuple):
     """Outcome of one scan.
 
-    `T_odom_base`: planar pose (3,) at `time_ns`, the middle of the sweep: there an error of the speed that undid the sweep does
+    `pose_odom_base`: planar pose (3,) at `time_ns`, the middle of the sweep: there an error of the speed that undid the sweep does
     not move the scan as a whole; `covariance`: (3, 3) of that pose against the local map, in body axes (m, rad), a weak
     direction as wide as it is; `error`: what the step from the processed scan before adds to the error of the path, none where the
     scan was not processed; `information`: (3,) along, across (1/m²), heading (1/rad²) of this scan, the others unknown;
@@ -58,7 +58,7 @@ class OdometryStep(NamedTuple):
 
     stamp_ns: int
     time_ns: int
-    T_odom_base: FloatArray
+    pose_odom_base: FloatArray
     covariance: FloatArray
     velocity: FloatArray
     information: FloatArray

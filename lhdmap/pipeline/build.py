@@ -25,12 +25,14 @@ from lhdmap.outputs import free_folder
 from lhdmap.pile.result import PileReport
 from lhdmap.pipeline.beside import Beside, HelperDied, Here
 from lhdmap.pipeline.cost import CompileClock, Spent, cost, peak_memory_mib
+from lhdmap.pipeline.driven import odometry_of, ways_of
 from lhdmap.pipeline.given import GROUND_TRUTH, given_rows
+from lhdmap.pipeline.inputs import ROLES_READ, Inputs
 from lhdmap.pipeline.inspection import Inspection, Inspector, PileBeside
 from lhdmap.pipeline.interruption import Interruption
 from lhdmap.pipeline.mapping import MappingPipeline
 from lhdmap.pipeline.mounts import machine_of
-from lhdmap.pipeline.outcome import ROLES_READ, Inputs, Outcome, odometry_of, ways_of
+from lhdmap.pipeline.outcome import Outcome
 from lhdmap.pipeline.refusal import require_a_map
 from lhdmap.provenance import file_entry, source_entry
 from lhdmap.report.page import fill_in_cost

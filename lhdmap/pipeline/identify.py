@@ -15,8 +15,8 @@ from lhdmap.geometry import se3
 from lhdmap.logs.source import LogSource
 from lhdmap.machine import Machine
 from lhdmap.messages import FloatArray, LaserScan, Message, Mount
+from lhdmap.pile.clouds.heap import measure_cloud
 from lhdmap.pile.face import Registration
-from lhdmap.pile.heap import measure_cloud
 from lhdmap.pile.result import Approach, PileReport, Snapshot
 from lhdmap.pipeline.front_end import own_boxes
 from lhdmap.pipeline.given import given_rows

@@ -27,8 +27,8 @@ from lhdmap.pipeline.build import BuildRequest, BuildResult, build_map
 from lhdmap.pipeline.cost import CompileClock
 from lhdmap.pipeline.drives import Drive, drives_of
 from lhdmap.pipeline.join_files import Joined, write_joined
+from lhdmap.pipeline.known_map import KnownMap
 from lhdmap.pipeline.landmarks import landmarks_for, with_stretches
-from lhdmap.pipeline.localize import KnownMap
 from lhdmap.pipeline.overlap import overlap_of
 from lhdmap.pipeline.path import motion_at
 from lhdmap.pipeline.taught import TaughtMap, path_of, scratch

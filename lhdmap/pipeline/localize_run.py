@@ -21,9 +21,10 @@ from lhdmap.machine import Machine
 from lhdmap.messages import FloatArray
 from lhdmap.outputs import free_folder
 from lhdmap.pipeline.build import Progress
-from lhdmap.pipeline.localize import KnownMap, Localizer
+from lhdmap.pipeline.inputs import ROLES_READ
+from lhdmap.pipeline.known_map import KnownMap
+from lhdmap.pipeline.localize import Localizer, LocalizerOptions
 from lhdmap.pipeline.mounts import machine_of
-from lhdmap.pipeline.outcome import ROLES_READ
 from lhdmap.report.localization_data import LocalizationData
 from lhdmap.report.localization_page import write_localization_report
 from lhdmap.report.localization_recording import record_localization
@@ -121,7 +122,9 @@ def _localized(
     request: LocalizeRequest, known: KnownMap, source: LogSource, machine: Machine | None, recording: RecordingWriter
 ) -> Localizer:
     """Send the log through a localizer; scans that have a place are recorded."""
-    with Localizer(known, request.settings, machine, request.start, smoother=request.smoother) as localizer:
+    with Localizer(
+        known, request.settings, machine, request.start, LocalizerOptions(smoother=request.smoother)
+    ) as localizer:
         messages = source.messages([role for role in ROLES_READ if role in source.roles])
         for role, message in request.progress(messages, source.duration_s) if request.progress else messages:
             localizer.update(role, message)

@@ -11,7 +11,7 @@ import numba as nb
 from lhdmap.config import Settings
 from lhdmap.messages import FloatArray, LaserScan
 from lhdmap.pile.face import Registration
-from lhdmap.pile.figure9_stage import Figure9Stage
+from lhdmap.pile.figure9.stage import Figure9Stage
 from lhdmap.pile.result import PileReport
 from lhdmap.pile.stage import PileStage, ScanHits
 from lhdmap.scan_matching.scan_points import planar_points

@@ -57,15 +57,15 @@ class Track:
         """The newest pose: x, y, z (m), roll, pitch, heading (rad)."""
         return tuple(self._poses[-_POSE:])
 
-    def append(self, time_ns: int, T_odom_base: FloatArray, roll_rad: float, pitch_rad: float) -> None:
+    def append(self, time_ns: int, pose_odom_base: FloatArray, roll_rad: float, pitch_rad: float) -> None:
         """Add a planar pose (3,) with its attitude; `time_ns` must rise."""
-        pose = self.ahead(T_odom_base, roll_rad, pitch_rad)
+        pose = self.ahead(pose_odom_base, roll_rad, pitch_rad)
         self._times.append(time_ns)
         self._poses.extend(pose)
 
-    def ahead(self, T_odom_base: FloatArray, roll_rad: float, pitch_rad: float) -> tuple[float, ...]:
+    def ahead(self, pose_odom_base: FloatArray, roll_rad: float, pitch_rad: float) -> tuple[float, ...]:
         """Return the pose (x, y, z, roll, pitch, heading) that a planar pose (3,) with its attitude would add."""
-        x, y, heading = (float(value) for value in T_odom_base)
+        x, y, heading = (float(value) for value in pose_odom_base)
         z = 0.0
         if self._poses:
             x0, y0, z, roll0, pitch0, heading0 = self.newest

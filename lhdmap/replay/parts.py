@@ -11,7 +11,7 @@ from lhdmap.config import Settings
 from lhdmap.guidance.directive import Directive
 from lhdmap.machine import Machine
 from lhdmap.messages import Command, FloatArray
-from lhdmap.pipeline.localize import KnownMap
+from lhdmap.pipeline.known_map import KnownMap
 from lhdmap.replay.faults import Position
 from lhdmap.replay.processes.navigator import Errand
 from lhdmap.replay.processes.told import ModeNow

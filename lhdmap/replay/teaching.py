@@ -13,7 +13,7 @@ from lhdmap.machine import Machine
 from lhdmap.messages import FloatArray
 from lhdmap.mine.network import Network
 from lhdmap.pipeline.build import BuildRequest, build_map
-from lhdmap.pipeline.localize import KnownMap
+from lhdmap.pipeline.known_map import KnownMap
 from lhdmap.replay.parts import Autonomous
 from lhdmap.replay.processes.navigator import Errand
 from lhdmap.replay.processes.told import ModeNow

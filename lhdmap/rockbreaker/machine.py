@@ -13,7 +13,9 @@ from pathlib import Path
 import numpy as np
 
 from lhdmap.errors import ConfigError
+from lhdmap.geometry import se3
 from lhdmap.messages import FloatArray
+from lhdmap.rockbreaker.cylinders import beta_of_rho, rho_of_theta, theta_of_beta
 from lhdmap.settings import check_corners, setting
 from lhdmap.settings_tree import load_tree, part, tree_toml
 
@@ -157,8 +159,6 @@ class Rockbreaker:
         They are given in the turn around zero, whatever turn the offsets ε are in. The outer boom is kept a degree from in
         line with the inner one, straight or folded back, where the arm is singular, on the side where most of its range lies.
         """
-        from lhdmap.rockbreaker.kinematics import beta_of_rho, theta_of_beta
-
         ends = np.array([[joint.shortest_m, joint.longest_m] for joint in self.joints]).T
         theta = np.sort(theta_of_beta(self, beta_of_rho(self, ends)), axis=0)
         theta -= 2.0 * np.pi * np.round(theta.mean(axis=0) / (2.0 * np.pi))
@@ -176,8 +176,6 @@ class Rockbreaker:
     @cached_property
     def swing_rate_limit(self) -> float:
         """Lowest point of Fig. 6: swing rate that the valve allows at each angle, Eq. (17) with errata 3 and 8, rad/s."""
-        from lhdmap.rockbreaker.kinematics import rho_of_theta
-
         theta = np.zeros((20_001, 4))
         theta[:, 0] = np.linspace(self.theta_limits[0, 0], self.theta_limits[1, 0], len(theta))
         rate = np.abs(np.gradient(rho_of_theta(self, theta)[:, :2], theta[:, 0], axis=0))
@@ -187,8 +185,6 @@ class Rockbreaker:
     @cached_property
     def T_cloud_base(self) -> FloatArray:  # noqa: N802  # frames in the name
         """Pose of the base's frame in that of a cloud, shape (4, 4)."""
-        from lhdmap.geometry import se3
-
         return se3.from_rpy(0.0, 0.0, math.radians(self.base.yaw_deg), self.base.position_m)
 
 

@@ -16,7 +16,8 @@ from lhdmap.landmarks.scans import NodeScan
 from lhdmap.landmarks.settings import LandmarkSettings
 from lhdmap.localization.rows import TRACKING, Row
 from lhdmap.messages import FloatArray, Message, Mount
-from lhdmap.pipeline.localize import KnownMap, Localizer
+from lhdmap.pipeline.known_map import KnownMap
+from lhdmap.pipeline.localize import Localizer
 from lhdmap.simulation.planar import PlanarScanner, simulate_scans
 from lhdmap.topology.model import DEAD_END, AccessPoint, Intersection, TopologicalMap, Tunnel
 

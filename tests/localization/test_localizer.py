@@ -11,7 +11,8 @@ from lhdmap.config import Settings
 from lhdmap.geometry import se2
 from lhdmap.localization.rows import CANDIDATE, LOST, TRACKING, UNKNOWN, Row
 from lhdmap.messages import FloatArray
-from lhdmap.pipeline.localize import Localizer, Where
+from lhdmap.pipeline.localize import Localizer
+from lhdmap.pipeline.localizer_says import Where
 
 from tests.localization import known
 from tests.settings.streams import RATE_HZ

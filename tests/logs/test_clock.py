@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 from lhdmap.errors import LhdmapError
 from lhdmap.logs.blocks import Block, Loaded
+from lhdmap.logs.doctor.health import examine
 from lhdmap.logs.formats import open_log
-from lhdmap.logs.health import examine
 from lhdmap.logs.order import clock_was_set_back
 from lhdmap.logs.ros_messages import serialized
 from lhdmap.logs.source import LogSource

@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 import pytest
 from lhdmap.cli.main import main
-from lhdmap.logs.finding import Severity
-from lhdmap.logs.health import Examination, Verdict, examine
+from lhdmap.logs.doctor.finding import Severity
+from lhdmap.logs.doctor.health import Examination, Verdict, examine
 from lhdmap.logs.writer import LogWriter
 from lhdmap.messages import Inclination, LaserScan, Message, Mount, Tachometer
 

@@ -17,7 +17,7 @@ import pytest
 import zstandard
 from lhdmap.errors import InputError
 from lhdmap.logs import LogSource, open_log
-from lhdmap.logs.health import Verdict, examine
+from lhdmap.logs.doctor.health import Verdict, examine
 from mcap.writer import CompressionType
 from tools.fuzz_logs import write_bag, write_db3, write_mcap
 

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from lhdmap.cli.main import main
 from lhdmap.geometry import se3
-from lhdmap.logs.health import Verdict, examine
+from lhdmap.logs.doctor.health import Verdict, examine
 from lhdmap.logs.source import LogSource
 from lhdmap.logs.writer import LogWriter
 from lhdmap.messages import Inclination, Joints, LaserScan, Message, Mount, Tachometer, WheelPose

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from lhdmap.logs import LogSource, open_log
 from lhdmap.logs.base import TopicInfo
-from lhdmap.logs.health import Verdict, examine
+from lhdmap.logs.doctor.health import Verdict, examine
 from lhdmap.logs.kinds import of_one_type
 from lhdmap.logs.ros_messages import definition, serialized
 from lhdmap.messages import LaserScan, Message, Text

@@ -75,6 +75,6 @@ def run(scans: tuple[LaserScan, ...], truth: FloatArray, method: str = "anchored
 
     odometry = make(starting_velocity(make, inputs[:WARM_SCANS]))
     steps = [odometry.update(*one) for one in inputs]
-    move = se2.compose(truth[0], se2.inverse(steps[0].T_odom_base))
-    estimate = np.array([se2.compose(move, step.T_odom_base) for step in steps])
+    move = se2.compose(truth[0], se2.inverse(steps[0].pose_odom_base))
+    estimate = np.array([se2.compose(move, step.pose_odom_base) for step in steps])
     return Driven(estimate, truth, steps)

@@ -54,7 +54,7 @@ def run(scans: list[LaserScan], steps: list[WheelStep | None]) -> list[OdometryS
 
 def errors(found: list[OdometryStep], poses: FloatArray) -> FloatArray:
     """Return the error of each pose relative to the first, shape (N, 3)."""
-    own = [se2.between(found[0].T_odom_base, step.T_odom_base) for step in found]
+    own = [se2.between(found[0].pose_odom_base, step.pose_odom_base) for step in found]
     true = [se2.between(poses[0], pose) for pose in poses]
     return np.array([se2.between(a, b) for a, b in zip(true, own, strict=True)])
 

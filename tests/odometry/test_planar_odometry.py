@@ -76,7 +76,7 @@ def test_the_pose_of_a_sweep_is_that_of_its_middle() -> None:
 def test_same_input_same_output(rough: Driven) -> None:
     poses, scans = drive()
     again = run(scans[:200], poses[:200])
-    assert all((a.T_odom_base == b.T_odom_base).all() for a, b in zip(again.steps, rough.steps, strict=False))
+    assert all((a.pose_odom_base == b.pose_odom_base).all() for a, b in zip(again.steps, rough.steps, strict=False))
 
 
 def unharmed(driven: Driven, far_m: float, *, turned_deg: float = 1.0) -> None:
@@ -178,7 +178,7 @@ def test_the_second_scan_far_from_the_first(motion: tuple[float, float, float]) 
         scans = scans_at(np.array([place, se2.compose(place, np.array(motion))]))
         stage = PlanarOdometry()
         steps = [stage.update(scan._replace(stamp_ns=10**18 + k * 10**8), LEVEL) for k, scan in enumerate(scans)]
-        error = se2.between(np.array(motion), se2.between(steps[0].T_odom_base, steps[1].T_odom_base))
+        error = se2.between(np.array(motion), se2.between(steps[0].pose_odom_base, steps[1].pose_odom_base))
         found.append(np.hypot(error[0], error[1]) < 0.05 and abs(math.degrees(error[2])) < 1.0)
     assert sum(found) >= 5
 

@@ -26,7 +26,7 @@ def scale_error_pct(seed: int) -> float:
     poses = drive_along(world.centre_line_m, SPEED_MPS, RATE_HZ)
     scans = simulate_scans(world, poses, PlanarScanner(noise_m=0.012), RATE_HZ, seed)
     stage = PlanarOdometry(OdometrySettings(), AnchorSettings(), None, None, np.array([SPEED_MPS, 0.0, 0.0]))
-    found = np.array([stage.update(scan, LEVEL).T_odom_base for scan in scans])
+    found = np.array([stage.update(scan, LEVEL).pose_odom_base for scan in scans])
     return 100.0 * (_length_m(found) / _length_m(poses) - 1.0)
 
 
@@ -77,7 +77,7 @@ def smooth_drive(seed: int) -> Driven:
     inputs = [ScanInput(scan, LEVEL) for scan in scans]
     stage = begun(starting_velocity(begun, inputs[:WARM_SCANS]))
     steps = [stage.update(*one) for one in inputs]
-    return Driven(np.array([step.T_odom_base for step in steps]), poses, steps)
+    return Driven(np.array([step.pose_odom_base for step in steps]), poses, steps)
 
 
 def _standing_scans(noise_m: float, wheels: WheelStep | None = None) -> list[ScanInput]:
@@ -139,7 +139,7 @@ def straight_drive(kind: Straight, seed: int, slips: bool = False) -> Driven:
     inputs = [ScanInput(scan, LEVEL, step) for scan, step in zip(scans, wheels, strict=True)]
     stage = begun(starting_velocity(begun, inputs[:WARM_SCANS]))
     steps = [stage.update(*one) for one in inputs]
-    return Driven(np.array([step.T_odom_base for step in steps]), poses - poses[0], steps)
+    return Driven(np.array([step.pose_odom_base for step in steps]), poses - poses[0], steps)
 
 
 STRAIGHT = (

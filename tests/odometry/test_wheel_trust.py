@@ -71,7 +71,7 @@ def _with_wheels(poses: FloatArray, wheels: Callable[[float], float]) -> tuple[D
 
     odometry = make(starting_velocity(make, inputs[:WARM_SCANS]))
     out = [odometry.update(*one) for one in inputs]
-    estimate = np.array([se2.compose(poses[0], step.T_odom_base) for step in out])
+    estimate = np.array([se2.compose(poses[0], step.pose_odom_base) for step in out])
     return Driven(estimate, poses, out), odometry
 
 

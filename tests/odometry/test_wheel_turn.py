@@ -109,7 +109,7 @@ def test_wheels_that_turn_on_their_own_hold_the_heading_where_nothing_is_seen() 
         for k, (scan, step) in enumerate(zip(scans, steps, strict=True)):
             wheels = WheelStep(float(step[0]), 0.01, float(step[2] + 0.06 * step[0]), 0.001)
             seen = scan._replace(ranges_m=np.full_like(scan.ranges_m, np.inf)) if k in blind else scan
-            pose = odometry.update(seen, LEVEL, wheels).T_odom_base
+            pose = odometry.update(seen, LEVEL, wheels).pose_odom_base
             if k == blind[-1]:
                 error = math.degrees(se2.wrap(float(pose[2] - (poses[k, 2] - poses[0, 2]))))
         return abs(error)

@@ -13,8 +13,8 @@ from lhdmap.errors import InputError, UsageError
 from lhdmap.integration.cloud import Cloud
 from lhdmap.integration.cloud_io import write_cloud
 from lhdmap.messages import FloatArray
-from lhdmap.pile.heap import CloudPile, measure_cloud, run_cloud
-from lhdmap.pile.heap_axes import AXES, isolated, rotation_to_up
+from lhdmap.pile.clouds.axes import AXES, isolated, rotation_to_up
+from lhdmap.pile.clouds.heap import CloudPile, measure_cloud, run_cloud
 from lhdmap.pile.result import estimate_json
 from lhdmap.rockbreaker.machine import Rockbreaker
 from lhdmap.simulation.grizzly import simulate_grizzly

@@ -18,9 +18,10 @@ from lhdmap.logs.writer import LogWriter
 from lhdmap.machine import Machine
 from lhdmap.messages import Tachometer
 from lhdmap.pipeline.build import BuildRequest, build_map
-from lhdmap.pipeline.localize import KnownMap, Localizer
+from lhdmap.pipeline.inputs import ROLES_READ
+from lhdmap.pipeline.known_map import KnownMap
+from lhdmap.pipeline.localize import Localizer
 from lhdmap.pipeline.localize_run import LocalizeRequest, LocalizeResult, localize
-from lhdmap.pipeline.outcome import ROLES_READ
 from lhdmap.runfolder import RunFolder
 from lhdmap.simulation.mine_drive import MineDriveSettings, SimulatedMineDrive, simulate_mine
 from lhdmap.simulation.sensing.sections import ScannerSettings, SensorSettings

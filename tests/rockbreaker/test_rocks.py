@@ -12,8 +12,8 @@ from lhdmap.errors import ConfigError, InputError, LhdmapError
 from lhdmap.integration.cloud import Cloud
 from lhdmap.integration.cloud_io import write_cloud
 from lhdmap.rockbreaker.collision import Obstacles, axis_points, without_arm
+from lhdmap.rockbreaker.cylinders import rho_of_theta
 from lhdmap.rockbreaker.environment import cloud_in_base, read_boxes
-from lhdmap.rockbreaker.kinematics import rho_of_theta
 from lhdmap.rockbreaker.machine import Rockbreaker
 from lhdmap.rockbreaker.plan import Planner, Request, Trajectory, start_joints
 from lhdmap.rockbreaker.rocks import find_rocks

@@ -11,9 +11,9 @@ from lhdmap.config import settings_from
 from lhdmap.geometry import se3
 from lhdmap.logs.source import LogSource
 from lhdmap.messages import FloatArray, GroundTruth, LaserScan, PointCloud
+from lhdmap.pipeline.inputs import ROLES_READ
 from lhdmap.pipeline.mapping import MappingPipeline
 from lhdmap.pipeline.mounts import machine_of
-from lhdmap.pipeline.outcome import ROLES_READ
 from lhdmap.pipeline.track import Rows, resample
 
 from tools.evaluate.heading_drives import drive_of

@@ -21,8 +21,9 @@ from lhdmap.geometry import se3
 from lhdmap.logs.source import LogSource
 from lhdmap.machine import Machine
 from lhdmap.messages import FloatArray
+from lhdmap.pipeline.again import integrate_again
+from lhdmap.pipeline.inputs import ROLES_READ, Inputs
 from lhdmap.pipeline.mapping import MappingPipeline, feed
-from lhdmap.pipeline.outcome import ROLES_READ, Inputs, integrate_again
 from lhdmap.pipeline.track import Rows, resample, trajectory_of
 from lhdmap.simulation.drive import SimulatedDrive, simulate_drift
 from lhdmap.simulation.scenario import DriftScenario

@@ -17,9 +17,10 @@ from lhdmap.logs.writer import LogWriter
 from lhdmap.mapfolder import MapFolder
 from lhdmap.messages import Mount
 from lhdmap.pipeline.build import BuildRequest, build_map
-from lhdmap.pipeline.localize import KnownMap, Localizer
+from lhdmap.pipeline.inputs import ROLES_READ
+from lhdmap.pipeline.known_map import KnownMap
+from lhdmap.pipeline.localize import Localizer
 from lhdmap.pipeline.localize_run import trajectory_of
-from lhdmap.pipeline.outcome import ROLES_READ
 from lhdmap.roles import ROLES
 from lhdmap.trajectory import Trajectory
 

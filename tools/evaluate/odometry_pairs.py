@@ -44,7 +44,7 @@ def levels_of(scan: LaserScan) -> Pyramid:
 def motion_between(first: Pyramid, second: Pyramid, noise_m: float = 0.012) -> FloatArray:
     """Return the motion (3,) by range flow from no motion, coarse to fine."""
     found = flow(first, second, np.zeros(3), _NO_PRIOR, noise_m, coarsest=FLOW.levels - 1, iterations=FLOW.iterations)
-    return found.T_reference_current
+    return found.pose_reference_current
 
 
 def pairs(seeds: Sequence[int]) -> Iterator[Figure]:
@@ -63,7 +63,7 @@ def pairs(seeds: Sequence[int]) -> Iterator[Figure]:
             finest = Pyramid(planar_points(scans[k], LEVEL, np.zeros(3)), FLOW.width_m, 1)
             found = flow(before, finest, guess, _NO_PRIOR, 0.012, iterations=FLOW.iterations)
             cpu.append(time.thread_time() - started)
-            predicted.append(se2.between(true, found.T_reference_current))
+            predicted.append(se2.between(true, found.pose_reference_current))
             now = levels_of(scans[k])
             from_rest.append(se2.between(true, motion_between(before, now)))
             before = now
@@ -159,7 +159,7 @@ def _found(world: PlanarWorld, place: FloatArray, motion: FloatArray, dt_s: floa
     scans = simulate_scans(world, poses, PlanarScanner(), 1.0 / dt_s, 5)
     stage = odometry()
     first = stage.update(scans[0], LEVEL)
-    error = se2.between(motion, se2.between(first.T_odom_base, stage.update(scans[1], LEVEL).T_odom_base))
+    error = se2.between(motion, se2.between(first.pose_odom_base, stage.update(scans[1], LEVEL).pose_odom_base))
     return bool(np.hypot(error[0], error[1]) < 0.05 and abs(np.degrees(error[2])) < 1.0)
 
 

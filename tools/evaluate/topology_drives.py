@@ -21,8 +21,9 @@ from lhdmap.messages import GroundTruth, LaserScan, Message, PointCloud
 from lhdmap.mine.network import make_network
 from lhdmap.mine.plan import MinePlan, find_plan, load_plan
 from lhdmap.mine.topology import topology_json
+from lhdmap.pipeline.driven import ways_of
+from lhdmap.pipeline.inputs import ROLES_READ
 from lhdmap.pipeline.mapping import MappingPipeline, feed
-from lhdmap.pipeline.outcome import ROLES_READ, ways_of
 from lhdmap.pipeline.topology import seen_of
 from lhdmap.pipeline.track import Rows
 from lhdmap.roles import ROLES

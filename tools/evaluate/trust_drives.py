@@ -15,8 +15,8 @@ from lhdmap.machine import Machine
 from lhdmap.messages import FloatArray
 from lhdmap.odometry.planar import PlanarOdometry
 from lhdmap.odometry.steps import OdometryStep
+from lhdmap.pipeline.inputs import ROLES_READ
 from lhdmap.pipeline.mapping import MappingPipeline, feed
-from lhdmap.pipeline.outcome import ROLES_READ
 from lhdmap.pipeline.track import Rows, resample
 from lhdmap.simulation.drive import simulate_drift
 from lhdmap.simulation.planar import PlanarScanner, drift_world, drive_along, simulate_scans
@@ -71,10 +71,10 @@ def planar(walls: str, course: str, seed: int, *, wheels: bool = False) -> Drive
     steps = [driven.steps[k] for k in used]
     keys = KeyScans(SmoothingSettings())
     for step in steps:
-        keys.update(step.time_ns, step.T_odom_base, _HIT, step.error, unseen=step.unseen)
+        keys.update(step.time_ns, step.pose_odom_base, _HIT, step.error, unseen=step.unseen)
     expected = expected_error(keys, None)
     assert expected is not None
-    true, estimate = truth[used], np.array([step.T_odom_base for step in steps])
+    true, estimate = truth[used], np.array([step.pose_odom_base for step in steps])
     return Driven(true, estimate, steps, expected, (*_end_error(true, estimate), None))
 
 

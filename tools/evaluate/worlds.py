@@ -140,7 +140,7 @@ def run(
 def interpolated(steps: list[OdometryStep]) -> FloatArray:
     """Return a pose (N, 3) at every scan's stamp, heading unwrapped; the odometry's are those of the sweeps' middles."""
     used = [step for step in steps if step.processed]
-    planar = np.array([step.T_odom_base for step in used])
+    planar = np.array([step.pose_odom_base for step in used])
     rows = np.zeros((len(used), 6))
     rows[:, [0, 1]], rows[:, 5] = planar[:, :2], np.unwrap(planar[:, 2])
     known = np.array([step.time_ns for step in used], dtype=np.int64)

@@ -34,11 +34,11 @@ _HEADING_ARM_M = 4.0  # by which a turn counts as a step
 class Flow(NamedTuple):
     """Motion between two scans and how sure it is.
 
-    `T_reference_current` (3,); `information` (3, 3) of the twist about the reference (gradients that are only noise do not
+    `pose_reference_current` (3,); `information` (3, 3) of the twist about the reference (gradients that are only noise do not
     count); residual in sigmas (rms); share of beams that agree.
     """
 
-    T_reference_current: FloatArray
+    pose_reference_current: FloatArray
     information: FloatArray
     residual_sigmas: float
     support: float
@@ -64,7 +64,7 @@ def flow(
     for level in range(coarsest, -1, -1):
         step = _solve(reference.level(level), current.level(level), pose, guess, prior_information, noise_m, iterations)
         result = Flow(*step)
-        pose = result.T_reference_current
+        pose = result.pose_reference_current
     return result
 
 
@@ -79,12 +79,12 @@ def _solve(reference, current, start, guess, prior_information, noise_m, iterati
     H, N, b, turn = np.zeros((3, 3)), np.zeros((3, 3)), np.zeros(3), np.eye(3)
     weights, squares, middle, end = 0.0, 0.0, 0, 0
     for _ in range(iterations):
-        T_current_reference = se2.inverse(pose)
+        pose_current_reference = se2.inverse(pose)
         middle = warp(pose, current, reference, noise_m, forth, table, 0)
-        end = warp(T_current_reference, reference, current, noise_m, back, table, middle)
+        end = warp(pose_current_reference, reference, current, noise_m, back, table, middle)
         if end < _FEWEST_BEAMS:
             return pose, np.zeros((3, 3)), math.nan, 0.0
-        _fill_turn(T_current_reference, turn)
+        _fill_turn(pose_current_reference, turn)
         toward = prior_information @ (guess - pose)
         twist[:] = 0.0
         for _ in range(_REWEIGHTINGS):
@@ -110,7 +110,7 @@ def _size_m(twist):  # type: ignore[no-untyped-def]
 
 @nb.njit(cache=True, nogil=True)
 def _fill_turn(T, turn):  # type: ignore[no-untyped-def]
-    """Fill `turn` (3, 3): a twist of `T_reference_current` from the left, as the twist of its inverse `T` from the left."""
+    """Fill `turn` (3, 3): a twist of `pose_reference_current` from the left, as the twist of its inverse `T` from the left."""
     c, s = math.cos(T[2]), math.sin(T[2])
     turn[0, 0], turn[0, 1], turn[0, 2] = -c, s, -T[1]
     turn[1, 0], turn[1, 1], turn[1, 2] = -s, -c, T[0]

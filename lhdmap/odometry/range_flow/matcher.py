@@ -29,37 +29,37 @@ class FlowMatcher:
         self._references: list[FlowReference] = []
         self._newest = np.zeros(3)  # pose of base_link at the newest reference
 
-    def step(self, points: FloatArray, T_base_scanner: FloatArray) -> Matched:
+    def step(self, points: FloatArray, pose_base_scanner: FloatArray) -> Matched:
         """Compare points (N, 2), level base frame, with the references; correct the motion; renew the references."""
         if len(points) < _FEWEST_HITS:
             return Matched(np.zeros((3, 3)), math.nan, 0.0, lost=True)
-        levels = scanner_pyramid(points, T_base_scanner, self._settings)
+        levels = scanner_pyramid(points, pose_base_scanner, self._settings)
         if not self._references:
-            self._refer(levels, T_base_scanner)
+            self._refer(levels, pose_base_scanner)
             return Matched(BY_DEFINITION, 0.0, 1.0, lost=False)
         found = [
-            compare(one, levels, T_base_scanner, self._motion, self._noise_m, self._settings)
+            compare(one, levels, pose_base_scanner, self._motion, self._noise_m, self._settings)
             for one in self._references
         ]
         best = max(found, key=lambda one: one.support)
         agreeing = [one for one in found if one.support >= self._settings.min_support]
         if not agreeing:
             self._references.clear()
-            self._refer(levels, T_base_scanner)
+            self._refer(levels, pose_base_scanner)
             return Matched(np.zeros((3, 3)), math.nan, best.support, lost=True)
         information = correct_by(self._motion, agreeing)
-        self._renew(levels, T_base_scanner)
+        self._renew(levels, pose_base_scanner)
         return Matched(information, best.residual_sigmas * self._noise_m, best.support, lost=False)
 
-    def _renew(self, levels: Pyramid, T_base_scanner: FloatArray) -> None:
+    def _renew(self, levels: Pyramid, pose_base_scanner: FloatArray) -> None:
         """Make the scan a reference once it is far enough from the last one; a new reference is known by definition."""
         step = se2.between(self._newest, self._motion.pose)
         turned = abs(step[2]) >= math.radians(self._settings.spacing_deg)
         if turned or np.hypot(step[0], step[1]) >= self._settings.spacing_m:
-            self._refer(levels, T_base_scanner)
+            self._refer(levels, pose_base_scanner)
             self._motion.forget(1.0)
 
-    def _refer(self, levels: Pyramid, T_base_scanner: FloatArray) -> None:
+    def _refer(self, levels: Pyramid, pose_base_scanner: FloatArray) -> None:
         self._newest = self._motion.pose
-        reference = FlowReference(se2.compose(self._newest, T_base_scanner), levels)
+        reference = FlowReference(se2.compose(self._newest, pose_base_scanner), levels)
         self._references = [*self._references, reference][-self._settings.references :]

@@ -23,7 +23,7 @@ _NO_PRIOR = 1e-3 * np.eye(3)  # 30 m and 30 rad: keeps the equations regular, ho
 class FlowReference(NamedTuple):
     """Pose of the scanner in `odom` (3,), its level frame, and its scan's pyramid."""
 
-    T_odom_scanner: FloatArray
+    pose_odom_scanner: FloatArray
     levels: Pyramid
 
 
@@ -36,30 +36,30 @@ class FlowPose(NamedTuple):
     support: float
 
 
-def scanner_pyramid(points: FloatArray, T_base_scanner: FloatArray, settings: RangeFlowSettings) -> Pyramid:
+def scanner_pyramid(points: FloatArray, pose_base_scanner: FloatArray, settings: RangeFlowSettings) -> Pyramid:
     """Return the pyramid of hits (N, 2) in the level base frame as seen from the scanner (planar pose (3,) in that frame)."""
-    return Pyramid(se2.transform(se2.inverse(T_base_scanner), points), settings.width_m, settings.levels)
+    return Pyramid(se2.transform(se2.inverse(pose_base_scanner), points), settings.width_m, settings.levels)
 
 
 def compare(
     reference: FlowReference,
     levels: Pyramid,
-    T_base_scanner: FloatArray,
+    pose_base_scanner: FloatArray,
     motion: Motion,
     noise_m: float,
     settings: RangeFlowSettings,
 ) -> FlowPose:
     """Return where the scan `levels` says the machine is; the motion gives the start and the coarsest level, no weight."""
-    guess = se2.between(reference.T_odom_scanner, se2.compose(motion.pose, T_base_scanner))
+    guess = se2.between(reference.pose_odom_scanner, se2.compose(motion.pose, pose_base_scanner))
     sigma = np.sqrt(np.diag(motion.P)[:3])
     sure = sigma[:2].max() < _SURE_SIGMA_M and sigma[2] < _SURE_SIGMA_RAD
     coarsest = 0 if sure else settings.levels - 1
     found = flow(reference.levels, levels, guess, _NO_PRIOR, noise_m, coarsest=coarsest, iterations=settings.iterations)
-    T_scanner_base = se2.compose(found.T_reference_current, se2.inverse(T_base_scanner))
+    pose_scanner_base = se2.compose(found.pose_reference_current, se2.inverse(pose_base_scanner))
     # The flow's unknown is a twist about the reference: turning it moves the machine along an arc, which is undone here.
-    J = np.array([[1.0, 0.0, T_scanner_base[1]], [0.0, 1.0, -T_scanner_base[0]], [0.0, 0.0, 1.0]])
-    information = body_information(J.T @ found.information @ J, -float(reference.T_odom_scanner[2]))
-    pose = se2.compose(reference.T_odom_scanner, T_scanner_base)
+    J = np.array([[1.0, 0.0, pose_scanner_base[1]], [0.0, 1.0, -pose_scanner_base[0]], [0.0, 0.0, 1.0]])
+    information = body_information(J.T @ found.information @ J, -float(reference.pose_odom_scanner[2]))
+    pose = se2.compose(reference.pose_odom_scanner, pose_scanner_base)
     return FlowPose(pose, information, found.residual_sigmas, found.support)
 
 

@@ -25,14 +25,14 @@ SUMS = 11
 
 
 @nb.njit(cache=True, nogil=True, error_model="numpy")
-def warp(T_target_source, source, target, noise_m, places, table, start):  # type: ignore[no-untyped-def]
+def warp(pose_target_source, source, target, noise_m, places, table, start):  # type: ignore[no-untyped-def]
     """Write the equations of the beams of `source` (N, 6) on `target` to columns `start` and on of `table`; return their end.
 
     A beam's residual is the range of its warped point less that of the wall segment which the direction of the point falls
     on. `places` (N,): the segments of the last warp, where the search starts (-1: none); replaced.
     """
-    tx, ty = T_target_source[0], T_target_source[1]
-    c, s = math.cos(T_target_source[2]), math.sin(T_target_source[2])
+    tx, ty = pose_target_source[0], pose_target_source[1]
+    c, s = math.cos(pose_target_source[2]), math.sin(pose_target_source[2])
     noise2 = noise_m * noise_m
     j, k = 0, start
     for i in range(source.shape[0]):
