@@ -2,7 +2,7 @@
 
 In a tunnel the place is ρ along its axis: a Kalman filter over ρ and v, Eq. (1), corrected by the wheels' speed with each scan and
 by ICP against landmarks twice a second. In an intersection pose and heading are those of wheels and ICP directly. What the paper
-leaves open, and what does not work as printed (docs/localization.md lists it):
+leaves open, and what does not work as printed (docs/localization_paper.md lists it):
 
 * `dir` is discrete, so no Kalman filter estimates it: it is the heading against the axis.
 * heading and lateral place are no part of the filter: those of the last match, carried on by the wheels' turn or the axis.

@@ -9,12 +9,12 @@ from lhdmap.settings import setting
 
 FIG_9 = "autonomous loading, Fig. 9"
 RULE = "measured on simulated scenes; the paper names no figures"
-REPAIR = "measured on simulated scenes: docs/pile.md"
+REPAIR = "measured on simulated scenes: docs/pile_figure9.md"
 
 
 @dataclass(frozen=True, slots=True)
 class Figure9Constants:
-    """The pile by the paper's algorithm to the letter: docs/pile.md says what it does and does not do."""
+    """The pile by the paper's algorithm to the letter: docs/pile_figure9.md says what it does and does not do."""
 
     voxel_size_m: tuple[float, float, float] = setting(
         (0.2, 0.2, 0.1), unit="m", source=FIG_9, minimum=0.01, maximum=5.0, doc="Voxel grid in x, y, z."
