@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, slots=True)
-class Cloud:
+class GridCloud:
     """N points; what is not known of them is None.
 
     Attributes:
@@ -45,7 +45,7 @@ class Cloud:
         points: FloatArray = self.points_m.astype(np.float64) + self.origin_m
         return points
 
-    def with_normals(self, normals: Float32Array, curvature: Float32Array) -> Cloud:
+    def with_normals(self, normals: Float32Array, curvature: Float32Array) -> GridCloud:
         """Return the same cloud with these normals, shape (N, 3), and curvatures, shape (N,)."""
         return replace(self, normals=normals, curvature=curvature)
 

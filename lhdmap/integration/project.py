@@ -16,7 +16,7 @@ import numpy.typing as npt
 
 from lhdmap.geometry.articulated import T_base_rear
 from lhdmap.integration.beams import BeamTable
-from lhdmap.integration.self_filter import Rig, body_poses, in_boxes
+from lhdmap.integration.self_filter import ScannerRig, body_poses, in_boxes
 from lhdmap.messages import Float32Array, FloatArray
 
 
@@ -46,7 +46,7 @@ class SweepPoints(NamedTuple):
         return cls(np.empty((points, 3)), np.empty(points, dtype=np.int64), np.empty(3))
 
 
-class Limits(NamedTuple):
+class RangeLimits(NamedTuple):
     """Which returns are taken: ranges in [`low_m`, `high_m`] that do not stick out of the sweep.
 
     A return is a stray one (dust, a drop of water) where it is nearer than the two beams on each side of it by more
@@ -59,7 +59,7 @@ class Limits(NamedTuple):
     stray_share: float = 0.0
 
 
-class Counts(NamedTuple):
+class BeamCounts(NamedTuple):
     """What became of a sweep's beams: kept points, no returns, returns from the machine itself, stray returns."""
 
     kept: int
@@ -79,7 +79,7 @@ class _Arc(NamedTuple):
 
 
 @nb.njit(cache=True, nogil=True)
-def sensor_pose(T_map_base: FloatArray, articulation_rad: float, rig: Rig) -> FloatArray:
+def sensor_pose(T_map_base: FloatArray, articulation_rad: float, rig: ScannerRig) -> FloatArray:
     """Return T_map_sensor, shape (4, 4)."""
     if rig.on_rear:
         return T_map_base @ T_base_rear(articulation_rad, rig.L_f_m, rig.L_r_m) @ rig.T_parent_sensor
@@ -87,7 +87,7 @@ def sensor_pose(T_map_base: FloatArray, articulation_rad: float, rig: Rig) -> Fl
 
 
 @nb.njit(cache=True, nogil=True)
-def _arc(poses: SweepPoses, rig: Rig) -> _Arc:
+def _arc(poses: SweepPoses, rig: ScannerRig) -> _Arc:
     A = sensor_pose(poses.T_map_base_start, poses.articulation_start_rad, rig)
     B = sensor_pose(poses.T_map_base_end, poses.articulation_end_rad, rig)
     R, t = A[:3, :3].copy(), A[:3, 3].copy()
@@ -121,12 +121,12 @@ def _put(points: FloatArray, n: int, arc: _Arc, share: float, point: tuple[float
 def project_scan(
     ranges_m: Float32Array,
     beams: BeamTable,
-    limits: Limits,
+    limits: RangeLimits,
     span_ns: tuple[int, int],
     poses: SweepPoses,
-    rig: Rig,
+    rig: ScannerRig,
     out: SweepPoints,
-) -> Counts:
+) -> BeamCounts:
     """Project a scan into the map.
 
     Args:
@@ -160,11 +160,11 @@ def project_scan(
         _put(out.points_map, n, arc, i * step, (x, y, 0.0))
         out.stamps_ns[n] = span_ns[0] + round(i * step * (span_ns[1] - span_ns[0]))
         n += 1
-    return Counts(n, no_return, own, strays)
+    return BeamCounts(n, no_return, own, strays)
 
 
 @nb.njit(cache=True, nogil=True)
-def _is_stray(ranges_m: Float32Array, i: int, limits: Limits) -> bool:
+def _is_stray(ranges_m: Float32Array, i: int, limits: RangeLimits) -> bool:
     """Return whether beam i is nearer than all of the four beams around it; a beam without a return counts as far."""
     if ranges_m.shape[0] < 5 or math.isinf(limits.stray_m):
         return False
@@ -179,12 +179,12 @@ def _is_stray(ranges_m: Float32Array, i: int, limits: Limits) -> bool:
 def project_cloud(
     points_m: Float32Array,
     offsets_s: Float32Array,
-    limits: Limits,
+    limits: RangeLimits,
     span_ns: tuple[int, int],
     poses: SweepPoses,
-    rig: Rig,
+    rig: ScannerRig,
     out: SweepPoints,
-) -> Counts:
+) -> BeamCounts:
     """Project a 3D scanner's points, shape (N, 3), into the map; `offsets_s` (N,) or empty; else as `project_scan`."""
     arc = _arc(poses, rig)
     out.viewpoint_map[:] = arc.t
@@ -208,4 +208,4 @@ def project_cloud(
         _put(out.points_map, n, arc, share, (x, y, z))
         out.stamps_ns[n] = span_ns[0] + round(share * (span_ns[1] - span_ns[0]))
         n += 1
-    return Counts(n, no_return, own, 0)
+    return BeamCounts(n, no_return, own, 0)

@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from lhdmap.errors import UsageError
-from lhdmap.integration.cloud import Cloud
+from lhdmap.integration.cloud import GridCloud
 from lhdmap.messages import FloatArray
 
 VOXEL = np.dtype(  # 64 bytes: one cache line
@@ -35,7 +35,7 @@ BLOCK = 8192  # points added between two looks at the table's load
 Rows = tuple[npt.NDArray[np.int64], npt.NDArray[np.int64]]  # of each sweep: first row, number of rows
 
 
-class Table(NamedTuple):
+class VoxelTable(NamedTuple):
     """Open addressing: `keys` (C,) int64, `slots` (C,) int32 into `voxels` (M,); C is a power of two."""
 
     keys: npt.NDArray[np.int64]
@@ -98,7 +98,7 @@ class VoxelGrid:
         self.refused += refused
         return refused
 
-    def cloud(self, min_hits: int = 1, min_neighbour_hits: int = 0) -> Cloud:
+    def cloud(self, min_hits: int = 1, min_neighbour_hits: int = 0) -> GridCloud:
         """Return the centroids with hits, first stamp and viewpoint, in the order of their first hit.
 
         A voxel with fewer than `min_hits` hits is left out unless its 26 neighbours hold `min_neighbour_hits` hits
@@ -107,7 +107,7 @@ class VoxelGrid:
         voxels = self.voxels
         if min_hits > 1 and min_neighbour_hits > 0:
             voxels = voxels[supported(self._table, self._count, min_hits, min_neighbour_hits)]
-        return Cloud(
+        return GridCloud(
             points_m=centroids(voxels, self.size_m),
             stamps_ns=voxels["first_ns"].copy(),
             hits=voxels["hits"].copy(),
@@ -129,8 +129,10 @@ class VoxelGrid:
         self._table = table
 
 
-def _empty_table(capacity: int) -> Table:
-    return Table(np.full(capacity, EMPTY, dtype=np.int64), np.zeros(capacity, dtype=np.int32), np.zeros(0, dtype=VOXEL))
+def _empty_table(capacity: int) -> VoxelTable:
+    return VoxelTable(
+        np.full(capacity, EMPTY, dtype=np.int64), np.zeros(capacity, dtype=np.int32), np.zeros(0, dtype=VOXEL)
+    )
 
 
 @nb.njit(cache=True, nogil=True)
@@ -141,7 +143,7 @@ def _home(key: int | np.int64, mask: int) -> np.int64:
 
 
 @nb.njit(cache=True, nogil=True)
-def _place(table: Table, key: int | np.int64) -> np.int64:
+def _place(table: VoxelTable, key: int | np.int64) -> np.int64:
     """Return the place of `key`, or the empty place where it is to go."""
     mask = table.keys.shape[0] - 1
     place = _home(key, mask)
@@ -151,7 +153,7 @@ def _place(table: Table, key: int | np.int64) -> np.int64:
 
 
 @nb.njit(cache=True, nogil=True)
-def fill(table: Table, count: int) -> None:
+def fill(table: VoxelTable, count: int) -> None:
     """Enter the first `count` voxels into an empty table."""
     for slot in range(count):
         place = _place(table, table.voxels[slot].key)
@@ -161,7 +163,7 @@ def fill(table: Table, count: int) -> None:
 
 @nb.njit(cache=True, nogil=True)
 def insert(
-    table: Table,
+    table: VoxelTable,
     count: int,
     size_m: FloatArray,
     points: FloatArray,
@@ -195,7 +197,7 @@ def insert(
 
 @nb.njit(cache=True, nogil=True)
 def insert_sweeps(
-    table: Table,
+    table: VoxelTable,
     count: int,
     size_m: FloatArray,
     points: FloatArray,
@@ -224,7 +226,7 @@ def _open(voxels: npt.NDArray[np.void], slot: int, key: np.int64, stamp_ns: np.i
 
 
 @nb.njit(cache=True, nogil=True)
-def supported(table: Table, count: int, min_hits: int, min_neighbour_hits: int) -> npt.NDArray[np.bool_]:
+def supported(table: VoxelTable, count: int, min_hits: int, min_neighbour_hits: int) -> npt.NDArray[np.bool_]:
     """Return which voxels have `min_hits` hits or 26 neighbours with `min_neighbour_hits` together; shape (count,)."""
     keep = np.zeros(count, dtype=np.bool_)
     for slot in range(count):

@@ -22,7 +22,7 @@ from lhdmap.landmarks.quality import Quality
 from lhdmap.localization.method import Corrected, Wheels
 from lhdmap.localization.paper_nodes import PaperNodes, Seen
 from lhdmap.localization.place_on_map import Placer
-from lhdmap.localization.tracker import Tracker, turned
+from lhdmap.localization.tracker import MapTracker, turned
 from lhdmap.messages import FloatArray
 from lhdmap.topology.model import Tunnel
 
@@ -41,7 +41,7 @@ _LEAST_HITS = 30
 class PaperTracker:
     """`pose` (3,) in `map`; in a tunnel held as ρ (`x[0]`), lateral place and heading; `C` (2, 2) is the covariance of ρ, v."""
 
-    def __init__(self, nodes: PaperNodes, placer: Placer, start: Tracker) -> None:
+    def __init__(self, nodes: PaperNodes, placer: Placer, start: MapTracker) -> None:
         self._nodes, self._placer, self._start = nodes, placer, start
         self.pose, self.height_m = start.pose.copy(), start.height_m
         self.x = np.zeros(2)

@@ -110,15 +110,15 @@ class RecentWay:
         thinned: FloatArray = points[np.sort(first)]
         return thinned
 
-    def snapshot(self, within_m: float = math.inf) -> Window:
+    def snapshot(self, within_m: float = math.inf) -> RecentWindow:
         """Return what a search needs, of the way within some travel of the machine; it may run beside what goes on here."""
         points, counts = self.cells()
         way = [one for one in self._way if abs(one[0] - self._ahead_m) <= within_m]
         ends = way[0][1], way[-1][1]
-        return Window(points, counts, np.array([pose[:2] for _, pose in way]), ends, way[-1][0] - way[0][0])
+        return RecentWindow(points, counts, np.array([pose[:2] for _, pose in way]), ends, way[-1][0] - way[0][0])
 
 
-class Window(NamedTuple):
+class RecentWindow(NamedTuple):
     """Averaged hits (M, 2) and counts (M,), the way (K, 2) from behind to ahead, the poses at its ends, its length."""
 
     points: FloatArray

@@ -16,7 +16,7 @@ import numpy.typing as npt
 from lhdmap.geometry import se2
 from lhdmap.landmarks.settings import LandmarkSettings
 from lhdmap.localization.placing import Costs, LiveProfile, PlaceOnStrips
-from lhdmap.localization.recent_way import Window
+from lhdmap.localization.recent_way import RecentWindow
 from lhdmap.localization.settings import LocalizationSettings
 from lhdmap.localization.strips import Strips
 from lhdmap.localization.walls import MapWalls
@@ -38,7 +38,7 @@ _SAME_M, _SAME_RAD = 1.0, math.radians(10.0)
 FIND, CONFIRM, CHECK = "find", "confirm", "check"
 
 
-class Candidate(NamedTuple):
+class PlaceCandidate(NamedTuple):
     """A place where the machine may be: pose (3,) in `map`, height of the floor, node (id).
 
     `probability`: of it against all others and against not being in the map; `chi2`: reduced, of its walls; `evidence` (nats):
@@ -69,9 +69,9 @@ class Search(NamedTuple):
     travelled_m: float
     window_m: float
     purpose: str
-    candidates: tuple[Candidate, ...]
+    candidates: tuple[PlaceCandidate, ...]
     refused: str
-    claimed: Candidate | None = None
+    claimed: PlaceCandidate | None = None
     denied: str = ""
 
     @property
@@ -86,7 +86,7 @@ class Question(NamedTuple):
     stamp_ns: int
     travelled_m: float
     purpose: str
-    window: Window
+    window: RecentWindow
     pose_odom_base: FloatArray
     claimed: FloatArray | None
 
@@ -144,11 +144,11 @@ class GlobalSearch:
         pose: FloatArray = se2.compose(pose_map_odom, pose_odom_base)
         return pose
 
-    def _candidate(self, place: PlaceOnStrips, gap: float, pose: FloatArray) -> Candidate:
+    def _candidate(self, place: PlaceOnStrips, gap: float, pose: FloatArray) -> PlaceCandidate:
         height, node = float(self._strips.heights_m[place.place]), self._strips.node_at(place.place)
-        return Candidate(pose, height, node, place.probability, place.chi2, -place.cost, gap, math.nan)
+        return PlaceCandidate(pose, height, node, place.probability, place.chi2, -place.cost, gap, math.nan)
 
-    def _refused(self, place: PlaceOnStrips, best: Candidate, asked: Question) -> str:
+    def _refused(self, place: PlaceOnStrips, best: PlaceCandidate, asked: Question) -> str:
         """Return why the best place is not believed; one that was found by the whole rule is confirmed by the gap alone."""
         window_m = asked.window.length_m
         if window_m < self._settings.search_m:
@@ -160,7 +160,7 @@ class GlobalSearch:
             return f"the next place is less likely by {told:.0f} of {self._settings.gap:.0f} nats"
         return ""
 
-    def _refined(self, found: Candidate, window: Window, pose_odom_base: FloatArray) -> Candidate:
+    def _refined(self, found: PlaceCandidate, window: RecentWindow, pose_odom_base: FloatArray) -> PlaceCandidate:
         """Match the walls about the machine as one scan, from several starts around a place."""
         local = se2.transform(se2.inverse(pose_odom_base), window.points)
         near = local[np.hypot(local[:, 0], local[:, 1]) < self._settings.range_m]

@@ -10,7 +10,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 from lhdmap.logs.base import LogReader
-from lhdmap.logs.doctor.finding import Finding, Severity
+from lhdmap.logs.doctor.finding import LogFinding, Severity
 from lhdmap.logs.doctor.scans import fatal_findings
 from lhdmap.logs.doctor.values import ValueWatch
 from lhdmap.logs.frames import FrameTree
@@ -33,10 +33,10 @@ class Survey:
     frames: FrameTree = field(default_factory=FrameTree)
     repairs: dict[str, ScanRepair] = field(default_factory=dict)
     left_out: dict[str, str] = field(default_factory=dict)
-    findings: list[Finding] = field(default_factory=list)
+    findings: list[LogFinding] = field(default_factory=list)
 
     @property
-    def fatal(self) -> list[Finding]:
+    def fatal(self) -> list[LogFinding]:
         """What makes the log unusable."""
         return [finding for finding in self.findings if finding.severity is Severity.FATAL]
 
@@ -106,4 +106,4 @@ def _judge_values(survey: Survey, role: str, watch: ValueWatch) -> None:
     what = "it never moves" if role == "wheel_odometry" else f"its value never changes ({watch.last_text})"
     survey.left_out[role] = what
     text = f"{what}: not used as {role.replace('_', ' ')}"
-    survey.findings.append(Finding(Severity.PROBLEM, watch.topic, text, "is the sensor connected?"))
+    survey.findings.append(LogFinding(Severity.PROBLEM, watch.topic, text, "is the sensor connected?"))

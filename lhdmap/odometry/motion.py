@@ -18,7 +18,7 @@ _DISTRUSTED_VARIANCE = np.diag([3.0**2, 0.3**2, 2.0**2])  # hardly known: as muc
 _GAP_VARIANCE = np.diag([4.0, 0.1, 0.5])  # that a gap adds: 2 m/s forward, 0.3 m/s sideways, 0.7 rad/s
 
 
-class Motion:
+class PlanarMotion:
     """State and covariance of `motion_filter`: shared by the odometry and the matcher that corrects it.
 
     `velocity` (3,): forward, lateral, turning speed at the start, where it is known.

@@ -12,7 +12,7 @@ from lhdmap.messages import FloatArray, LaserScan
 from lhdmap.odometry.anchored.matcher import AnchoredMatcher
 from lhdmap.odometry.anchored.rear_view import NO_POINTS, NOTHING_BEHIND, Behind, RearView, behind
 from lhdmap.odometry.clock import ScanClock
-from lhdmap.odometry.motion import Motion
+from lhdmap.odometry.motion import PlanarMotion
 from lhdmap.odometry.range_flow.matcher import FlowMatcher
 from lhdmap.odometry.rate import AdaptiveRate
 from lhdmap.odometry.settings import AnchorSettings, OdometrySettings, RangeFlowSettings, SearchSettings
@@ -31,7 +31,7 @@ _MOSTLY_NOISE = 0.5  # of what a scan tells: then the walls tell nothing of one 
 _WALLS_ALONE = 0.6  # support below which a crowd may be what the scan is held by
 
 
-class View(NamedTuple):
+class ScanView(NamedTuple):
     """What else is known of a scan's surroundings.
 
     `height_m` of `base_link` in `odom`; `boxes_m` (K, 6): own bodies; `rear`: tells what the rear scanner sees at the same
@@ -59,7 +59,7 @@ class _Judged(NamedTuple):
     covariance: FloatArray
 
 
-_PLAIN = View()  # of a scan of which nothing else is known
+_PLAIN = ScanView()  # of a scan of which nothing else is known
 Placement = FloatArray | Callable[[], FloatArray]
 
 
@@ -80,7 +80,7 @@ class PlanarOdometry:
         trust: TrustSettings | None = None,
     ) -> None:
         self._settings = settings or OdometrySettings()
-        self._motion = Motion(self._settings, velocity)
+        self._motion = PlanarMotion(self._settings, velocity)
         self.wheels, self.gyro = WheelModel(self._settings, self._motion), GyroTurn(self._motion)
         self._matcher: AnchoredMatcher | FlowMatcher
         if self._settings.method == "range_flow":
@@ -101,7 +101,7 @@ class PlanarOdometry:
         self.points = np.zeros((0, 3))  # hits of the last processed scan, level base frame, heights in odom
 
     def update(
-        self, scan: LaserScan, T_level_sensor: Placement, wheels: WheelStep | None = None, view: View = _PLAIN
+        self, scan: LaserScan, T_level_sensor: Placement, wheels: WheelStep | None = None, view: ScanView = _PLAIN
     ) -> OdometryStep:
         """Process one scan; `T_level_sensor` (4, 4): mount and attitude, or what tells it where the scan is processed."""
         dt_s = self._clock.step(scan.stamp_ns)
@@ -135,7 +135,7 @@ class PlanarOdometry:
         information = marginal_information(body_information(matched.information, heading_rad))
         return _Judged(information, self._weak(information), body_information(self._motion.P[:3, :3], heading_rad))
 
-    def _behind(self, view: View, floor_m: float) -> Behind:
+    def _behind(self, view: ScanView, floor_m: float) -> Behind:
         """Return the rear scanner's hits; at rest they add nothing."""
         velocity = self._motion.velocity
         rear = view.rear() if view.rear is not None and abs(velocity[0]) >= _SLOWEST_REAR_MPS else None

@@ -13,7 +13,7 @@ import numpy as np
 
 from lhdmap.geometry import se2
 from lhdmap.messages import FloatArray, LaserScan
-from lhdmap.odometry.planar import Placement, PlanarOdometry, View
+from lhdmap.odometry.planar import Placement, PlanarOdometry, ScanView
 from lhdmap.odometry.steps import OdometryStep, WheelStep
 
 _SPAN_SCANS = 6  # the starting speed is the mean over so many scans
@@ -31,7 +31,7 @@ class ScanInput(NamedTuple):
     scan: LaserScan
     T_level_sensor: Placement
     wheels: WheelStep | None = None
-    view: View = View()
+    view: ScanView = ScanView()
 
 
 Maker = Callable[[FloatArray | None], PlanarOdometry]  # takes a starting velocity, None: unknown

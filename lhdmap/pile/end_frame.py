@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numba as nb
 import numpy as np
 
-from lhdmap.pile.corridor import BIN_M, Corridor
+from lhdmap.pile.corridor import BIN_M, DriftCorridor
 from lhdmap.pile.order import quantile
 
 _WALLS_M = 7.0  # length of wall before the face that its heading is taken from
@@ -45,7 +45,7 @@ class End(NamedTuple):
     half_m: float
 
 
-def _mouth(corridor: Corridor, at_x_m: float, slope: float) -> tuple[float, float] | None:
+def _mouth(corridor: DriftCorridor, at_x_m: float, slope: float) -> tuple[float, float] | None:
     """Return y of both walls of the drift some metres before x, carried on along the end's slope; None: hardly seen.
 
     A drift runs at any angle to the machine and bends: its width is what can be carried over, its walls' y is not.
@@ -60,7 +60,7 @@ def _mouth(corridor: Corridor, at_x_m: float, slope: float) -> tuple[float, floa
     return middle + half, middle - half
 
 
-def end_of(corridor: Corridor, face_x_m: float) -> End | None:
+def end_of(corridor: DriftCorridor, face_x_m: float) -> End | None:
     """Return the end before a face at x, from the walls of the last metres; None where they were not seen."""
     last = (corridor.x_m < face_x_m - 0.8) & (corridor.x_m > face_x_m - _WALLS_M)
     lines, weights = [], []

@@ -40,7 +40,7 @@ def _below(bound_deg: float, steepness_deg: float, std_deg: float) -> float:
     return 0.5 * math.erfc((steepness_deg - bound_deg) / (std * math.sqrt(2.0)))
 
 
-class Evidence(NamedTuple):
+class StatusEvidence(NamedTuple):
     """What the status follows from.
 
     Inclination and deviation (deg, sign of Table 6), grain (m): how unlike neighbouring decimetres are, share of the width that
@@ -57,7 +57,7 @@ class Evidence(NamedTuple):
     fit_std_deg: float = 0.0
 
 
-def probabilities(evidence: Evidence) -> dict[str, float]:
+def probabilities(evidence: StatusEvidence) -> dict[str, float]:
     """Return the probability of each status."""
     angle = -evidence.inclination_deg
     part = shares(angle, evidence.std_deg)

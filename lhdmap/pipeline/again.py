@@ -10,12 +10,12 @@ from lhdmap.pipeline.inputs import Inputs
 from lhdmap.pipeline.mapping import MappingPipeline
 from lhdmap.pipeline.sweep_times import SweepTimes
 from lhdmap.pipeline.sweeps import SweepIntegration
-from lhdmap.pipeline.track import FinalTrack, Rows
+from lhdmap.pipeline.track import FinalTrack, TrackRows
 from lhdmap.proprioception.wheels import WheelOdometry
 
 
 def integrate_again(
-    inputs: Inputs, pipeline: MappingPipeline, rows: Rows, survey: Survey | None = None
+    inputs: Inputs, pipeline: MappingPipeline, rows: TrackRows, survey: Survey | None = None
 ) -> SweepIntegration:
     """Read the scans once more and integrate them at their final poses: closed loops have moved them, or they are given.
 

@@ -23,7 +23,7 @@ from lhdmap.messages import Message
 from lhdmap.movement.costs import connection_times
 from lhdmap.outputs import free_folder
 from lhdmap.pile.result import PileReport
-from lhdmap.pipeline.beside import Beside, HelperDied, Here
+from lhdmap.pipeline.beside import HelperDied, Here, ProcessBeside
 from lhdmap.pipeline.cost import CompileClock, Spent, cost, peak_memory_mib
 from lhdmap.pipeline.driven import odometry_of, ways_of
 from lhdmap.pipeline.given import GROUND_TRUTH, given_rows
@@ -32,7 +32,7 @@ from lhdmap.pipeline.inspection import Inspection, Inspector, PileBeside
 from lhdmap.pipeline.interruption import Interruption
 from lhdmap.pipeline.mapping import MappingPipeline
 from lhdmap.pipeline.mounts import machine_of
-from lhdmap.pipeline.outcome import Outcome
+from lhdmap.pipeline.outcome import MapOutcome
 from lhdmap.pipeline.refusal import require_a_map
 from lhdmap.provenance import file_entry, source_entry
 from lhdmap.report.page import fill_in_cost
@@ -136,7 +136,7 @@ def build_map(request: BuildRequest) -> BuildResult:
                 require_a_map(source.paths[0], pipeline.records, ways.rows)
             final = _stamped(ways.final, as_recorded)
             folder.write_trajectory(final)
-            outcome = Outcome(inputs, source, pipeline, ways)
+            outcome = MapOutcome(inputs, source, pipeline, ways)
             beside = _write(folder, request, source, outcome, inspector)
         known = {path: _entry(request, path, future) for path, future in hashes.items()}
         own = Spent(peak_memory_mib(), compiling.seconds)
@@ -174,7 +174,7 @@ def _run(pipeline: MappingPipeline, source: LogSource, progress: Progress | None
 
 
 def _write(
-    folder: MapFolderWriter, request: BuildRequest, source: LogSource, outcome: Outcome, inspector: Inspector
+    folder: MapFolderWriter, request: BuildRequest, source: LogSource, outcome: MapOutcome, inspector: Inspector
 ) -> Spent:
     """Write the rest of the map but `map.json`; return what a process beside this one needed."""
     shown = outcome.report(), outcome.pipeline.machine or Machine(bodies={})
@@ -200,13 +200,13 @@ def _write(
         with _inspection(Here, request, source, folder.path) as here:
             here.ask(Inspection.write, *shown)
         return Spent()
-    return spent if isinstance(inspector, Beside) else Spent()
+    return spent if isinstance(inspector, ProcessBeside) else Spent()
 
 
 def _inspector(request: BuildRequest, source: LogSource, folder: Path) -> Inspector:
     """Return where the inspection happens: beside this process where that is wanted and pays."""
     beside = request.helper and source.duration_s >= _BESIDE_FROM_S and _cores() > 1
-    return _inspection(Beside if beside else Here, request, source, folder)
+    return _inspection(ProcessBeside if beside else Here, request, source, folder)
 
 
 def _inspection(make: Callable[..., Inspector], request: BuildRequest, source: LogSource, folder: Path) -> Inspector:

@@ -11,7 +11,7 @@ from lhdmap.errors import InputError
 from lhdmap.messages import FloatArray
 from lhdmap.pipeline.heading import gyro_correction
 from lhdmap.pipeline.mapping import MappingPipeline
-from lhdmap.pipeline.track import FinalTrack, Rows, resample, trajectory_of
+from lhdmap.pipeline.track import FinalTrack, TrackRows, resample, trajectory_of
 from lhdmap.smoothing.smoother import Correction, corrected
 from lhdmap.trajectory import Trajectory
 
@@ -26,7 +26,7 @@ class DrivenPaths(NamedTuple):
 
     odometry: Trajectory
     final: Trajectory
-    rows: Rows
+    rows: TrackRows
     moved: bool
     closures: int
     end_covariance: FloatArray | None = None
@@ -39,7 +39,7 @@ def odometry_of(pipeline: MappingPipeline) -> Trajectory:
     return trajectory_of(resample(pipeline.track.rows(), times), stamps)
 
 
-def ways_of(pipeline: MappingPipeline, given: Rows | None) -> DrivenPaths:
+def ways_of(pipeline: MappingPipeline, given: TrackRows | None) -> DrivenPaths:
     """Close loops and return both paths; with `given` poses these are final.
 
     Raises:
@@ -49,7 +49,7 @@ def ways_of(pipeline: MappingPipeline, given: Rows | None) -> DrivenPaths:
     rows = pipeline.path.final.rows() if given is None else given
     steadied = None if given is not None else gyro_correction(pipeline, rows)
     if steadied is not None:
-        rows = Rows(rows.times_ns, corrected(rows.poses, rows.times_ns, steadied))
+        rows = TrackRows(rows.times_ns, corrected(rows.poses, rows.times_ns, steadied))
     correction = None if given is not None else _correction(pipeline, rows, steadied)
     if given is not None and not any(map(FinalTrack(given).covers, times.tolist())):
         raise InputError(
@@ -57,7 +57,7 @@ def ways_of(pipeline: MappingPipeline, given: Rows | None) -> DrivenPaths:
             f"the scans of {times[0] / 1e9:.3f} to {times[-1] / 1e9:.3f} s: none has a pose"
         )
     if correction is not None:
-        rows = Rows(rows.times_ns, corrected(rows.poses, rows.times_ns, correction))
+        rows = TrackRows(rows.times_ns, corrected(rows.poses, rows.times_ns, correction))
     final = trajectory_of(resample(rows, times), stamps)
     moved = given is not None or correction is not None or steadied is not None
     if correction is not None:
@@ -69,7 +69,7 @@ def ways_of(pipeline: MappingPipeline, given: Rows | None) -> DrivenPaths:
     return DrivenPaths(odometry_of(pipeline), final, rows, moved, *end)
 
 
-def _correction(pipeline: MappingPipeline, rows: Rows, steadied: Correction | None) -> Correction | None:
+def _correction(pipeline: MappingPipeline, rows: TrackRows, steadied: Correction | None) -> Correction | None:
     """Return how closed loops move the path; heights close where an inclinometer tells them."""
 
     def floor(times_ns: npt.NDArray[np.int64]) -> FloatArray:

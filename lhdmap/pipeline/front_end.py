@@ -23,10 +23,10 @@ from lhdmap.messages import (
 )
 from lhdmap.odometry.anchored.rear_view import RearView
 from lhdmap.odometry.cloud.motion import CloudPrior
-from lhdmap.odometry.planar import View
+from lhdmap.odometry.planar import ScanView
 from lhdmap.odometry.start import ScanInput
 from lhdmap.odometry.steps import WheelStep
-from lhdmap.pipeline.mounts import Mounts, level_sensor
+from lhdmap.pipeline.mounts import SensorMounts, level_sensor
 from lhdmap.pipeline.rear import AT_ONCE_NS, RearScans
 from lhdmap.pipeline.sweep_times import SweepTimes
 from lhdmap.proprioception.attitude import AttitudeFilter
@@ -46,7 +46,7 @@ class FrontEnd:
     def __init__(self, settings: Settings, machine: Machine | None) -> None:
         self._settings, self._gyro_settings = settings.attitude, settings.gyro
         self.machine = machine or DEFAULT_MACHINE
-        self.mounts = Mounts(machine)
+        self.mounts = SensorMounts(machine)
         self.attitude, self.gyro = AttitudeFilter(settings.attitude), Gyro(settings.gyro, settings.attitude.lag_s)
         self.wheels = WheelOdometry(settings.wheels, self.machine)
         self.rear = RearScans(self.mounts, self.wheels, self.machine)
@@ -86,7 +86,7 @@ class FrontEnd:
         rear = partial(self.behind_at, time_ns) if self.has_inclinometer else None
         rise = rise_of(self.mounts.of(scan.frame_id, "front").T_parent_child)
         turn_rad = self.gyro.turn_between(before_ns, time_ns) if self.gyro.there else None
-        view = View(height_m, self.boxes, rear, rise, self.has_inclinometer, turn_rad)
+        view = ScanView(height_m, self.boxes, rear, rise, self.has_inclinometer, turn_rad)
         return ScanInput(scan, partial(self.placement, scan, time_ns), self._wheel_step(before_ns, time_ns), view)
 
     def placement(self, scan: LaserScan, time_ns: int) -> FloatArray:

@@ -9,7 +9,7 @@ from lhdmap.config import Settings
 from lhdmap.machine import Machine
 from lhdmap.messages import FloatArray
 from lhdmap.pile.result import PileReport
-from lhdmap.pipeline.beside import Beside, Here
+from lhdmap.pipeline.beside import Here, ProcessBeside
 from lhdmap.pipeline.cost import CompileClock, Spent, peak_memory_mib
 from lhdmap.pipeline.pile import PileWatch, PlacedScan
 from lhdmap.report import charts
@@ -63,7 +63,7 @@ class Inspection:
             self._recording.close()
 
 
-Inspector = Here[Inspection] | Beside[Inspection]
+Inspector = Here[Inspection] | ProcessBeside[Inspection]
 
 
 class PileBeside:

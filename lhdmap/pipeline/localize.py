@@ -1,6 +1,6 @@
 """`Localizer`: messages in, where the machine is on a map out; the same object for a log and for a running machine.
 
-messages -> MappingPipeline (odometry alone) -> steps -> Tracker against the map's walls
+messages -> MappingPipeline (odometry alone) -> steps -> MapTracker against the map's walls
 -> Finder: searches in a thread of their own where the place is not known, or lost, and checks of the one that is tracked
 """
 
@@ -21,15 +21,15 @@ from lhdmap.config import Settings
 from lhdmap.geometry import se2
 from lhdmap.localization.changes import WorldChanges
 from lhdmap.localization.finder import Finder
-from lhdmap.localization.fixed_lag import Belief, FixedLag, Step, placed_row
+from lhdmap.localization.fixed_lag import Belief, FixedLag, LagStep, placed_row
 from lhdmap.localization.method import Tracks
 from lhdmap.localization.paper import PaperTracker
 from lhdmap.localization.paper_nodes import PaperNodes
 from lhdmap.localization.place_on_map import Placer
-from lhdmap.localization.rows import CANDIDATE, LOST, NOWHERE, TRACKING, UNKNOWN, Row
-from lhdmap.localization.search import CHECK, CONFIRM, FIND, Candidate, Search
-from lhdmap.localization.starting import Start, best_start
-from lhdmap.localization.tracker import Tracker
+from lhdmap.localization.rows import CANDIDATE, LOST, NOWHERE, TRACKING, UNKNOWN, LocalizationRow
+from lhdmap.localization.search import CHECK, CONFIRM, FIND, PlaceCandidate, Search
+from lhdmap.localization.starting import BestStart, best_start
+from lhdmap.localization.tracker import MapTracker
 from lhdmap.localization.walls import MapWalls
 from lhdmap.machine import Machine
 from lhdmap.messages import FloatArray, Message
@@ -111,7 +111,7 @@ class Localizer:
         self._near = NearLook(self._walls)
         self._time_ns = 0
         self.digs = False  # what is seen is known to differ from the map then: a place is not given up for that
-        self.start: Start | None = None  # which of several it was
+        self.start: BestStart | None = None  # which of several it was
         self._travelled_m = 0.0
         self._probability = 0.0 if start is None else 1.0
         self._information = 0.0
@@ -119,7 +119,7 @@ class Localizer:
         self.first_fix: tuple[float, float] | None = None  # seconds, metres
         self._began_ns: int | None = None
         self._stamp_ns = 0
-        self.rows: list[Row] = []
+        self.rows: list[LocalizationRow] = []
         self.reasons: list[tuple[int, str]] = []  # when a place was given up, and why
         self.newest: tuple[int, FloatArray] | None = (
             None  # stamp and hits (N, 3) in `map` of the newest scan with a place
@@ -181,7 +181,7 @@ class Localizer:
 
     def _tracks(self, pose: FloatArray, std: FloatArray, height_m: float) -> Tracks:
         """Return what tracks by the method of the settings from a pose (3,) with these deviations (3,)."""
-        tracker = Tracker(self._walls, self._settings, pose, np.diag(std**2), height_m)
+        tracker = MapTracker(self._walls, self._settings, pose, np.diag(std**2), height_m)
         return tracker if self._paper is None else PaperTracker(self._paper, self._placer, tracker)
 
     def take(self, stamp_ns: int, step: OdometryStep, odometry: PlanarOdometry) -> None:
@@ -212,7 +212,7 @@ class Localizer:
             self._row(stamp_ns, step, source, 1e3 * (time.perf_counter() - began - self._finder.waited_s + waited_s))
         )
         if self._lag is not None:
-            said = Step(len(self.rows) - 1, step.pose_odom_base, step.error.covariance, odometry.gyro.turn_rad)
+            said = LagStep(len(self.rows) - 1, step.pose_odom_base, step.error.covariance, odometry.gyro.turn_rad)
             self._smooth(self._lag, said, predicted)
         self._set_against_the_map(stamp_ns, points)  # the place has not waited for it
         if self._listener is not None:
@@ -221,7 +221,7 @@ class Localizer:
     def _belief(self) -> Belief | None:
         return None if self._tracker is None else Belief(self._tracker.pose.copy(), self._tracker.P.copy())
 
-    def _smooth(self, lag: FixedLag, step: Step, predicted: Belief | None) -> None:
+    def _smooth(self, lag: FixedLag, step: LagStep, predicted: Belief | None) -> None:
         """Hand a scan to the smoother; rewrite the rows that are final."""
         believed = self._belief()
         if believed is None or predicted is None or self._status != TRACKING:
@@ -351,7 +351,7 @@ class Localizer:
         self._denials = self._denials + 1 if said.denied and tells else 0
         return self._denials >= _DENIALS
 
-    def _try(self, found: Candidate) -> None:
+    def _try(self, found: PlaceCandidate) -> None:
         height = self._placer.height_m(found.pose[0], found.pose[1], found.height_m)
         if self._tracker is not None:
             self.world.found(self._travelled_m, self._tracker.pose, found.pose)
@@ -360,7 +360,7 @@ class Localizer:
         self._status, self._probability = CANDIDATE, found.probability
         self._supports.clear()
 
-    def _row(self, stamp_ns: int, step: OdometryStep, source: str, latency_ms: float) -> Row:
+    def _row(self, stamp_ns: int, step: OdometryStep, source: str, latency_ms: float) -> LocalizationRow:
         row = NOWHERE._replace(
             stamp_ns=stamp_ns, status=self._status, probability=self._probability, source=source, latency_ms=latency_ms
         )

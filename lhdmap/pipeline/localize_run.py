@@ -15,7 +15,7 @@ from lhdmap.errors import InputError
 from lhdmap.geometry import se3
 from lhdmap.localization.changes import Change
 from lhdmap.localization.episodes import episodes
-from lhdmap.localization.rows import TRACKING, Row, columns
+from lhdmap.localization.rows import TRACKING, LocalizationRow, columns
 from lhdmap.logs.source import LogSource
 from lhdmap.machine import Machine
 from lhdmap.messages import FloatArray
@@ -61,7 +61,7 @@ class LocalizeResult:
 
     folder: Path
     summary: dict[str, Any]
-    rows: list[Row]
+    rows: list[LocalizationRow]
 
 
 def localize(request: LocalizeRequest) -> LocalizeResult:
@@ -150,7 +150,7 @@ def summary_of(localizer: Localizer) -> dict[str, Any]:
     }
 
 
-def trajectory_of(rows: Sequence[Row]) -> Trajectory:
+def trajectory_of(rows: Sequence[LocalizationRow]) -> Trajectory:
     """Return the poses of the rows that track."""
     kept = [row for row in rows if row.status == TRACKING and math.isfinite(row.x_m)]
     stamps = np.array([row.stamp_ns for row in kept], dtype=np.int64)

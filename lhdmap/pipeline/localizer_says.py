@@ -6,8 +6,8 @@ import math
 from typing import NamedTuple
 
 from lhdmap.localization.method import Tracks
-from lhdmap.localization.place_on_map import Place
-from lhdmap.localization.rows import Row
+from lhdmap.localization.place_on_map import PlaceOnMap
+from lhdmap.localization.rows import LocalizationRow
 from lhdmap.messages import FloatArray
 
 
@@ -30,7 +30,7 @@ class Fix(NamedTuple):
     height_m: float
 
 
-def row_of(row: Row, place: Place, tracker: Tracks) -> Row:
+def row_of(row: LocalizationRow, place: PlaceOnMap, tracker: Tracks) -> LocalizationRow:
     """Return a row with the place on the map and in its frame, and how sure both are."""
     along, across, heading = tracker.deviations.tolist()
     return row._replace(

@@ -11,7 +11,7 @@ import numpy as np
 
 from lhdmap.config import settings_toml
 from lhdmap.errors import InputError
-from lhdmap.integration.cloud import Cloud
+from lhdmap.integration.cloud import GridCloud
 from lhdmap.landmarks.model import Landmarks
 from lhdmap.logs.source import LogSource
 from lhdmap.names import name_of
@@ -44,7 +44,7 @@ from lhdmap.topology.build import Topology, topology_of
 from lhdmap.topology.points import with_piles
 
 
-class Outcome:
+class MapOutcome:
     """Cloud, pile, figures and warnings of a run.
 
     Raises:
@@ -60,7 +60,7 @@ class Outcome:
         with ThreadPoolExecutor(1, "landmarks") as beside:  # they are compared while the scans are read once more
             found = self._topology(beside)
             sweeps = integrate_again(inputs, pipeline, rows, source.survey) if ways.moved else pipeline.sweeps
-            self.cloud: Cloud = sweeps.cloud()
+            self.cloud: GridCloud = sweeps.cloud()
         of_sweeps = sweeps.warnings
         sweeps.forget()
         distance_m = float(np.linalg.norm(np.diff(rows.poses[:, :3], axis=0), axis=1).sum())

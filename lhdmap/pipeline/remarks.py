@@ -14,7 +14,7 @@ from lhdmap.pipeline.given import GROUND_TRUTH
 from lhdmap.pipeline.inputs import ROLES_PLACED, ROLES_READ, Inputs
 from lhdmap.pipeline.mapping import MappingPipeline
 from lhdmap.pipeline.refusal import key_scans_remark
-from lhdmap.pipeline.track import Rows
+from lhdmap.pipeline.track import TrackRows
 from lhdmap.report.data import TopicRow
 from lhdmap.smoothing.evidence import open_loops
 
@@ -99,7 +99,7 @@ def remarks_of(pipeline: MappingPipeline) -> list[str]:
     return remarks
 
 
-def holes_of(rows: Rows) -> list[str]:
+def holes_of(rows: TrackRows) -> list[str]:
     """Return a warning about stretches between given poses that are too long to be straight."""
     dt_s, step_m = np.diff(rows.times_ns) * 1e-9, np.linalg.norm(np.diff(rows.poses[:, :3], axis=0), axis=1)
     holes = (dt_s > _HOLE_S) & (step_m > _HOLE_M)

@@ -12,7 +12,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from lhdmap.geometry import se3
-from lhdmap.localization.rows import CANDIDATE, LOST, TRACKING, UNKNOWN, Row
+from lhdmap.localization.rows import CANDIDATE, LOST, TRACKING, UNKNOWN, LocalizationRow
 from lhdmap.localization.search import Search
 from lhdmap.machine import Machine
 from lhdmap.messages import FloatArray
@@ -87,7 +87,9 @@ def _add_map(writer: RecordingWriter, data: LocalizationData) -> None:
         writer.explain("red balls", "what is not as in the map")
 
 
-def _add_machine(writer: RecordingWriter, placed: Sequence[Row], data: LocalizationData, machine: Machine) -> None:
+def _add_machine(
+    writer: RecordingWriter, placed: Sequence[LocalizationRow], data: LocalizationData, machine: Machine
+) -> None:
     stamps = np.array([row.stamp_ns for row in placed], dtype=np.int64)
     positions = np.array([[row.x_m, row.y_m, row.z_m] for row in placed])
     zero = np.zeros(len(placed))
@@ -103,7 +105,7 @@ def _add_machine(writer: RecordingWriter, placed: Sequence[Row], data: Localizat
         writer.add_path("tracked", Trajectory(stamps[tracked], positions[tracked], quaternions[tracked]), _PATH)
 
 
-def _add_ellipses(writer: RecordingWriter, placed: Sequence[Row]) -> None:
+def _add_ellipses(writer: RecordingWriter, placed: Sequence[LocalizationRow]) -> None:
     """Record how sure the place is, twice a second."""
     import rerun as rr
 
@@ -116,7 +118,7 @@ def _add_ellipses(writer: RecordingWriter, placed: Sequence[Row]) -> None:
     writer.explain("pink ellipse", f"{_SIGMAS:.0f} standard deviations of the place")
 
 
-def ellipse(row: Row) -> FloatArray:
+def ellipse(row: LocalizationRow) -> FloatArray:
     """Return the ellipse (N, 3) of a row's deviations in `map`, many times as large so that it is seen."""
     along, across = _SIGMAS * row.std_along_m * np.cos(_CIRCLE), _SIGMAS * row.std_across_m * np.sin(_CIRCLE)
     c, s = math.cos(row.yaw_rad), math.sin(row.yaw_rad)

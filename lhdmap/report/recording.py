@@ -19,7 +19,7 @@ import numpy as np
 import numpy.typing as npt
 
 from lhdmap.errors import InputError
-from lhdmap.integration.cloud import Cloud
+from lhdmap.integration.cloud import GridCloud
 from lhdmap.machine import Machine
 from lhdmap.mapfolder import Diagnostics
 from lhdmap.messages import Float32Array, FloatArray
@@ -215,7 +215,7 @@ class RecordingWriter:
         quaternions = np.column_stack([zero, zero, np.sin(-angles_rad / 2), np.cos(-angles_rad / 2)])
         self.add_moving("map/base_link/rear_link", stamps_ns, np.column_stack([x, y, zero]), quaternions)
 
-    def add_cloud(self, cloud: Cloud) -> None:
+    def add_cloud(self, cloud: GridCloud) -> None:
         """Record the cloud in parts, each from the time on at which its points were first measured."""
         if not len(cloud):
             return

@@ -66,7 +66,7 @@ class Base:
 
 
 @dataclass(frozen=True, slots=True)
-class Joint:
+class ArmJoint:
     """A revolute joint, the link that it carries, and its cylinder (for the swing: both cylinders alike)."""
 
     link_m: float = setting(1.0, unit="m", source=PAPER, minimum=0.01, maximum=50.0, doc="a: to the next joint (or P).")
@@ -119,13 +119,13 @@ class Grizzly:
         check_corners(self.min_m, self.max_m)
 
 
-def _table1() -> tuple[Joint, ...]:
+def _table1() -> tuple[ArmJoint, ...]:
     swing = {"shortest_m": 1.07, "longest_m": 1.5, "blind_area_m2": 1.03e-2, "rod_area_m2": 7.16e-3}
     return (
-        Joint(0.37, 1.28, 0.22, -89.04, 24.0, **swing, radius_m=0.40),
-        Joint(3.06, 0.70, 2.09, -57.63, 60.0, radius_m=0.30),
-        Joint(2.38, 2.07, 0.73, -7.60, 60.0),
-        Joint(2.57, 2.12, 0.63, 60.56, 38.0),
+        ArmJoint(0.37, 1.28, 0.22, -89.04, 24.0, **swing, radius_m=0.40),
+        ArmJoint(3.06, 0.70, 2.09, -57.63, 60.0, radius_m=0.30),
+        ArmJoint(2.38, 2.07, 0.73, -7.60, 60.0),
+        ArmJoint(2.57, 2.12, 0.63, 60.56, 38.0),
     )
 
 
@@ -135,7 +135,7 @@ class Rockbreaker:
 
     name: str = setting("rockbreaker_table1", doc="Name of the machine.")
     base: Base = part(Base)
-    joints: tuple[Joint, ...] = part(_table1, key="joint", names=JOINTS)
+    joints: tuple[ArmJoint, ...] = part(_table1, key="joint", names=JOINTS)
     grizzly: Grizzly = part(Grizzly)
 
     def per_joint(self, name: str) -> FloatArray:
@@ -217,7 +217,7 @@ def _check(machine: Rockbreaker) -> None:
             raise ConfigError(f"joint.{name}: its cylinder leaves it no angle to move in")
 
 
-def _check_joint(name: str, joint: Joint) -> None:
+def _check_joint(name: str, joint: ArmJoint) -> None:
     """Raise ConfigError where the cylinder's range is empty or does not close the triangle of its pins."""
     nearest_m, farthest_m = abs(joint.body_pin_m - joint.rod_pin_m), joint.body_pin_m + joint.rod_pin_m
     if not nearest_m <= joint.shortest_m < joint.longest_m <= farthest_m + 1e-9:

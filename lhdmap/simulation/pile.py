@@ -14,7 +14,7 @@ from lhdmap.simulation.crossing import joined
 from lhdmap.simulation.drift import Drift, Mesh
 from lhdmap.simulation.pile_face import Face, Room, make_face
 from lhdmap.simulation.pile_rocks import cylinder, extent, rock, standing_machine
-from lhdmap.simulation.pile_sections import PileSettings
+from lhdmap.simulation.pile_sections import SimulatedPileSettings
 
 _MARGIN_M = 0.6  # how far the face goes into walls, roof and end
 
@@ -30,7 +30,7 @@ class Oversize(NamedTuple):
 class Pile(NamedTuple):
     """All that stands at the end of a drift, in the frame of the foot: x along its end heading, at arc length `place_m`."""
 
-    settings: PileSettings
+    settings: SimulatedPileSettings
     frame: UprightFrame
     place_m: float
     face: Face | None
@@ -50,7 +50,9 @@ class Pile(NamedTuple):
         return mesh
 
 
-def make_pile(settings: PileSettings, drift: Drift, place_m: float, machine: Machine, rng: np.random.Generator) -> Pile:
+def make_pile(
+    settings: SimulatedPileSettings, drift: Drift, place_m: float, machine: Machine, rng: np.random.Generator
+) -> Pile:
     """Return the pile whose foot lies at arc length `place_m` of the drift."""
     x, y, z, heading = drift.line.at(np.array([place_m]))[0].tolist()
     frame = UprightFrame(np.array([x, y, z]), heading)
@@ -85,7 +87,7 @@ def _boulder(face: Face, place: tuple[float, float, float, float], rng: np.rando
     return Oversize(Mesh(mesh.vertices_m + middle, mesh.triangles), middle, extent(mesh.vertices_m))
 
 
-def _spill(settings: PileSettings, drift: Drift, place_m: float, rng: np.random.Generator) -> list[Mesh]:
+def _spill(settings: SimulatedPileSettings, drift: Drift, place_m: float, rng: np.random.Generator) -> list[Mesh]:
     """Return rocks on the floor before the foot, most of them near it."""
     parts = []
     for _ in range(settings.spill):
@@ -106,7 +108,7 @@ def floor_height(drift: Drift, place_m: float, along_m: FloatArray, lateral_m: F
     return rise + drift.floor_offset(s, lateral_m)
 
 
-def _obstacle(settings: PileSettings, drift: Drift, place_m: float, machine: Machine) -> list[Mesh]:
+def _obstacle(settings: SimulatedPileSettings, drift: Drift, place_m: float, machine: Machine) -> list[Mesh]:
     """Return what stands at the foot: a machine whose nearest point is there, or a post from floor to roof."""
     lateral = settings.obstacle_lateral_m
     floor = float(floor_height(drift, place_m, np.zeros(1), np.array([lateral]))[0])

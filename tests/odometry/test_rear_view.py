@@ -17,7 +17,7 @@ from lhdmap.machine import Machine
 from lhdmap.messages import FloatArray, Joints, LaserScan
 from lhdmap.odometry.anchored.rear_view import Behind, JointOffset, RearView, behind
 from lhdmap.pipeline.mapping import MappingPipeline
-from lhdmap.pipeline.track import Rows, resample
+from lhdmap.pipeline.track import TrackRows, resample
 from lhdmap.scan_matching.matching import Hits, MatchModel, Prior, match
 from lhdmap.scan_matching.surface_map import empty_map, insert_all
 from lhdmap.simulation.drive import simulate_drift
@@ -103,14 +103,14 @@ def errors(log: Path, *, rear: bool, joint_deg: float = 0.0) -> Errors:
     pipeline.finish()
     truth = read_tum(log.with_suffix(".truth.tum"))
     heading = np.unwrap(se3.rpy_from_quaternions(truth.quaternions_xyzw)[:, 2])
-    true = Rows(truth.stamps_ns, np.column_stack([truth.positions_m, np.zeros((len(heading), 2)), heading]))
+    true = TrackRows(truth.stamps_ns, np.column_stack([truth.positions_m, np.zeros((len(heading), 2)), heading]))
     found = [segment_errors(path.rows(), true) for path in (pipeline.track, pipeline.path.final)]
     ends = [rows.poses[[0, -1]][:, [0, 1, 5]] for rows in (true, pipeline.track.rows())]
     end = se2.between(*(se2.between(*pair) for pair in ends))
     return Errors(*found[0], *found[1], float(np.hypot(end[0], end[1])), abs(math.degrees(float(end[2]))))
 
 
-def segment_errors(rows: Rows, truth: Rows) -> tuple[float, float]:
+def segment_errors(rows: TrackRows, truth: TrackRows) -> tuple[float, float]:
     """Return the mean errors over 10 m, in metres and degrees."""
     estimate, true = rows.poses[:, [0, 1, 5]], resample(truth, rows.times_ns).poses[:, [0, 1, 5]]
     found = planar_segments(estimate, true)

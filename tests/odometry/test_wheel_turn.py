@@ -14,7 +14,7 @@ from lhdmap.messages import FloatArray
 from lhdmap.odometry.planar import PlanarOdometry
 from lhdmap.odometry.settings import OdometrySettings
 from lhdmap.odometry.steps import WheelStep
-from lhdmap.odometry.wheels.stretch import Compared, Stretch
+from lhdmap.odometry.wheels.stretch import Compared, WheelStretch
 from lhdmap.odometry.wheels.turn import WheelTurn
 
 from tests.odometry.planar_drives import LEVEL, RATE_HZ, drive
@@ -30,7 +30,7 @@ def _turns(count: int, seed: int = 0) -> FloatArray:
 
 
 def _driven(turn: WheelTurn, true_rad: FloatArray, wheels_rad: FloatArray) -> WheelTurn:
-    pose, stretch = np.zeros(3), Stretch()
+    pose, stretch = np.zeros(3), WheelStretch()
     stretch.matched(pose)
     for true, wheels in zip(true_rad, wheels_rad, strict=True):
         pose = se2.compose(pose, np.array([STEP_M, 0.0, true]))
@@ -71,7 +71,7 @@ def test_what_is_known_to_be_right_is_left() -> None:
 
 
 def test_a_stretch_that_was_not_seen_whole_is_not_compared() -> None:
-    stretch, pose = Stretch(), np.zeros(3)
+    stretch, pose = WheelStretch(), np.zeros(3)
     for _ in range(20):
         assert stretch.matched(pose) is None
         stretch.missed()  # the wheels slipped
@@ -80,7 +80,7 @@ def test_a_stretch_that_was_not_seen_whole_is_not_compared() -> None:
 
 
 def test_a_stretch_is_what_was_driven_in_it() -> None:
-    stretch = Stretch()
+    stretch = WheelStretch()
     stretch.matched(np.array([3.0, 1.0, 0.5]))
     stretch.measured(0.6, 0.1, 0.02)
     middle = se2.compose(np.array([3.0, 1.0, 0.5]), np.array([0.7, 0.0, 0.2]))

@@ -12,7 +12,7 @@ import pytest
 from lhdmap.cli.main import main
 from lhdmap.config import settings_from
 from lhdmap.errors import InputError, UsageError
-from lhdmap.localization.rows import TRACKING, UNKNOWN, Row
+from lhdmap.localization.rows import TRACKING, UNKNOWN, LocalizationRow
 from lhdmap.logs.source import LogSource
 from lhdmap.logs.writer import LogWriter
 from lhdmap.machine import Machine
@@ -93,7 +93,7 @@ def test_the_folder_is_whole(found: LocalizeResult, capsys: pytest.CaptureFixtur
     folder = RunFolder.open(found.folder, ["localization"])
     assert {one.name for one in found.folder.iterdir()} >= {"localization.parquet", "localization.tum", "report.html"}
     table = pq.read_table(found.folder / "localization.parquet")
-    assert table.column_names == list(Row._fields)
+    assert table.column_names == list(LocalizationRow._fields)
     assert table["stamp_ns"].to_pylist() == [row.stamp_ns for row in found.rows]
     tracked = [row for row in found.rows if row.status == TRACKING]
     path = read_tum(found.folder / "localization.tum")

@@ -21,7 +21,7 @@ from lhdmap.pipeline.inputs import Inputs
 from lhdmap.pipeline.mapping import MappingPipeline
 from lhdmap.pipeline.records import ScanRecords
 from lhdmap.pipeline.sweeps import SweepIntegration
-from lhdmap.pipeline.track import Rows, Track
+from lhdmap.pipeline.track import Track, TrackRows
 from lhdmap.simulation.drive import SimulatedDrive
 from lhdmap.simulation.planar import PlanarScanner, drift_world, drive_along, simulate_scans
 from lhdmap.smoothing import smoother
@@ -89,7 +89,7 @@ def test_both_clouds_are_not_held_at_a_time(
 ) -> None:
     left, again = [], integrate_again
 
-    def watched(inputs: Inputs, pipeline: MappingPipeline, rows: Rows, survey: Survey | None) -> SweepIntegration:
+    def watched(inputs: Inputs, pipeline: MappingPipeline, rows: TrackRows, survey: Survey | None) -> SweepIntegration:
         left.append(len(pipeline.sweeps.integrator.grid))
         return again(inputs, pipeline, rows, survey)
 

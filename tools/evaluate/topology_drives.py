@@ -25,7 +25,7 @@ from lhdmap.pipeline.driven import ways_of
 from lhdmap.pipeline.inputs import ROLES_READ
 from lhdmap.pipeline.mapping import MappingPipeline, feed
 from lhdmap.pipeline.topology import seen_of
-from lhdmap.pipeline.track import Rows
+from lhdmap.pipeline.track import TrackRows
 from lhdmap.roles import ROLES
 from lhdmap.simulation.mine_drive import MineDrive, MineDriveSettings
 from lhdmap.simulation.sensing.sections import ScannerSettings, SensorSettings
@@ -124,8 +124,8 @@ def _message(message: Any) -> Message:
     return found
 
 
-def _rows(truth: list[GroundTruth]) -> Rows:
+def _rows(truth: list[GroundTruth]) -> TrackRows:
     rpy = se3.rpy_from_quaternions(np.array([one.quaternion_xyzw for one in truth]))
     rpy[:, 2] = np.unwrap(rpy[:, 2])
     positions = np.array([one.position_m for one in truth])
-    return Rows(np.array([one.stamp_ns for one in truth], dtype=np.int64), np.column_stack([positions, rpy]))
+    return TrackRows(np.array([one.stamp_ns for one in truth], dtype=np.int64), np.column_stack([positions, rpy]))

@@ -17,7 +17,7 @@ from lhdmap.odometry.planar import PlanarOdometry
 from lhdmap.odometry.steps import OdometryStep
 from lhdmap.pipeline.inputs import ROLES_READ
 from lhdmap.pipeline.mapping import MappingPipeline, feed
-from lhdmap.pipeline.track import Rows, resample
+from lhdmap.pipeline.track import TrackRows, resample
 from lhdmap.simulation.drive import simulate_drift
 from lhdmap.simulation.planar import PlanarScanner, drift_world, drive_along, simulate_scans
 from lhdmap.simulation.scenario import DriftScenario
@@ -119,7 +119,7 @@ def _scenario(walls: str, seed: int) -> DriftScenario:
     )
 
 
-def _mapped(log: Path, truth: Rows, sensors: Sensors) -> Driven:
+def _mapped(log: Path, truth: TrackRows, sensors: Sensors) -> Driven:
     pipeline = MappingPipeline(Settings(), Machine(), cloud=sensors.rear)
     with LogSource([log]) as source:
         feed(pipeline, source.messages([role for role in sensors.roles if role in source.roles]))

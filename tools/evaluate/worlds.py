@@ -16,7 +16,7 @@ from lhdmap.odometry.planar import PlanarOdometry
 from lhdmap.odometry.settings import AnchorSettings, OdometrySettings, RangeFlowSettings, SearchSettings
 from lhdmap.odometry.start import Maker, ScanInput, starting_velocity
 from lhdmap.odometry.steps import OdometryStep, WheelStep
-from lhdmap.pipeline.track import Rows, resample
+from lhdmap.pipeline.track import TrackRows, resample
 from lhdmap.simulation.planar import PlanarScanner, PlanarWorld, drift_world, drive_along, simulate_scans
 
 BoolArray = npt.NDArray[np.bool_]
@@ -145,7 +145,7 @@ def interpolated(steps: list[OdometryStep]) -> FloatArray:
     rows[:, [0, 1]], rows[:, 5] = planar[:, :2], np.unwrap(planar[:, 2])
     known = np.array([step.time_ns for step in used], dtype=np.int64)
     at = np.array([step.stamp_ns for step in steps], dtype=np.int64)
-    return resample(Rows(known, rows), at).poses[:, [0, 1, 5]]
+    return resample(TrackRows(known, rows), at).poses[:, [0, 1, 5]]
 
 
 def aligned(estimate: FloatArray, truth: FloatArray) -> FloatArray:

@@ -7,7 +7,7 @@ from typing import BinaryIO
 
 from lhdmap.errors import InputError
 from lhdmap.logs.bag import records as rec
-from lhdmap.logs.bag.scan import Scan
+from lhdmap.logs.bag.scan import BagScan
 from lhdmap.logs.blocks import Entry
 from lhdmap.logs.container import BlockFile, Contents
 from lhdmap.logs.findings import Findings
@@ -27,7 +27,7 @@ class BagFile(BlockFile):
             self._file.close()
             found = start.decode("ascii", "replace").strip() if start.startswith(b"#ROSBAG") else "other bytes"
             raise InputError(f"{path}: it begins with {found}, '#ROSBAG V2.0' was wanted; is it another format?")
-        scan = Scan(self._file, path.stat().st_size, damage)
+        scan = BagScan(self._file, path.stat().st_size, damage)
         scan.run()
         self._channels = scan.channels
         self._blocks = scan.blocks
@@ -36,7 +36,7 @@ class BagFile(BlockFile):
     def _entries(self, data: bytes) -> tuple[list[Entry], str | None]:
         return rec.messages(data, self._channels)
 
-    def _indexed(self, scan: Scan) -> Contents | None:
+    def _indexed(self, scan: BagScan) -> Contents | None:
         """Return the contents that the index states, None where it does not cover all chunks."""
         infos = [scan.infos.get(position) for position in scan.positions]
         known = [info for info in infos if info is not None]

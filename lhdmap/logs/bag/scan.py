@@ -8,7 +8,7 @@ from typing import BinaryIO, NamedTuple
 from lhdmap.errors import InputError
 from lhdmap.logs.bag import records as rec
 from lhdmap.logs.base import Channel
-from lhdmap.logs.blocks import MAX_TIME_NS, Block
+from lhdmap.logs.blocks import MAX_TIME_NS, ChunkBlock
 from lhdmap.logs.findings import Findings
 
 _STRETCH_BYTES = 1 << 20
@@ -17,7 +17,7 @@ _WINDOW = 1 << 20
 _INDEX_ENTRY_BYTES = 12
 
 
-class Record(NamedTuple):
+class BagRecord(NamedTuple):
     """One record at the top level: its fields, where its data begins, and how long that claims to be."""
 
     fields: rec.Fields
@@ -38,11 +38,11 @@ class ChunkInfo(NamedTuple):
     counts: dict[int, int]
 
 
-class Scan:
+class BagScan:
     """One walk over the file: fills `blocks` (and at which byte the record of each begins), `infos` and `channels`."""
 
     def __init__(self, file: BinaryIO, size: int, damage: Findings) -> None:
-        self.blocks: list[Block] = []
+        self.blocks: list[ChunkBlock] = []
         self.positions: list[int] = []
         self.infos: dict[int, ChunkInfo] = {}
         self.channels: dict[int, Channel] = {}
@@ -60,7 +60,7 @@ class Scan:
             else:
                 pos = self._take(pos, record)
 
-    def _record(self, pos: int) -> Record | None:
+    def _record(self, pos: int) -> BagRecord | None:
         """Return the record at `pos`, None where there is none."""
         size_field = self._at(pos, 4)
         if len(size_field) < 4:
@@ -77,9 +77,9 @@ class Scan:
             return None
         if rec.op_of(fields) not in rec.OPS:
             return None
-        return Record(fields, pos + 8 + header_size, rec.U32.unpack(raw[header_size:])[0])
+        return BagRecord(fields, pos + 8 + header_size, rec.U32.unpack(raw[header_size:])[0])
 
-    def _take(self, pos: int, record: Record) -> int:
+    def _take(self, pos: int, record: BagRecord) -> int:
         op = rec.op_of(record.fields)
         try:
             if op == rec.CHUNK:
@@ -95,7 +95,7 @@ class Scan:
             self._damage.add(f"{error} at byte {pos}")
         return self._index_end(record) if op == rec.INDEX else record.end
 
-    def _add(self, pos: int, block: Block) -> None:
+    def _add(self, pos: int, block: ChunkBlock) -> None:
         """Add a block; messages outside of chunks that follow each other become one."""
         if block.compression == "" and self.blocks and self._follows(self.blocks[-1], block):
             joined = self.blocks[-1].length + block.length
@@ -105,22 +105,22 @@ class Scan:
         self.positions.append(pos)
 
     @staticmethod
-    def _follows(before: Block, block: Block) -> bool:
+    def _follows(before: ChunkBlock, block: ChunkBlock) -> bool:
         near = before.offset + before.length == block.offset
         return near and before.compression == "" and before.length < _STRETCH_BYTES
 
-    def _chunk(self, record: Record) -> Block:
+    def _chunk(self, record: BagRecord) -> ChunkBlock:
         compression = record.fields.get(b"compression", b"").decode("ascii", "replace") or "none"
         length = min(record.length, self._size - record.start)
-        return Block(record.start, length, rec.number(record.fields, b"size"), compression, 0, 0, MAX_TIME_NS)
+        return ChunkBlock(record.start, length, rec.number(record.fields, b"size"), compression, 0, 0, MAX_TIME_NS)
 
-    def _chunk_info(self, record: Record) -> None:
+    def _chunk_info(self, record: BagRecord) -> None:
         position = int.from_bytes(record.fields.get(b"chunk_pos", b""), "little")
         counts = rec.chunk_counts(self._at(record.start, record.length))
         start_ns, end_ns = rec.time_ns(record.fields, b"start_time"), rec.time_ns(record.fields, b"end_time")
         self.infos[position] = ChunkInfo(start_ns, end_ns, counts)
 
-    def _index_end(self, record: Record) -> int:
+    def _index_end(self, record: BagRecord) -> int:
         """Return where an index record really ends: some writers state a wrong length, the count is right then."""
         counted = record.start + _INDEX_ENTRY_BYTES * int.from_bytes(record.fields.get(b"count", b""), "little")
         if counted == record.end or self._is_start(record.end) or not self._is_start(counted):
@@ -131,7 +131,7 @@ class Scan:
     def _is_start(self, pos: int) -> bool:
         return pos == self._size or self._record(pos) is not None
 
-    def _overrun(self, pos: int, record: Record) -> int | None:
+    def _overrun(self, pos: int, record: BagRecord) -> int | None:
         """Take a record that reaches beyond the end of the file: cut off, or its length is wrong."""
         op = rec.op_of(record.fields)
         if op == rec.INDEX:
@@ -180,5 +180,5 @@ class Scan:
         return self._file.read(size)
 
 
-def _stretch(start: int, end: int) -> Block:
-    return Block(start, end - start, end - start, "", 0, 0, MAX_TIME_NS)
+def _stretch(start: int, end: int) -> ChunkBlock:
+    return ChunkBlock(start, end - start, end - start, "", 0, 0, MAX_TIME_NS)

@@ -19,7 +19,7 @@ class Severity(StrEnum):
     FATAL = "fatal"
 
 
-class Finding(NamedTuple):
+class LogFinding(NamedTuple):
     """What was found, in which topic ("" for the log as a whole), and what to do about it ("" for nothing)."""
 
     severity: Severity

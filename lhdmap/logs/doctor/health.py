@@ -11,7 +11,7 @@ from pathlib import Path
 from lhdmap.errors import InputError
 from lhdmap.logs.base import LogReader
 from lhdmap.logs.decoders import DECODERS
-from lhdmap.logs.doctor.finding import Finding, Severity
+from lhdmap.logs.doctor.finding import LogFinding, Severity
 from lhdmap.logs.doctor.scans import ScanWatch
 from lhdmap.logs.doctor.stamps import StampWatch
 from lhdmap.logs.doctor.values import ValueWatch
@@ -36,7 +36,7 @@ _KEY_SCAN_STEP_M, _KEY_SCAN_PERIOD_S = 0.5, 0.3
 Progress = Callable[[LogReader, Iterator[Record]], Iterator[Record]]
 
 
-class Verdict(StrEnum):
+class LogVerdict(StrEnum):
     """Whether a log can be used."""
 
     USABLE = "usable"
@@ -49,8 +49,8 @@ class Examination:
     """The outcome for one log; `inventory` is None where it could not be opened."""
 
     path: Path
-    verdict: Verdict
-    findings: list[Finding] = field(default_factory=list)
+    verdict: LogVerdict
+    findings: list[LogFinding] = field(default_factory=list)
     inventory: Inventory | None = None
 
 
@@ -80,7 +80,7 @@ def examine(path: Path, overrides: Mapping[str, str] | None = None, progress: Pr
             reader = stack.enter_context(open_log(path))
             return _examined(reader, overrides or {}, progress or (lambda _, records: records))
         except InputError as error:
-            return Examination(path, Verdict.UNUSABLE, [Finding(Severity.FATAL, "", str(error))])
+            return Examination(path, LogVerdict.UNUSABLE, [LogFinding(Severity.FATAL, "", str(error))])
 
 
 def _examined(reader: LogReader, overrides: Mapping[str, str], progress: Progress) -> Examination:
@@ -93,7 +93,7 @@ def _examined(reader: LogReader, overrides: Mapping[str, str], progress: Progres
             watches.update(record.topic, message)
     findings += survey.findings
     findings += [
-        Finding(Severity.PROBLEM, "", f"damaged: {line}", "all whole messages are used") for line in reader.damage
+        LogFinding(Severity.PROBLEM, "", f"damaged: {line}", "all whole messages are used") for line in reader.damage
     ]
     findings += _topic_findings(reader, watches, survey)
     findings += _missing(reader, roles, watches)
@@ -105,17 +105,17 @@ def _examined(reader: LogReader, overrides: Mapping[str, str], progress: Progres
     return Examination(reader.path, _verdict(findings), findings, take_inventory(reader, used))
 
 
-def _roles(reader: LogReader, overrides: Mapping[str, str]) -> tuple[dict[str, str], list[Finding]]:
+def _roles(reader: LogReader, overrides: Mapping[str, str]) -> tuple[dict[str, str], list[LogFinding]]:
     """Return the roles of the topics, and the doubt about the front scanner, which no command can do without."""
     roles, doubt = roles_and_doubt(reader.topics(), overrides)
     if doubt and overrides:
         raise InputError(doubt)
     return roles, [
-        Finding(Severity.FATAL, "", doubt, "give that option to this and the other commands")
+        LogFinding(Severity.FATAL, "", doubt, "give that option to this and the other commands")
     ] if doubt else []
 
 
-def _topic_findings(reader: LogReader, watches: _Watches, survey: Survey) -> list[Finding]:
+def _topic_findings(reader: LogReader, watches: _Watches, survey: Survey) -> list[LogFinding]:
     found = []
     for topic, watch in watches.stamps.items():
         if is_ground_truth(topic):
@@ -131,16 +131,16 @@ def _stated_end(reader: LogReader, topic: str) -> float | None:
     return reader.stated_end_rad(topic) if reader.topics()[topic].type_name == SCAN else None
 
 
-def _clocks(reader: LogReader) -> list[Finding]:
+def _clocks(reader: LogReader) -> list[LogFinding]:
     """Return where the clock was set, and topics with a clock of their own."""
     start_ns = min((seen.first_ns for seen in reader.stamps.values() if seen.count), default=0)
     advice = "the order of the file is kept, and time runs on as if the clock had not been set"
-    return [Finding(Severity.REMARK, "", step.text(start_ns), advice) for step in reader.clock_steps]
+    return [LogFinding(Severity.REMARK, "", step.text(start_ns), advice) for step in reader.clock_steps]
 
 
-def _of_remark(line: str) -> Finding:
+def _of_remark(line: str) -> LogFinding:
     """Return a reader's remark as a finding; how a format is read is a note, what was guessed or left out is more."""
-    return Finding(Severity.REMARK if any(word in line for word in _GUESSED) else Severity.NOTE, "", line)
+    return LogFinding(Severity.REMARK if any(word in line for word in _GUESSED) else Severity.NOTE, "", line)
 
 
 def _told_elsewhere(remark: str) -> bool:
@@ -148,7 +148,7 @@ def _told_elsewhere(remark: str) -> bool:
     return ("stamp" in remark and "another clock" not in remark) or remark.startswith("the clock was set")
 
 
-def _mounts(survey: Survey, roles: Mapping[str, str], watches: _Watches) -> list[Finding]:
+def _mounts(survey: Survey, roles: Mapping[str, str], watches: _Watches) -> list[LogFinding]:
     """Return which sensors have no mount, and what was odd in the transforms."""
     found = []
     frames = {topic: watch.frame_id for topic, watch in watches.scans.items() if watch.frame_id}
@@ -158,38 +158,38 @@ def _mounts(survey: Survey, roles: Mapping[str, str], watches: _Watches) -> list
         is_scanner = topic in watches.scans and bool(watches.scans[topic].frame_id)
         if survey.frames.mount(frame) is None and (is_scanner or topic in mounted):
             advice = "the machine file's is used, else a level sensor at base_link"
-            found.append(Finding(Severity.REMARK, topic, f"no mount of its frame '{frame}' in the log", advice))
-    return found + [Finding(Severity.REMARK, "", line) for line in survey.frames.remarks]
+            found.append(LogFinding(Severity.REMARK, topic, f"no mount of its frame '{frame}' in the log", advice))
+    return found + [LogFinding(Severity.REMARK, "", line) for line in survey.frames.remarks]
 
 
-def _missing(reader: LogReader, roles: Mapping[str, str], watches: _Watches) -> list[Finding]:
+def _missing(reader: LogReader, roles: Mapping[str, str], watches: _Watches) -> list[LogFinding]:
     """Return what the log lacks."""
     found = []
     topics = reader.topics()
     scanners = [name for name, info in topics.items() if info.type_name in (SCAN, CLOUD)]
     if not scanners:
-        found.append(Finding(Severity.FATAL, "", str(missing_scanner(topics)), "record the scanner's topic"))
+        found.append(LogFinding(Severity.FATAL, "", str(missing_scanner(topics)), "record the scanner's topic"))
     elif scanners == [roles.get("rear")]:
         found.append(
-            Finding(Severity.FATAL, "", str(missing_scanner(topics, roles["rear"])), "or record the front one")
+            LogFinding(Severity.FATAL, "", str(missing_scanner(topics, roles["rear"])), "or record the front one")
         )
     elif not any(name in watches.stamps for name in scanners):
         text = "no scan in the log: its scanner topics hold no whole message"
-        found.append(Finding(Severity.FATAL, "", text, "record it again"))
+        found.append(LogFinding(Severity.FATAL, "", text, "record it again"))
     if "inclinometer" not in roles:
-        found.append(Finding(Severity.NOTE, "", "no inclinometer: the drive is treated as level"))
+        found.append(LogFinding(Severity.NOTE, "", "no inclinometer: the drive is treated as level"))
     if "wheel_odometry" not in roles and "tachometer" not in roles:
         found.append(
-            Finding(Severity.NOTE, "", "no wheel speed: where scans do not show the motion, the last one is kept")
+            LogFinding(Severity.NOTE, "", "no wheel speed: where scans do not show the motion, the last one is kept")
         )
     undecoded = [info for info in topics.values() if info.type_name not in DECODERS]
     if undecoded:
         listed = ", ".join(f"{info.name} ({info.type_name})" for info in undecoded)
-        found.append(Finding(Severity.NOTE, "", f"not read: {listed}"))
+        found.append(LogFinding(Severity.NOTE, "", f"not read: {listed}"))
     return found
 
 
-def _key_scans(roles: Mapping[str, str], watches: _Watches) -> list[Finding]:
+def _key_scans(roles: Mapping[str, str], watches: _Watches) -> list[LogFinding]:
     """Tell a log of key scans (about a metre apart) from a drive."""
     path_m = max((watch.path_m for watch in watches.values.values()), default=0.0)
     front = roles.get("front", "")
@@ -199,11 +199,11 @@ def _key_scans(roles: Mapping[str, str], watches: _Watches) -> list[Finding]:
     if count < 2 or quick or path_m < _KEY_SCAN_STEP_M * count:
         return []
     text = f"key scans only: {path_m / count:.2f} m between scans"
-    return [Finding(Severity.PROBLEM, front, text, "too far for odometry: build the map with given poses")]
+    return [LogFinding(Severity.PROBLEM, front, text, "too far for odometry: build the map with given poses")]
 
 
-def _verdict(findings: list[Finding]) -> Verdict:
+def _verdict(findings: list[LogFinding]) -> LogVerdict:
     severities = {finding.severity for finding in findings}
     if Severity.FATAL in severities:
-        return Verdict.UNUSABLE
-    return Verdict.REMARKS if severities & {Severity.REMARK, Severity.PROBLEM} else Verdict.USABLE
+        return LogVerdict.UNUSABLE
+    return LogVerdict.REMARKS if severities & {Severity.REMARK, Severity.PROBLEM} else LogVerdict.USABLE

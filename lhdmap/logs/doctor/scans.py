@@ -9,7 +9,7 @@ from collections.abc import Sequence
 import numpy as np
 import numpy.typing as npt
 
-from lhdmap.logs.doctor.finding import Finding, Severity
+from lhdmap.logs.doctor.finding import LogFinding, Severity
 from lhdmap.messages import Float32Array, LaserScan
 
 _SAMPLES = 256  # scans kept for the statistics of single beams
@@ -50,7 +50,7 @@ class ScanWatch:
                 self._samples, self._stride = self._samples[::2], 2 * self._stride
         self._count += 1
 
-    def findings(self, period_s: float | None, stated_end_rad: float | None) -> list[Finding]:
+    def findings(self, period_s: float | None, stated_end_rad: float | None) -> list[LogFinding]:
         """Return what is to be said beside what the survey says.
 
         `period_s`: the usual time between scans; the stated angle of the last beam.
@@ -86,48 +86,54 @@ class ScanWatch:
         self._run = self._run + 1 if same else 0
         self._longest_run = max(self._longest_run, self._run)
 
-    def _validity(self) -> list[Finding]:
+    def _validity(self) -> list[LogFinding]:
         share = self._valid / max(self._beams, 1)
         found = []
         if _DEAD_SHARE <= share < _WEAK_SHARE:
             text = f"only {100 * share:.0f} % of the beams have a valid range"
-            found.append(Finding(Severity.PROBLEM, self.topic, text, "check the scanner's window and its range limits"))
+            found.append(
+                LogFinding(Severity.PROBLEM, self.topic, text, "check the scanner's window and its range limits")
+            )
         if 0 < self._dead < self._count:
             text = f"{self._dead} of {self._count} scans have no valid beam"
-            found.append(Finding(Severity.REMARK, self.topic, text, "motion is bridged by prediction there"))
+            found.append(LogFinding(Severity.REMARK, self.topic, text, "motion is bridged by prediction there"))
         if self._top > _SATURATED_SHARE * self._valid > 0:
             text = f"saturated: {100 * self._top / self._valid:.0f} % of the valid ranges are at the greatest range"
             found.append(
-                Finding(Severity.PROBLEM, self.topic, text, "the scanner seems to report no return as a range")
+                LogFinding(Severity.PROBLEM, self.topic, text, "the scanner seems to report no return as a range")
             )
         if self._nan:
             text = f"{100 * self._nan / self._beams:.1f} % of the ranges are NaN (taken as no return)"
-            found.append(Finding(Severity.NOTE, self.topic, text))
+            found.append(LogFinding(Severity.NOTE, self.topic, text))
         if self._negative:
-            found.append(Finding(Severity.REMARK, self.topic, f"{self._negative} negative ranges (taken as no return)"))
+            found.append(
+                LogFinding(Severity.REMARK, self.topic, f"{self._negative} negative ranges (taken as no return)")
+            )
         return found
 
-    def _frozen(self) -> list[Finding]:
+    def _frozen(self) -> list[LogFinding]:
         if self._longest_run < _FROZEN_RUN:
             return []
         text = f"frozen: {self._longest_run + 1} identical scans in a row ({self._identical} repeated in all)"
         return [
-            Finding(Severity.PROBLEM, self.topic, text, "check the driver; a simulated scanner without noise does this")
+            LogFinding(
+                Severity.PROBLEM, self.topic, text, "check the driver; a simulated scanner without noise does this"
+            )
         ]
 
-    def _geometry(self) -> list[Finding]:
+    def _geometry(self) -> list[LogFinding]:
         starts = sorted({start for _, start, _ in self._geometries})
         sizes = sorted({size for size, _, _ in self._geometries})
         if len(starts) > 1:
             listed = ", ".join(f"{math.degrees(start):.2f}" for start in starts[:6])
             text = f"interlaced: {len(starts)} start angles in turn ({listed} deg)"
-            return [Finding(Severity.REMARK, self.topic, text, "the start angle of each scan is used")]
+            return [LogFinding(Severity.REMARK, self.topic, text, "the start angle of each scan is used")]
         if len(sizes) > 1:
             text = f"the number of beams changes ({', '.join(map(str, sizes[:6]))})"
-            return [Finding(Severity.REMARK, self.topic, text)]
+            return [LogFinding(Severity.REMARK, self.topic, text)]
         return []
 
-    def _own_body(self) -> list[Finding]:
+    def _own_body(self) -> list[LogFinding]:
         size = Counter(len(scan.ranges_m) for scan in self._samples).most_common(1)[0][0]
         table = np.array([scan.ranges_m for scan in self._samples if len(scan.ranges_m) == size])
         if len(table) < 20 or size == 0:
@@ -146,17 +152,17 @@ class ScanWatch:
         sector = f"{math.degrees(angles.min()):.0f} to {math.degrees(angles.max()):.0f} deg"
         text = f"{len(constant)} beams never change ({sector}, {np.median(table[:, constant]):.2f} m): own body"
         advice = "the self-filter must cover them: check the machine's outline and the mount"
-        return [Finding(Severity.REMARK, self.topic, text, advice)]
+        return [LogFinding(Severity.REMARK, self.topic, text, advice)]
 
 
-def fatal_findings(topic: str, scans: Sequence[LaserScan]) -> list[Finding]:
+def fatal_findings(topic: str, scans: Sequence[LaserScan]) -> list[LogFinding]:
     """Return what makes a scanner useless, of a sample of its scans."""
     beams = sum(len(scan.ranges_m) for scan in scans)
     share = sum(int(np.count_nonzero(_valid(scan.ranges_m, scan))) for scan in scans) / max(beams, 1)
     if share >= _DEAD_SHARE:
         return []
     text = f"dead: only {100 * share:.1f} % of the beams have a valid range"
-    return [Finding(Severity.FATAL, topic, text, "check the scanner, its window and its range limits")]
+    return [LogFinding(Severity.FATAL, topic, text, "check the scanner, its window and its range limits")]
 
 
 def _valid(ranges: npt.NDArray[np.float32], scan: LaserScan) -> npt.NDArray[np.bool_]:
@@ -164,7 +170,7 @@ def _valid(ranges: npt.NDArray[np.float32], scan: LaserScan) -> npt.NDArray[np.b
     return np.isfinite(ranges) & (ranges > 0.0) & (ranges >= scan.range_min_m) & (ranges <= scan.range_max_m)
 
 
-def _stated_end(topic: str, scan: LaserScan, stated_rad: float | None) -> list[Finding]:
+def _stated_end(topic: str, scan: LaserScan, stated_rad: float | None) -> list[LogFinding]:
     """Compare the stated angle of the last beam with start, increment and number of beams."""
     size, increment = len(scan.ranges_m), scan.angle_increment_rad
     if stated_rad is None or size < 2 or increment == 0.0 or not math.isfinite(stated_rad):
@@ -178,24 +184,24 @@ def _stated_end(topic: str, scan: LaserScan, stated_rad: float | None) -> list[F
     if (stated_rad - scan.angle_min_rad) * increment < 0:
         text = f"the sign of the angle increment contradicts the stated end ({text})"
         advice = "start and increment are used: check whether the map is mirrored"
-        return [Finding(Severity.PROBLEM, topic, text, advice)]
+        return [LogFinding(Severity.PROBLEM, topic, text, advice)]
     severity = Severity.REMARK if abs(off) < 1.5 else Severity.PROBLEM
-    return [Finding(severity, topic, text, "start and increment are used, the stated end is not")]
+    return [LogFinding(severity, topic, text, "start and increment are used, the stated end is not")]
 
 
-def _unusual_limits(topic: str, scan: LaserScan) -> list[Finding]:
+def _unusual_limits(topic: str, scan: LaserScan) -> list[LogFinding]:
     low, high = scan.range_min_m, scan.range_max_m
     if low < 0 or _MAX_RANGE_M < high < math.inf:
-        return [Finding(Severity.REMARK, topic, f"the range limits are unusual ({low:g} to {high:g} m)")]
+        return [LogFinding(Severity.REMARK, topic, f"the range limits are unusual ({low:g} to {high:g} m)")]
     return []
 
 
-def _timing(topic: str, scan: LaserScan, period_s: float | None) -> list[Finding]:
+def _timing(topic: str, scan: LaserScan, period_s: float | None) -> list[LogFinding]:
     sweep_s = abs(scan.time_increment_s) * len(scan.ranges_m)
     if period_s and sweep_s > 1.1 * period_s:
         text = f"a sweep takes {sweep_s:.3f} s by its time increment, scans come each {period_s:.3f} s"
         advice = "the time increment is wrong: motion compensation would do harm"
-        return [Finding(Severity.PROBLEM, topic, text, advice)]
+        return [LogFinding(Severity.PROBLEM, topic, text, advice)]
     if sweep_s == 0.0:
-        return [Finding(Severity.NOTE, topic, "no time increment: motion within a sweep is not compensated")]
+        return [LogFinding(Severity.NOTE, topic, "no time increment: motion within a sweep is not compensated")]
     return []

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from lhdmap.logs.doctor.finding import Finding, Severity
+from lhdmap.logs.doctor.finding import LogFinding, Severity
 from lhdmap.messages import GroundTruth, Inclination, Joints, Message, PointCloud, Pressure, Tachometer, WheelPose
 
 _MANY = 50
@@ -68,18 +68,18 @@ class ValueWatch:
         """What the last message said."""
         return ", ".join(f"{value:.4g}" for value in self._last)
 
-    def findings(self) -> list[Finding]:
+    def findings(self) -> list[LogFinding]:
         """Return what is to be said."""
         found = []
         if self._count >= _MANY and self.never_changes:
             text = f"its value never changes ({self.last_text})"
-            found.append(Finding(Severity.REMARK, self.topic, text, "is the sensor connected?"))
+            found.append(LogFinding(Severity.REMARK, self.topic, text, "is the sensor connected?"))
         if self._kind is Inclination:
             found += self._tilt()
         if self._kind is WheelPose and self._jump_m > _MAX_JUMP_M:
             text = f"the pose jumps by up to {self._jump_m:.1f} m"
             found.append(
-                Finding(Severity.PROBLEM, self.topic, text, "the odometry was reset or is corrected: not motion")
+                LogFinding(Severity.PROBLEM, self.topic, text, "the odometry was reset or is corrected: not motion")
             )
         return found
 
@@ -88,18 +88,20 @@ class ValueWatch:
             self._low = self._high = values
         self._low, self._high = np.fmin(self._low, values), np.fmax(self._high, values)
 
-    def _tilt(self) -> list[Finding]:
+    def _tilt(self) -> list[LogFinding]:
         found = []
         worst = float(np.max(np.abs([self._low, self._high])))
         if worst > _MAX_TILT_RAD:
             text = f"roll or pitch reaches {math.degrees(worst):.0f} deg"
             advice = "check its mount: roll and pitch of the front body are wanted (REP 103)"
-            found.append(Finding(Severity.PROBLEM, self.topic, text, advice))
+            found.append(LogFinding(Severity.PROBLEM, self.topic, text, advice))
         if self._gravity_count:
             gravity = self._gravity_sum / self._gravity_count
             if abs(gravity - _GRAVITY_MPS2) > _GRAVITY_TOLERANCE_MPS2:
                 text = f"the mean acceleration is {gravity:.2f} m/s2, not gravity's {_GRAVITY_MPS2}"
-                found.append(Finding(Severity.REMARK, self.topic, text, "unit or offset of the accelerometer is wrong"))
+                found.append(
+                    LogFinding(Severity.REMARK, self.topic, text, "unit or offset of the accelerometer is wrong")
+                )
         return found
 
 

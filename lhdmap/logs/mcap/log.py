@@ -13,7 +13,7 @@ from lhdmap.logs.compression import inflated
 from lhdmap.logs.container import BlockFile, Contents
 from lhdmap.logs.findings import Findings
 from lhdmap.logs.mcap import records as rec
-from lhdmap.logs.mcap.scan import Scan
+from lhdmap.logs.mcap.scan import McapScan
 
 _FOOTER_BYTES = rec.HEAD.size + 20
 _MAX_SUMMARY_BYTES = 256 << 20
@@ -34,9 +34,9 @@ class McapFile(BlockFile):
             raise InputError(
                 f"{path}: not an MCAP file (its first bytes are not MCAP's); is it another format, or empty?"
             )
-        self._tables = rec.Tables()
+        self._tables = rec.McapTables()
         self._channels = self._tables.channels
-        scan = Scan(self._file, self._size, damage)
+        scan = McapScan(self._file, self._size, damage)
         scan.run()
         self._blocks = scan.blocks
         self._contents = self._summary()
@@ -78,7 +78,7 @@ class McapFile(BlockFile):
         return _stated(summary, self._tables)
 
 
-def _stated(summary: bytes, tables: rec.Tables) -> Contents | None:
+def _stated(summary: bytes, tables: rec.McapTables) -> Contents | None:
     """Return the contents from the records of a summary section, None where it has no statistics."""
     found, pos = None, 0
     while pos + rec.HEAD.size <= len(summary):

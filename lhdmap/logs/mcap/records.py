@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 from lhdmap.errors import InputError
 from lhdmap.logs.base import Channel
-from lhdmap.logs.blocks import MAX_TIME_NS, Block, Entry
+from lhdmap.logs.blocks import MAX_TIME_NS, ChunkBlock, Entry
 from lhdmap.logs.compression import COMPRESSIONS
 
 MAGIC = b"\x89MCAP0\r\n"
@@ -24,7 +24,7 @@ _STATISTICS = struct.Struct("<QHIIIIQQI")
 _COUNT = struct.Struct("<HQ")
 
 
-class Statistics(NamedTuple):
+class McapStatistics(NamedTuple):
     """The statistics record: number of messages by channel id, and their first and last log time."""
 
     counts: dict[int, int]
@@ -64,7 +64,7 @@ _U16, _U32 = struct.Struct("<H"), struct.Struct("<I")
 _CHANNEL_IDS = struct.Struct("<HH")
 
 
-class Tables:
+class McapTables:
     """Schemas and channels seen so far; the first definition of an id holds."""
 
     def __init__(self) -> None:
@@ -89,7 +89,7 @@ def ros2_type(name: str) -> str:
     return f"{parts[0]}/msg/{parts[-1]}" if len(parts) in (2, 3) else name
 
 
-def chunk_block(content: bytes | memoryview, offset: int, length: int) -> Block:
+def chunk_block(content: bytes | memoryview, offset: int, length: int) -> ChunkBlock:
     """Return the block of a chunk record whose content begins at `offset` of the file; `content`: its first bytes.
 
     Raises:
@@ -107,15 +107,17 @@ def chunk_block(content: bytes | memoryview, offset: int, length: int) -> Block:
     head = name_start + name_size + 8
     if stored > length - head:
         raise InputError("a chunk with an impossible size")
-    return Block(offset + head, stored, size, compression, crc, min(start_ns, MAX_TIME_NS), min(end_ns, MAX_TIME_NS))
+    return ChunkBlock(
+        offset + head, stored, size, compression, crc, min(start_ns, MAX_TIME_NS), min(end_ns, MAX_TIME_NS)
+    )
 
 
-def statistics(content: bytes) -> Statistics:
+def statistics(content: bytes) -> McapStatistics:
     """Return the content of a statistics record; raises InputError where it is broken."""
     fields = Fields(content)
     *_, start_ns, end_ns, size = fields.take(_STATISTICS)
     pairs: list[tuple[int, int]] = [fields.take(_COUNT) for _ in range(size // _COUNT.size)]  # type: ignore[misc]
-    return Statistics(dict(pairs), start_ns, end_ns)
+    return McapStatistics(dict(pairs), start_ns, end_ns)
 
 
 def footer(content: bytes) -> tuple[int, int, int]:
@@ -124,7 +126,7 @@ def footer(content: bytes) -> tuple[int, int, int]:
     return start, offsets, crc
 
 
-def messages(data: bytes, tables: Tables | None = None) -> tuple[list[Entry], str | None]:
+def messages(data: bytes, tables: McapTables | None = None) -> tuple[list[Entry], str | None]:
     """Return the messages in the records of `data` and what is wrong with it (None: nothing).
 
     Schemas and channels on the way go into `tables`. A record that does not fit ends the walk.
@@ -148,7 +150,7 @@ def messages(data: bytes, tables: Tables | None = None) -> tuple[list[Entry], st
     return entries, problem if pos == end else f"{end - pos} bytes left over"
 
 
-def _define(tables: Tables, opcode: int, content: bytes) -> str | None:
+def _define(tables: McapTables, opcode: int, content: bytes) -> str | None:
     try:
         tables.define(opcode, content)
     except InputError as error:

@@ -10,7 +10,7 @@ import re
 from typing import BinaryIO
 
 from lhdmap.errors import InputError
-from lhdmap.logs.blocks import MAX_TIME_NS, Block
+from lhdmap.logs.blocks import MAX_TIME_NS, ChunkBlock
 from lhdmap.logs.findings import Findings
 from lhdmap.logs.mcap import records as rec
 
@@ -24,11 +24,11 @@ _WINDOW = 1 << 20
 _MAX_CANDIDATES = 1 << 20
 
 
-class Scan:
+class McapScan:
     """One walk over the data section: fills `blocks`; what is broken goes to `damage`."""
 
     def __init__(self, file: BinaryIO, size: int, damage: Findings) -> None:
-        self.blocks: list[Block] = []
+        self.blocks: list[ChunkBlock] = []
         self._file, self._size, self._damage = file, size, damage
         self._stretch: list[int] | None = None  # start, end, first and last log time of records outside of chunks
         self._candidates = 0
@@ -142,7 +142,7 @@ class Scan:
     def _close_stretch(self) -> None:
         if self._stretch is not None:
             start, end, first_ns, last_ns = self._stretch
-            self.blocks.append(Block(start, end - start, end - start, "", 0, first_ns, min(last_ns, MAX_TIME_NS)))
+            self.blocks.append(ChunkBlock(start, end - start, end - start, "", 0, first_ns, min(last_ns, MAX_TIME_NS)))
         self._stretch = None
 
     def _at(self, pos: int, size: int) -> bytes:

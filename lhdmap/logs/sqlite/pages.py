@@ -19,14 +19,14 @@ _INTEGER_SIZES = {1: 1, 2: 2, 3: 3, 4: 4, 5: 6, 6: 8}
 _MAX_COLUMNS = 16
 
 
-class Row(NamedTuple):
+class PageRow(NamedTuple):
     """One row: its rowid and its columns (None, integers, or the bytes of texts and blobs)."""
 
     rowid: int
     columns: list[Value]
 
 
-class Place(NamedTuple):
+class PagePlace(NamedTuple):
     """Where a row is: page number (from 0) and offset of its cell in the page."""
 
     page: int
@@ -49,17 +49,17 @@ class Pages:
         if self._usable < 480:
             self._usable = self.page_bytes
 
-    def rows(self) -> Iterator[tuple[Place, Row]]:
+    def rows(self) -> Iterator[tuple[PagePlace, PageRow]]:
         """Yield all rows that can be read, in the order of the pages."""
         for number in range(self._size // self.page_bytes):
             page = self._page(number)
             for offset in _cells(page, _HEADER_BYTES if number == 0 else 0):
                 try:
-                    yield Place(number, offset), self._row(page, offset)
+                    yield PagePlace(number, offset), self._row(page, offset)
                 except (InputError, IndexError):
                     continue
 
-    def row(self, place: Place) -> Row:
+    def row(self, place: PagePlace) -> PageRow:
         """Return the row at a place that `rows` gave."""
         return self._row(self._page(place.page), place.offset)
 
@@ -67,10 +67,10 @@ class Pages:
         self._file.seek(number * self.page_bytes)
         return self._file.read(self.page_bytes)
 
-    def _row(self, page: bytes, offset: int) -> Row:
+    def _row(self, page: bytes, offset: int) -> PageRow:
         payload_bytes, pos = _varint(page, offset)
         rowid, pos = _varint(page, pos)
-        return Row(rowid, _columns(self._payload(page, pos, payload_bytes)))
+        return PageRow(rowid, _columns(self._payload(page, pos, payload_bytes)))
 
     def _payload(self, page: bytes, pos: int, size: int) -> bytes:
         """Return the payload of a cell, the part on overflow pages included."""

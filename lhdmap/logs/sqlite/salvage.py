@@ -10,7 +10,7 @@ from lhdmap.errors import InputError
 from lhdmap.logs.base import Channel
 from lhdmap.logs.blocks import MAX_TIME_NS
 from lhdmap.logs.container import Contents
-from lhdmap.logs.sqlite.pages import Pages, Place, Row
+from lhdmap.logs.sqlite.pages import PagePlace, PageRow, Pages
 
 
 class _Found(NamedTuple):
@@ -19,7 +19,7 @@ class _Found(NamedTuple):
     time_ns: int
     rowid: int
     topic: int
-    place: Place
+    place: PagePlace
 
 
 class Salvage:
@@ -62,14 +62,14 @@ class Salvage:
         """Close the file."""
         self._file.close()
 
-    def _add_topic(self, row: Row) -> None:
+    def _add_topic(self, row: PageRow) -> None:
         """Take in a row (id, name, type, serialization format, ...) of the table of topics."""
         texts = [value.decode("utf-8", "replace") for value in row.columns[1:4] if isinstance(value, bytes)]
         if len(texts) == 3 and row.columns[0] is None and "/" in texts[1] and texts[2].isalnum():
             self._channels.setdefault(row.rowid, Channel(*texts))
 
 
-def _message(row: Row, place: Place) -> _Found | None:
+def _message(row: PageRow, place: PagePlace) -> _Found | None:
     """Return the message that a row (id, topic, log time, data) of the table of messages is, None for another row."""
     if len(row.columns) != 4 or row.columns[0] is not None:
         return None

@@ -17,7 +17,7 @@ from lhdmap.errors import InputError
 from lhdmap.logs.base import TopicInfo
 from lhdmap.logs.findings import Findings
 from lhdmap.logs.text.lines import text_lines
-from lhdmap.logs.text.log import Found, TextLog, Wanted, every
+from lhdmap.logs.text.log import FoundLine, TextLog, Wanted, every
 from lhdmap.messages import Float32Array, LaserScan, WheelPose
 from lhdmap.roles import ODOMETRY, SCAN
 
@@ -60,7 +60,7 @@ class BreezyLog(TextLog):
             _ODOMETRY: TopicInfo(_ODOMETRY, ODOMETRY, self._count, "odom"),
         }
 
-    def _messages(self, topics: Collection[str], wanted: Wanted = every) -> Iterator[Found]:
+    def _messages(self, topics: Collection[str], wanted: Wanted = every) -> Iterator[FoundLine]:
         wheels = _Wheels()
         for text in self._lines():
             try:
@@ -70,9 +70,9 @@ class BreezyLog(TextLog):
                 continue
             pose = wheels.update(line)
             if _ODOMETRY in topics and wanted(_ODOMETRY):
-                yield Found(_ODOMETRY, line.stamp_ns, pose, True)
+                yield FoundLine(_ODOMETRY, line.stamp_ns, pose, True)
             if _SCAN in topics and wanted(_SCAN):
-                yield Found(_SCAN, line.stamp_ns, _scan(line), True)
+                yield FoundLine(_SCAN, line.stamp_ns, _scan(line), True)
 
 
 class _Wheels:

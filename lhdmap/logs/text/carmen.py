@@ -16,7 +16,7 @@ from lhdmap.logs.base import TopicInfo
 from lhdmap.logs.findings import Findings
 from lhdmap.logs.text import carmen_lines as lines
 from lhdmap.logs.text.carmen_survey import FRAMES, PARSERS, CarmenSurvey, survey
-from lhdmap.logs.text.log import Found, TextLog, Wanted, every
+from lhdmap.logs.text.log import FoundLine, TextLog, Wanted, every
 from lhdmap.messages import GroundTruth, LaserScan, Mount, WheelPose
 from lhdmap.roles import ODOMETRY, ROLES, SCAN, TRANSFORMS
 
@@ -57,7 +57,7 @@ class CarmenLog(TextLog):
         stated = first is not None and topic not in ("FLASER", "RLASER")
         return first.angle_min_rad + first.fov_rad if first is not None and stated else None
 
-    def _messages(self, topics: Collection[str], wanted: Wanted = every) -> Iterator[Found]:
+    def _messages(self, topics: Collection[str], wanted: Wanted = every) -> Iterator[FoundLine]:
         if _MOUNTS in topics:
             yield from self._mounts()
         for line in self._lines():
@@ -69,13 +69,15 @@ class CarmenLog(TextLog):
             if now:
                 yield from self._parsed(name, line.split(), now)
 
-    def _mounts(self) -> Iterator[Found]:
+    def _mounts(self) -> Iterator[FoundLine]:
         for name in self._lasers:
             if name in self._found.mounts:
                 start = self._start_ns or 0
-                yield Found(_MOUNTS, start, Mount(start, "base_link", FRAMES[name], self._found.mounts[name]), False)
+                yield FoundLine(
+                    _MOUNTS, start, Mount(start, "base_link", FRAMES[name], self._found.mounts[name]), False
+                )
 
-    def _parsed(self, name: str, words: list[bytes], topics: Collection[str]) -> Iterator[Found]:
+    def _parsed(self, name: str, words: list[bytes], topics: Collection[str]) -> Iterator[FoundLine]:
         try:
             if name in PARSERS:
                 yield from self._scan(name, PARSERS[name](words), topics)
@@ -85,23 +87,23 @@ class CarmenLog(TextLog):
         except InputError as error:
             self._notes_damage(f"{name}: a line was skipped: {error}")
 
-    def _scan(self, name: str, line: lines.LaserLine, topics: Collection[str]) -> Iterator[Found]:
+    def _scan(self, name: str, line: lines.LaserLine, topics: Collection[str]) -> Iterator[FoundLine]:
         limit = self._found.range_max_m.get(name, math.inf)
         numbers = (line.angle_min_rad, line.angle_increment_rad, 0.0, 0.0, limit)
         if name in topics:
             scan = LaserScan(line.stamp_ns, FRAMES[name], *numbers, line.ranges_m)
-            yield Found(name, line.stamp_ns, scan, True)
+            yield FoundLine(name, line.stamp_ns, scan, True)
         topic = self._pose_topics.get(name)
         if topic in topics and topic is not None and line.robot_pose is not None:
             yield self._pose(topic, line.stamp_ns, line.robot_pose)
 
     @staticmethod
-    def _pose(topic: str, stamp_ns: int, pose: lines.Pose) -> Found:
+    def _pose(topic: str, stamp_ns: int, pose: lines.Pose) -> FoundLine:
         x, y, heading = pose
         if not topic.startswith(_TRUTH):
-            return Found(topic, stamp_ns, WheelPose(stamp_ns, x, y, heading), True)
+            return FoundLine(topic, stamp_ns, WheelPose(stamp_ns, x, y, heading), True)
         quaternion = np.array([0.0, 0.0, math.sin(heading / 2), math.cos(heading / 2)])
-        return Found(topic, stamp_ns, GroundTruth(stamp_ns, np.array([x, y, 0.0]), quaternion), True)
+        return FoundLine(topic, stamp_ns, GroundTruth(stamp_ns, np.array([x, y, 0.0]), quaternion), True)
 
 
 def _lasers(found: CarmenSurvey) -> list[str]:

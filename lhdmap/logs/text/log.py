@@ -19,7 +19,7 @@ from lhdmap.logs.text.lines import text_lines
 from lhdmap.messages import Message, Record
 
 
-class Found(NamedTuple):
+class FoundLine(NamedTuple):
     """One message of a line; `stamped` tells whether its stamp is a measurement's."""
 
     topic: str
@@ -133,7 +133,7 @@ class TextLog(ABC):
     def _survey(self) -> None: ...
 
     @abstractmethod
-    def _messages(self, topics: Collection[str], wanted: Wanted = every) -> Iterator[Found]:
+    def _messages(self, topics: Collection[str], wanted: Wanted = every) -> Iterator[FoundLine]:
         """Yield the messages of `topics`; `wanted(topic)` is asked before one is parsed."""
 
     def _lines(self) -> Iterator[bytes]:

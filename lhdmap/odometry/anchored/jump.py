@@ -9,7 +9,7 @@ import numpy as np
 from lhdmap.geometry import se2
 from lhdmap.messages import FloatArray
 from lhdmap.odometry.anchored.state import NO_OFFSET
-from lhdmap.odometry.motion import Motion
+from lhdmap.odometry.motion import PlanarMotion
 from lhdmap.odometry.settings import SearchSettings
 from lhdmap.odometry.wheels.model import WheelModel
 from lhdmap.scan_matching.matching import Hits, Match, Prior
@@ -28,7 +28,7 @@ def jump(
     hits: Hits,
     near: Match,
     prior: Prior,
-    motion: Motion,
+    motion: PlanarMotion,
     wheels: WheelModel,
     s: SearchSettings,
     offset: FloatArray = NO_OFFSET,
@@ -65,7 +65,7 @@ def _log_odds_against(result: Match, prior: Prior, wheels: WheelModel, offset: F
     return wheels.log_odds_against(offset_of(result, prior) + offset, prior.information)
 
 
-def _reach(motion: Motion, s: SearchSettings) -> FloatArray:
+def _reach(motion: PlanarMotion, s: SearchSettings) -> FloatArray:
     """Return how far to search: three sigmas of the prediction within the settings' limits, metres and radians.
 
     After a gap the wheels' pose may be an old one: all that the settings allow is searched.

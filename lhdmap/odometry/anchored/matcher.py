@@ -11,10 +11,10 @@ from lhdmap.messages import FloatArray
 from lhdmap.odometry.anchored.jump import jump, offset_of
 from lhdmap.odometry.anchored.local_map import LocalMap
 from lhdmap.odometry.anchored.rear_view import NOTHING_BEHIND, Behind
-from lhdmap.odometry.anchored.scan_hits import ScanHits
+from lhdmap.odometry.anchored.scan_hits import HitChoice
 from lhdmap.odometry.anchored.state import MatcherState
-from lhdmap.odometry.anchored.young import Heading, YoungMap
-from lhdmap.odometry.motion import Motion
+from lhdmap.odometry.anchored.young import YoungHeading, YoungMap
+from lhdmap.odometry.motion import PlanarMotion
 from lhdmap.odometry.settings import AnchorSettings, OdometrySettings, RangeFlowSettings, SearchSettings
 from lhdmap.odometry.step_covariance import direction_noise
 from lhdmap.odometry.steps import BY_DEFINITION, Matched
@@ -42,7 +42,7 @@ class AnchoredMatcher:
 
     def __init__(
         self,
-        motion: Motion,
+        motion: PlanarMotion,
         wheels: WheelModel,
         settings: OdometrySettings,
         anchor: AnchorSettings,
@@ -53,7 +53,7 @@ class AnchoredMatcher:
         self._noise_m, self._anchor, self._wide = settings.range_noise_m, anchor, wide
         self._map = LocalMap(settings, anchor, wide)
         self._young = YoungMap(motion, settings.range_noise_m, anchor.young_m, range_flow)
-        self._hits = ScanHits()
+        self._hits = HitChoice()
         self._state = MatcherState()
 
     @property
@@ -97,7 +97,7 @@ class AnchoredMatcher:
         self._map.insert(points, self._motion.pose)
         return Matched(BY_DEFINITION, 0.0, 1.0, lost=False, noise=np.zeros((3, 3)))
 
-    def _prior(self, heading: Heading) -> Prior:
+    def _prior(self, heading: YoungHeading) -> Prior:
         """Return the motion's prediction, and a heading with its information."""
         predicted, information = self._motion.pose, self._motion.prior_information + heading.matrix
         if heading.information > 0.0:
@@ -151,7 +151,7 @@ class AnchoredMatcher:
             self._begin(points, pose_base_scanner)
         return _lost(support)
 
-    def _correct(self, found: Match, heading: Heading) -> None:
+    def _correct(self, found: Match, heading: YoungHeading) -> None:
         """Tell the motion where the scan was found; what it has driven since is renewed in the map, and so is its error."""
         motion = self._motion
         before, velocity = motion.pose, motion.velocity

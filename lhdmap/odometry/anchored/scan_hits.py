@@ -12,7 +12,7 @@ from lhdmap.scan_matching.slant import slants
 _FRONT_STEP = 3  # one in three hits of the front scanner: as exact with the rear one's, and faster
 
 
-class ScanHits:
+class HitChoice:
     """`of` a scan gives its hits; `behind`: the rear ones among the last, shape (N, 3), level base frame."""
 
     def __init__(self) -> None:

@@ -24,7 +24,7 @@ _BETTER = 0.01  # support by which a wide start must fit better than the predict
 _FAR = 1e3  # metres that a library may move a pose before the result is taken for nonsense
 
 
-class Cloud(NamedTuple):
+class PreparedCloud(NamedTuple):
     """A cloud in `base_link`, sweep undone: all points (M, 3), the thinned ones (N, 3) alone and with covariances."""
 
     full_m: FloatArray
@@ -32,7 +32,7 @@ class Cloud(NamedTuple):
     prepared: Any
 
 
-def prepare(points_m: FloatArray, sample_m: float) -> Cloud | None:
+def prepare(points_m: FloatArray, sample_m: float) -> PreparedCloud | None:
     """Return the cloud of points (M, 3) thinned to one per cell of `sample_m`; None where too few are left."""
     import small_gicp
 
@@ -42,10 +42,10 @@ def prepare(points_m: FloatArray, sample_m: float) -> Cloud | None:
     if len(thinned) < _LEAST_POINTS:
         return None
     small_gicp.estimate_covariances(thinned, num_neighbors=_NEIGHBOURS, num_threads=1)
-    return Cloud(points_m, np.array(thinned.points()[:, :3]), thinned)
+    return PreparedCloud(points_m, np.array(thinned.points()[:, :3]), thinned)
 
 
-class Prediction(NamedTuple):
+class CloudPrediction(NamedTuple):
     """Where the machine should be: pose (4, 4), its information (6, 6), and starts for the search, each (4, 4)."""
 
     pose: FloatArray
@@ -56,10 +56,10 @@ class Prediction(NamedTuple):
 class CloudMatcher(Protocol):
     """What the stage needs of a matcher."""
 
-    def match(self, cloud: Cloud, predicted: Prediction) -> PlaneFit:
+    def match(self, cloud: PreparedCloud, predicted: CloudPrediction) -> PlaneFit:
         """Return the pose of the cloud, blended with the prediction, and what the map says of it."""
 
-    def insert(self, cloud: Cloud, pose: FloatArray) -> None:
+    def insert(self, cloud: PreparedCloud, pose: FloatArray) -> None:
         """Take the cloud into the map."""
 
     def clear(self) -> None:
@@ -87,13 +87,13 @@ class VgicpMatcher:
         """Return the number of voxels."""
         return int(self._fine.size())
 
-    def insert(self, cloud: Cloud, pose: FloatArray) -> None:
+    def insert(self, cloud: PreparedCloud, pose: FloatArray) -> None:
         """Take the cloud into the map."""
         self._fine.insert(cloud.prepared, pose)
         self._coarse.insert(cloud.prepared, pose)
         self._planes = None
 
-    def match(self, cloud: Cloud, predicted: Prediction) -> PlaneFit:
+    def match(self, cloud: PreparedCloud, predicted: CloudPrediction) -> PlaneFit:
         """Return the best of the fits from the prediction and from the wide starts, if any."""
         best = self._fit(cloud, self._align(self._fine, cloud, predicted.pose, self._settings.voxel_m), predicted)
         for start in predicted.starts:
@@ -102,11 +102,11 @@ class VgicpMatcher:
             best = found if found.support > best.support + _BETTER else best
         return best
 
-    def judge(self, cloud: Cloud, pose: FloatArray) -> PlaneFit:
+    def judge(self, cloud: PreparedCloud, pose: FloatArray) -> PlaneFit:
         """Return what the planes say of a pose (4, 4)."""
         return self._plane_map().judge(cloud.points_m, pose)
 
-    def _fit(self, cloud: Cloud, start: FloatArray, predicted: Prediction) -> PlaneFit:
+    def _fit(self, cloud: PreparedCloud, start: FloatArray, predicted: CloudPrediction) -> PlaneFit:
         return self._plane_map().fit(cloud.points_m, start, predicted.pose, predicted.information)
 
     def _plane_map(self) -> PlaneMap:
@@ -114,7 +114,7 @@ class VgicpMatcher:
             self._planes = PlaneMap(self._fine, self._settings.voxel_m, self._noise)
         return self._planes
 
-    def _align(self, voxels: Any, cloud: Cloud, start: FloatArray, reach_m: float) -> FloatArray:
+    def _align(self, voxels: Any, cloud: PreparedCloud, start: FloatArray, reach_m: float) -> FloatArray:
         import small_gicp
 
         result = small_gicp.align(
@@ -173,13 +173,13 @@ class KissMatcher:
         """Return the number of voxels of the map of planes."""
         return len(self._judge)
 
-    def insert(self, cloud: Cloud, pose: FloatArray) -> None:
+    def insert(self, cloud: PreparedCloud, pose: FloatArray) -> None:
         """Take the cloud into both maps."""
         _, dense = self._kiss.voxelize(cloud.full_m)
         self._kiss.local_map.update(dense, pose)
         self._judge.insert(cloud, pose)
 
-    def match(self, cloud: Cloud, predicted: Prediction) -> PlaneFit:
+    def match(self, cloud: PreparedCloud, predicted: CloudPrediction) -> PlaneFit:
         """Return kiss-icp's pose blended with the prediction; its adaptive threshold is all the search that it has."""
         sigma = self._kiss.adaptive_threshold.get_threshold()
         source, _ = self._kiss.voxelize(cloud.full_m)
@@ -195,7 +195,7 @@ class KissMatcher:
         return fit._replace(pose=blended(fit, predicted))
 
 
-def blended(fit: PlaneFit, predicted: Prediction) -> FloatArray:
+def blended(fit: PlaneFit, predicted: CloudPrediction) -> FloatArray:
     """Return the mean (4, 4) of the fitted and the predicted pose, weighted by their information."""
     error = log(se3.inverse(fit.pose) @ predicted.pose)
     pull = predicted.information @ error

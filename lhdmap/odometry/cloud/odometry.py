@@ -10,12 +10,19 @@ import numpy as np
 from lhdmap.geometry import se3
 from lhdmap.geometry.twist import exp
 from lhdmap.messages import FloatArray, PointCloud
-from lhdmap.odometry.cloud.matchers import Cloud, CloudMatcher, KissMatcher, Prediction, VgicpMatcher, prepare
+from lhdmap.odometry.cloud.matchers import (
+    CloudMatcher,
+    CloudPrediction,
+    KissMatcher,
+    PreparedCloud,
+    VgicpMatcher,
+    prepare,
+)
 from lhdmap.odometry.cloud.motion import CloudMotion, CloudPrior
 from lhdmap.odometry.cloud.planes import PlaneFit
 from lhdmap.odometry.cloud.settings import CloudOdometrySettings
 from lhdmap.odometry.cloud.steps import CloudStep, marginal_information, starts_along, travel_m, turn_rad
-from lhdmap.odometry.cloud.sweep import Sweep, SweepClock, sweep_of
+from lhdmap.odometry.cloud.sweep import CloudSweep, SweepClock, sweep_of
 from lhdmap.scan_matching.scan_points import NO_BOXES
 
 _FIRST_CLOUDS = 10  # enter the map and are processed at any speed: one cloud is no map
@@ -30,7 +37,7 @@ _WIDE_PRIOR = 0.01  # a jump contradicts the prior by definition: it must not ho
 class _First(NamedTuple):
     """The first cloud, the middle of its sweep after its stamp (s), and the velocity (6,) that undid it."""
 
-    sweep: Sweep
+    sweep: CloudSweep
     middle_s: float
     twist: FloatArray
 
@@ -123,7 +130,7 @@ class CloudOdometry:
         moved = travel_m(step) >= s.step_m or turn_rad(step) >= math.radians(s.step_deg)
         return moved or self._wait_s >= s.step_s or self._inserts < _FIRST_CLOUDS or self._lost_in_a_row > 0
 
-    def _place(self, sweep: Sweep) -> _Placed:
+    def _place(self, sweep: CloudSweep) -> _Placed:
         """Match the cloud and correct the motion; on a new velocity undo the sweep and match once more."""
         cloud = self._prepare(sweep)
         if cloud is None:
@@ -141,25 +148,25 @@ class CloudOdometry:
         again = self._again(sweep, self._motion.twist - before, prior)
         return self._accept(*(again or (cloud, fit)))
 
-    def _prepare(self, sweep: Sweep) -> Cloud | None:
+    def _prepare(self, sweep: CloudSweep) -> PreparedCloud | None:
         return prepare(sweep.undone(self._motion.twist), self._settings.sample_m)
 
-    def _begin(self, sweep: Sweep, cloud: Cloud) -> _Placed:
+    def _begin(self, sweep: CloudSweep, cloud: PreparedCloud) -> _Placed:
         """Start the map with one cloud at the predicted pose."""
         self._first = _First(sweep, self._clock.middle_s, self._motion.twist) if self._processed == 0 else None
         self._insert(cloud)
         return _Placed(PlaneFit(self._motion.pose, _BY_DEFINITION, 0.0, 1.0))
 
-    def _match(self, cloud: Cloud) -> PlaneFit | None:
+    def _match(self, cloud: PreparedCloud) -> PlaneFit | None:
         """Return the fit near the prediction or, where that fails, in its surroundings; None where nothing fits."""
         s, motion = self._settings, self._motion
         sigma_m = float(np.sqrt(motion.P[3, 3]))
         reach_m = min(3.0 * sigma_m, s.reach_m) if sigma_m > 0.5 * s.voxel_m else 0.0
-        near = Prediction(motion.pose, motion.prior_information, starts_along(motion.pose, reach_m, s.voxel_m))
+        near = CloudPrediction(motion.pose, motion.prior_information, starts_along(motion.pose, reach_m, s.voxel_m))
         fit = self._matcher.match(cloud, near)
         if not self._trusted(fit):
             starts = starts_along(motion.pose, s.reach_m, s.voxel_m, turned=True)
-            fit = self._matcher.match(cloud, Prediction(motion.pose, _WIDE_PRIOR * near.information, starts))
+            fit = self._matcher.match(cloud, CloudPrediction(motion.pose, _WIDE_PRIOR * near.information, starts))
         return fit if self._trusted(fit) else None
 
     def _trusted(self, fit: PlaneFit) -> bool:
@@ -171,7 +178,7 @@ class CloudOdometry:
         moved_m = travel_m(se3.inverse(self._processed_pose) @ fit.pose)
         return moved_m > self._settings.max_speed_mps * max(self._wait_s, _SHORTEST_S)
 
-    def _again(self, sweep: Sweep, change: FloatArray, prior: FloatArray) -> tuple[Cloud, PlaneFit] | None:
+    def _again(self, sweep: CloudSweep, change: FloatArray, prior: FloatArray) -> tuple[PreparedCloud, PlaneFit] | None:
         """Match once more where the velocity that undid the sweep was off by `change` (6,); None where it was not.
 
         The first cloud was taken as measured at rest: it is undone anew, too, and the map begun anew with it.
@@ -202,7 +209,7 @@ class CloudOdometry:
         self._matcher.insert(cloud, moved)
         self._inserted_pose = self._processed_pose = moved
 
-    def _accept(self, cloud: Cloud, fit: PlaneFit) -> _Placed:
+    def _accept(self, cloud: PreparedCloud, fit: PlaneFit) -> _Placed:
         """Insert the cloud where the machine has moved on since the last one that was; the first ones always."""
         s = self._settings
         self._lost_in_a_row = 0
@@ -212,7 +219,7 @@ class CloudOdometry:
             self._insert(cloud)
         return _Placed(fit)
 
-    def _lose(self, cloud: Cloud) -> _Placed:
+    def _lose(self, cloud: PreparedCloud) -> _Placed:
         """Go on by the motion alone; begin a new map at the predicted pose when nothing has fitted for a while."""
         self._lost_in_a_row += 1
         if self._lost_in_a_row >= _LOST_BEFORE_RESTART:
@@ -221,7 +228,7 @@ class CloudOdometry:
             self._insert(cloud)
         return _Placed(None, lost=True)
 
-    def _insert(self, cloud: Cloud) -> None:
+    def _insert(self, cloud: PreparedCloud) -> None:
         self._matcher.insert(cloud, self._motion.pose)
         self._inserts += 1
         self._inserted_pose = self._motion.pose

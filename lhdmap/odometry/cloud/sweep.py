@@ -11,7 +11,7 @@ from lhdmap.messages import FloatArray, PointCloud
 _LONGEST_S = 1.0  # of a sweep: times that are farther from the stamp are in a wrong unit
 
 
-class Sweep(NamedTuple):
+class CloudSweep(NamedTuple):
     """Points (N, 3), metres, in `base_link` as it was when each was measured, `times_s` (N,) after the sweep's middle.
 
     `times_s` is empty where the log has no times: all points are then taken as measured at the stamp.
@@ -47,7 +47,9 @@ def middle_s(cloud: PointCloud) -> float:
     return float(np.clip(times.mean(), -_LONGEST_S, _LONGEST_S)) if times.size else 0.0
 
 
-def sweep_of(cloud: PointCloud, T_base_sensor: FloatArray, limits_m: tuple[float, float], boxes_m: FloatArray) -> Sweep:
+def sweep_of(
+    cloud: PointCloud, T_base_sensor: FloatArray, limits_m: tuple[float, float], boxes_m: FloatArray
+) -> CloudSweep:
     """Return the points within `limits_m` (nearest, farthest) of the scanner that are not on the machine.
 
     `boxes_m`: (K, 6), x y z minimum and maximum of the machine's bodies in `base_link`. What is not finite is left out.
@@ -64,7 +66,7 @@ def sweep_of(cloud: PointCloud, T_base_sensor: FloatArray, limits_m: tuple[float
     points_base = points @ T_base_sensor[:3, :3].T + T_base_sensor[:3, 3]
     for box in boxes_m:
         near &= ~((points_base >= box[:3]) & (points_base <= box[3:])).all(axis=1)
-    return Sweep(points_base[near], times[kept][near] - middle_s(cloud) if timed else np.zeros(0))
+    return CloudSweep(points_base[near], times[kept][near] - middle_s(cloud) if timed else np.zeros(0))
 
 
 class SweepClock:

@@ -12,7 +12,7 @@ import numpy as np
 
 from lhdmap.geometry import se2
 from lhdmap.messages import FloatArray
-from lhdmap.odometry.motion import Motion
+from lhdmap.odometry.motion import PlanarMotion
 from lhdmap.odometry.range_flow.reference import FlowReference, compare, correct_by, scanner_pyramid
 from lhdmap.odometry.range_flow.scan import Pyramid
 from lhdmap.odometry.settings import OdometrySettings, RangeFlowSettings
@@ -24,7 +24,7 @@ _FEWEST_HITS = 12  # as many as one comparison needs at least (`flow`)
 class FlowMatcher:
     """Keeps the reference scans; `step` is the whole method."""
 
-    def __init__(self, motion: Motion, settings: OdometrySettings, range_flow: RangeFlowSettings) -> None:
+    def __init__(self, motion: PlanarMotion, settings: OdometrySettings, range_flow: RangeFlowSettings) -> None:
         self._motion, self._noise_m, self._settings = motion, settings.range_noise_m, range_flow
         self._references: list[FlowReference] = []
         self._newest = np.zeros(3)  # pose of base_link at the newest reference

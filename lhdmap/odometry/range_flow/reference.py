@@ -9,7 +9,7 @@ import numpy as np
 
 from lhdmap.geometry import se2
 from lhdmap.messages import FloatArray
-from lhdmap.odometry.motion import Motion
+from lhdmap.odometry.motion import PlanarMotion
 from lhdmap.odometry.range_flow.flow import flow
 from lhdmap.odometry.range_flow.scan import Pyramid
 from lhdmap.odometry.settings import RangeFlowSettings
@@ -45,7 +45,7 @@ def compare(
     reference: FlowReference,
     levels: Pyramid,
     pose_base_scanner: FloatArray,
-    motion: Motion,
+    motion: PlanarMotion,
     noise_m: float,
     settings: RangeFlowSettings,
 ) -> FlowPose:
@@ -63,7 +63,7 @@ def compare(
     return FlowPose(pose, information, found.residual_sigmas, found.support)
 
 
-def correct_by(motion: Motion, found: list[FlowPose]) -> FloatArray:
+def correct_by(motion: PlanarMotion, found: list[FlowPose]) -> FloatArray:
     """Correct the motion by the information-weighted mean of comparisons and its prior; return their information (3, 3)."""
     predicted, prior = motion.pose, motion.prior_information
     total, vector = np.zeros((3, 3)), np.zeros(3)

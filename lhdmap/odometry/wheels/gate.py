@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from lhdmap.odometry.motion import FORWARD, Motion
+from lhdmap.odometry.motion import FORWARD, PlanarMotion
 
 _GATE_SIGMAS = 4.0  # measured speeds farther off than one in ten thousand by chance are slip, or the motion is wrong
 # Share of what wheels that slip were off by at first, within which they are believed again: walls alone tell the speed less and
@@ -16,7 +16,7 @@ _SLIP_S, _CONTRADICTION_S = 3.0, 0.5
 class WheelGate:
     """Fuses mean speeds of the wheels into the motion; `overridden` tells whether the last was believed against it."""
 
-    def __init__(self, motion: Motion) -> None:
+    def __init__(self, motion: PlanarMotion) -> None:
         self._motion = motion
         self.overridden = False
         self._contradicting_s = 0.0

@@ -10,8 +10,8 @@ import math
 
 from lhdmap.geometry import se2
 from lhdmap.messages import FloatArray
-from lhdmap.odometry.motion import TURNING, Motion
-from lhdmap.odometry.wheels.tally import Tally
+from lhdmap.odometry.motion import TURNING, PlanarMotion
+from lhdmap.odometry.wheels.tally import WordOfWalls
 
 _STRETCH_S = 1.0  # compared at once: long against the time between scans, short against a bend
 _TURNS_RAD = math.radians(3.0)  # a stretch that turns less tells of no scale
@@ -40,10 +40,10 @@ _TELL_RAD, _TELL_SHARE = (
 class GyroTurn:
     """`fuse` with each step's turn, `learn` with each scan that was matched."""
 
-    def __init__(self, motion: Motion) -> None:
+    def __init__(self, motion: PlanarMotion) -> None:
         self._motion = motion
         self._bias, self._variance = 0.0, _BIAS_STD_RPS**2
-        self._tally = Tally(_MEMORY_RAD)
+        self._tally = WordOfWalls(_MEMORY_RAD)
         self._held = True
         self._gyro_rad = self._walls_rad = self._stretch_s = 0.0
         self._before: FloatArray | None = None

@@ -19,12 +19,12 @@ import numpy as np
 
 from lhdmap.geometry import se2
 from lhdmap.messages import FloatArray
-from lhdmap.odometry.motion import FORWARD, TURNING, Motion
+from lhdmap.odometry.motion import FORWARD, TURNING, PlanarMotion
 from lhdmap.odometry.settings import OdometrySettings
 from lhdmap.odometry.steps import Matched, WheelStep
 from lhdmap.odometry.wheels.gate import WheelGate
 from lhdmap.odometry.wheels.stale import StaleWheels
-from lhdmap.odometry.wheels.stretch import Stretch
+from lhdmap.odometry.wheels.stretch import WheelStretch
 from lhdmap.odometry.wheels.trust import WheelTrust
 from lhdmap.odometry.wheels.turn import WheelTurn
 
@@ -53,14 +53,14 @@ class WheelUse(StrEnum):
 class WheelModel:
     """`fuse` with each step of the wheels, `learn` with each scan that was matched; `use` is what became of the last step."""
 
-    def __init__(self, settings: OdometrySettings, motion: Motion) -> None:
+    def __init__(self, settings: OdometrySettings, motion: PlanarMotion) -> None:
         self._settings, self._motion = settings, motion
         self.use = WheelUse.NONE
         self.stale, self.trust, self.gate = StaleWheels(), WheelTrust(), WheelGate(motion)
         self.turn = WheelTurn(settings.wheel_scale_std, settings.wheel_curvature_std)
         self._at, self._since_m = np.zeros(3), 0.0
-        self._all = Stretch(_SOON_M)
-        self._good = Stretch()  # only steps that agreed with the motion
+        self._all = WheelStretch(_SOON_M)
+        self._good = WheelStretch()  # only steps that agreed with the motion
 
     def fuse(self, wheels: WheelStep | None, dt_s: float) -> WheelUse:
         """Tell the motion the wheels' mean speeds over `dt_s`; return what became of them."""

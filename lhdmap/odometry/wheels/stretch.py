@@ -26,7 +26,7 @@ class Compared(NamedTuple):
     length_m: float
 
 
-class Stretch:
+class WheelStretch:
     """`measured` with each step of the wheels, `matched` with each pose that the walls gave; `missed` where either failed."""
 
     def __init__(self, length_m: float = 1.0) -> None:

@@ -10,7 +10,7 @@ import numpy as np
 _MOST_RATIOS = 500  # that the median of a warning is taken of: memory is bounded
 
 
-class Tally:
+class WordOfWalls:
     """`take` each comparison with its size (m driven, or rad turned), which is also what it counts for."""
 
     def __init__(self, memory: float) -> None:

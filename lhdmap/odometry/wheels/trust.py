@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 
 from lhdmap.odometry.wheels.stretch import Compared
-from lhdmap.odometry.wheels.tally import Tally
+from lhdmap.odometry.wheels.tally import WordOfWalls
 
 _AGREES = (
     0.75,
@@ -25,7 +25,7 @@ class WheelTrust:
     """`learn` with each stretch that was compared with the walls; `believed` says what follows."""
 
     def __init__(self) -> None:
-        self._tally = Tally(_MEMORY_M)
+        self._tally = WordOfWalls(_MEMORY_M)
 
     @property
     def compared_m(self) -> float:

@@ -20,7 +20,7 @@ _LOWEST_SHARE = 1e-4
 _FEWEST_LOWEST = 4
 
 
-class Floor(NamedTuple):
+class HeapFloor(NamedTuple):
     """z = height + slope_x x + slope_y y; standard deviation of its height (m); how it was found, in words."""
 
     height_m: float
@@ -35,7 +35,7 @@ class Floor(NamedTuple):
         return z
 
 
-def find_floor(points_m: FloatArray, surface: HeightMap) -> Floor:
+def find_floor(points_m: FloatArray, surface: HeightMap) -> HeapFloor:
     """Return the floor of points (N, 3), z up, with their height map.
 
     Where at least 15 % of the cells are level and lie together at the bottom, it is the robust plane through them. A heap that
@@ -46,7 +46,7 @@ def find_floor(points_m: FloatArray, surface: HeightMap) -> Floor:
     return plane if plane is not None else _lowest_level(points_m[:, 2])
 
 
-def _seen_plane(surface: HeightMap) -> Floor | None:
+def _seen_plane(surface: HeightMap) -> HeapFloor | None:
     level = surface.seen & (np.nan_to_num(surface.slope_deg, nan=90.0) < _FLAT_DEG) & ~surface.walls
     if np.count_nonzero(level) < 3:
         return None
@@ -62,7 +62,7 @@ def _seen_plane(surface: HeightMap) -> Floor | None:
     # Neighbouring cells share their points: a disc of them counts once.
     independent = max(np.count_nonzero(used) * (surface.cell_m / surface.radius_m) ** 2 / math.pi, 1.0)
     std = float(np.std(rest)) / math.sqrt(independent)
-    return Floor(float(values[0]), float(values[1]), float(values[2]), std, "plane through its level cells")
+    return HeapFloor(float(values[0]), float(values[1]), float(values[2]), std, "plane through its level cells")
 
 
 def _near(residuals: FloatArray, used: Weights) -> Weights | None:
@@ -73,9 +73,9 @@ def _near(residuals: FloatArray, used: Weights) -> Weights | None:
     return near if np.count_nonzero(near) >= 3 else None
 
 
-def _lowest_level(z: FloatArray) -> Floor:
+def _lowest_level(z: FloatArray) -> HeapFloor:
     count = min(max(_FEWEST_LOWEST, round(_LOWEST_SHARE * len(z))), len(z))
     lowest = np.partition(z, count - 1)[:count]
     height = float(np.median(lowest))
     std = float(np.percentile(z, 1.0)) - height
-    return Floor(height, 0.0, 0.0, max(std, float(np.std(lowest))), "lowest points, the floor itself is covered")
+    return HeapFloor(height, 0.0, 0.0, max(std, float(np.std(lowest))), "lowest points, the floor itself is covered")

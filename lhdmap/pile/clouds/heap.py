@@ -17,8 +17,9 @@ from lhdmap.integration.cloud_io import read_cloud
 from lhdmap.messages import FloatArray
 from lhdmap.pile.bounds import BOUNDS
 from lhdmap.pile.clouds.axes import isolated, rotation_to_up, vertical_axis
+from lhdmap.pile.clouds.cells import outline_m2, with_holes_filled
 from lhdmap.pile.clouds.faces import HeapFace, find_faces
-from lhdmap.pile.clouds.floor import Floor, find_floor
+from lhdmap.pile.clouds.floor import HeapFloor, find_floor
 from lhdmap.pile.clouds.height_map import HeightMap, Mask, height_map
 from lhdmap.pile.result import AttackPoint, Boulder, PileEstimate
 from lhdmap.pile.slope_status import status_probabilities
@@ -37,11 +38,11 @@ class CloudPile(NamedTuple):
     extra: dict[str, Any]
 
 
-class Heap(NamedTuple):
+class MeasuredHeap(NamedTuple):
     """A heap with z up: its height map, the floor, the cells (I, J) that hold material, and its faces, the largest first."""
 
     surface: HeightMap
-    floor: Floor
+    floor: HeapFloor
     material: Mask
     faces: list[HeapFace]
 
@@ -104,11 +105,11 @@ def measure_cloud(points_m: FloatArray, up: str = "auto", empty_m: FloatArray | 
     return CloudPile(_turned(estimate, R_up_cloud.T), extra | figures)
 
 
-def measure_heap(points_m: FloatArray, floor: Floor | None = None) -> CloudPile:
+def measure_heap(points_m: FloatArray, floor: HeapFloor | None = None) -> CloudPile:
     """Return slopes, volume and status of a heap from points (N, 3), z up; above `floor`, or above that which is found."""
     surface = height_map(points_m)
     ground = floor or find_floor(points_m, surface)
-    heap = Heap(surface, ground, np.zeros(surface.seen.shape, dtype=bool), [])
+    heap = MeasuredHeap(surface, ground, np.zeros(surface.seen.shape, dtype=bool), [])
     rise = _least_rise_m(surface, ground)
     material = surface.seen & ~surface.walls & (np.nan_to_num(heap.above_m) > rise)
     heap = heap._replace(material=material, faces=find_faces(surface, material))
@@ -131,17 +132,17 @@ def measure_heap(points_m: FloatArray, floor: Floor | None = None) -> CloudPile:
     return CloudPile(PileEstimate.unknown(reason), extra)
 
 
-def volume_m3(heap: Heap, points_m: FloatArray) -> tuple[float, float]:
+def volume_m3(heap: MeasuredHeap, points_m: FloatArray) -> tuple[float, float]:
     """Return the volume between floor and visible surface with its standard deviation, m³.
 
     Cells at the edge of the cloud are covered in part: the area is that of the convex outline where it is smaller. Holes are
     filled with the mean height about them (half of that counts as uncertain).
     """
     seen = heap.surface.seen & ~heap.surface.walls
-    filled, holes = _filled(np.where(seen, np.clip(heap.above_m, 0.0, None), np.nan))
+    filled, holes = with_holes_filled(np.where(seen, np.clip(heap.above_m, 0.0, None), np.nan))
     cells = filled[np.isfinite(filled)]
     area = len(cells) * heap.surface.cell_m**2
-    share = min(1.0, _outline_m2(points_m) / area) if area else 0.0
+    share = min(1.0, outline_m2(points_m) / area) if area else 0.0
     volume = float(cells.sum()) * heap.surface.cell_m**2 * share
     hidden = float(filled[holes].sum()) * heap.surface.cell_m**2
     rough = float(np.nanmedian(heap.surface.roughness_m)) if np.isfinite(heap.surface.roughness_m).any() else 0.0
@@ -170,50 +171,24 @@ def _placed(found: CloudPile, origin_m: FloatArray) -> CloudPile:
     return CloudPile(replace(pile, boulders=rocks, attack=attack, **places), extra)
 
 
-def _floor_of(points_m: FloatArray) -> Floor:
+def _floor_of(points_m: FloatArray) -> HeapFloor:
     points = points_m[~isolated(points_m)]
     return find_floor(points, height_map(points))._replace(source="the cloud without the pile")
 
 
-def _least_rise_m(surface: HeightMap, floor: Floor) -> float:
+def _least_rise_m(surface: HeightMap, floor: HeapFloor) -> float:
     """Return the height above the floor from which on a cell holds material: three deviations, or 2 % of the extent."""
     rough = surface.roughness_m[np.isfinite(surface.roughness_m)]
     noise = float(np.percentile(rough, 20.0)) if len(rough) else 0.0
     return max(3.0 * noise, 3.0 * min(floor.std_m, noise), _LEAST_RISE * surface.cell_m * max(surface.seen.shape))
 
 
-def _filled(heights: FloatArray) -> tuple[FloatArray, Mask]:
-    """Return heights (I, J) with enclosed holes filled from their neighbours, and which cells that were."""
-    from scipy import ndimage
-
-    known = np.isfinite(heights)
-    holes = ndimage.binary_fill_holes(known) & ~known
-    filled = heights.copy()
-    todo = holes.copy()
-    while todo.any():
-        weights = ndimage.uniform_filter(np.isfinite(filled).astype(float), 3, mode="constant")
-        sums = ndimage.uniform_filter(np.nan_to_num(filled), 3, mode="constant")
-        now = todo & (weights > 1e-6)
-        filled[now] = sums[now] / weights[now]
-        todo &= ~now
-    return filled, holes
-
-
-def _outline_m2(points_m: FloatArray) -> float:
-    from scipy.spatial import ConvexHull, QhullError
-
-    try:
-        return float(ConvexHull(points_m[:, :2]).volume)
-    except QhullError:
-        return 0.0
-
-
-def _without_face(heap: Heap, points_m: FloatArray, reason: str) -> PileEstimate:
+def _without_face(heap: MeasuredHeap, points_m: FloatArray, reason: str) -> PileEstimate:
     volume, volume_std = volume_m3(heap, points_m)
     return PileEstimate(volume_m3=volume, volume_std_m3=volume_std, warnings=(reason,))
 
 
-def _estimate(heap: Heap, points_m: FloatArray) -> PileEstimate:
+def _estimate(heap: MeasuredHeap, points_m: FloatArray) -> PileEstimate:
     volume, volume_std = volume_m3(heap, points_m)
     face = heap.faces[0]
     share = status_probabilities(-face.slope_deg, face.slope_std_deg, BOUNDS)
@@ -237,17 +212,17 @@ def _estimate(heap: Heap, points_m: FloatArray) -> PileEstimate:
     )
 
 
-def _cell_points(heap: Heap, cells: Mask) -> FloatArray:
+def _cell_points(heap: MeasuredHeap, cells: Mask) -> FloatArray:
     points: FloatArray = np.column_stack([heap.surface.centers_m()[cells], heap.surface.height_m[cells]])
     return points
 
 
-def _center(heap: Heap, cells: Mask) -> FloatArray:
+def _center(heap: MeasuredHeap, cells: Mask) -> FloatArray:
     center: FloatArray = _cell_points(heap, cells).mean(axis=0)
     return center
 
 
-def _toe(heap: Heap, face: HeapFace) -> tuple[FloatArray, FloatArray, FloatArray]:
+def _toe(heap: MeasuredHeap, face: HeapFace) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Return the face's lowest cells from left to right (K, 3), and the left and right ends (3,) of the face at the toe.
 
     Left and right are those of one who stands before the face and looks uphill.
@@ -265,7 +240,7 @@ def _toe(heap: Heap, face: HeapFace) -> tuple[FloatArray, FloatArray, FloatArray
     return toe, left, right
 
 
-def _extra(heap: Heap, points_m: FloatArray, kind: str, reason: str) -> dict[str, Any]:
+def _extra(heap: MeasuredHeap, points_m: FloatArray, kind: str, reason: str) -> dict[str, Any]:
     slopes = heap.surface.slope_deg[heap.surface.seen & ~heap.surface.walls]
     slopes = slopes[np.isfinite(slopes)]
     quantiles = np.percentile(slopes, [50, 75, 90]) if len(slopes) else np.full(3, math.nan)

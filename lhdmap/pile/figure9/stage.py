@@ -14,7 +14,7 @@ from lhdmap.geometry import se3
 from lhdmap.messages import FloatArray
 from lhdmap.pile.figure9.method import figure9, loop_ends
 from lhdmap.pile.figure9.settings import Figure9Constants
-from lhdmap.pile.result import Approach, PileReport, Snapshot
+from lhdmap.pile.result import PileApproach, PileReport, Snapshot
 from lhdmap.pile.settings import PileSettings
 from lhdmap.pile.stage import ScanHits
 
@@ -50,7 +50,7 @@ class Figure9Stage:
     def report(self) -> PileReport:
         """Return what there is so far."""
         last = next((one for one in reversed(self._history) if one.estimate.found), None)
-        piles = () if self._decision is None else (Approach(self._decision, self._decision),)
+        piles = () if self._decision is None else (PileApproach(self._decision, self._decision),)
         return PileReport(
             self._decision, self._decision or last, tuple(self._history), self._settings.method, piles=piles
         )
