@@ -3,7 +3,7 @@ SHELL := /bin/bash
 .SHELLFLAGS := -euo pipefail -c
 .DEFAULT_GOAL := help
 
-PYTHON ?= $(firstword $(foreach name,python3.11 python3.12 python3,$(if $(shell command -v $(name)),$(name))))
+PYTHON ?= $(firstword $(foreach name,python3.11 python3.12 python3.13 python3,$(if $(shell command -v $(name)),$(name))))
 VENV ?= .venv
 BIN := $(VENV)/bin
 JOBS ?= 2
@@ -19,7 +19,7 @@ export OPENBLAS_NUM_THREADS ?= 1
 help: ## List the targets
 	@sed -nE 's/^([a-z]+):.*## (.*)/  make \1\t\2/p' $(MAKEFILE_LIST) | expand -t 16
 
-setup: $(STAMP) ## Make the environment in .venv (Python 3.11 or 3.12), once
+setup: $(STAMP) ## Make the environment in .venv (Python 3.11 to 3.13), once
 
 system: ## Install the system libraries that are missing (Debian, as root), or say which
 	@sh tools/system_packages.sh $(PYTHON)
@@ -27,7 +27,7 @@ system: ## Install the system libraries that are missing (Debian, as root), or s
 $(STAMP): pyproject.toml
 	@sh tools/system_packages.sh $(PYTHON)
 	$(PYTHON) -m venv $(VENV)
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[dev]'
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[all,dev]'
 	@rm -f $(VENV)/.made-from-* && touch $@
 
 demo: $(STAMP) ## Simulate the sample drive, build its map, evaluate it: demo/ (anew each time)

@@ -39,6 +39,7 @@ from lhdmap.pipeline.track import FinalTrack, Rows, resample, trajectory_of
 from lhdmap.proprioception.wheels import WheelOdometry
 from lhdmap.report.bounded import bounded
 from lhdmap.report.data import ReportData, Summary, TopicRow
+from lhdmap.report.recording_end import left_out
 from lhdmap.roles import BUILD_MAP, GIVEN_POSES, read_by
 from lhdmap.smoothing.evidence import open_loops
 from lhdmap.smoothing.smoother import Correction, corrected
@@ -162,7 +163,7 @@ class Outcome:
         self.topology, self.landmarks = self._with_landmarks(*found)
         told = [*source.warnings, *source.damage, *_of_the_run(pipeline, inputs), *of_sweeps]
         told += _holes(rows) if inputs.poses else _remarks(pipeline)
-        self.warnings = said_once([*told, *_of_the_pile(self.pile)])
+        self.warnings = said_once([*told, *_of_the_pile(self.pile), *left_out()])
         stamps, records = ways.odometry.stamps_ns, pipeline.records
         self.duration_s = source.duration_s or float(stamps[-1] - stamps[0]) * 1e-9
         self.summary: dict[str, Any] = {
