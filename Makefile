@@ -14,7 +14,7 @@ STAMP := $(VENV)/.made-from-$(shell cat pyproject.toml <(pwd) | sha256sum | cut 
 export OMP_NUM_THREADS ?= 1
 export OPENBLAS_NUM_THREADS ?= 1
 
-.PHONY: help setup system demo test lint format config readme bench wheel clean
+.PHONY: help setup system demo test lint format config readme bench wheel lock docs clean
 
 help: ## List the targets
 	@sed -nE 's/^([a-z]+):.*## (.*)/  make \1\t\2/p' $(MAKEFILE_LIST) | expand -t 16
@@ -57,6 +57,9 @@ bench: $(STAMP) ## Measure speed and memory
 
 wheel: $(STAMP) ## Build the wheel: dist/
 	$(BIN)/python -m pip wheel --quiet --disable-pip-version-check --no-deps --wheel-dir dist .
+
+lock: $(STAMP) ## Pin requirements/core.txt and all.txt anew, with hashes
+	$(BIN)/python -m tools.lock
 
 clean: ## Remove what was made, the environment too; the maps in demo/ stay
 	rm -rf $(VENV) dist build .pytest_cache .mypy_cache .ruff_cache .hypothesis
