@@ -17,6 +17,7 @@ import lhdmap
 import pytest
 from lhdmap.config import Settings, load_settings, settings_table, settings_toml
 from lhdmap.errors import ConfigError, UsageError
+from lhdmap.extras import LIBRARIES
 from lhdmap.machine import Machine, load_machine, machine_toml
 from lhdmap.resources import resource
 from lhdmap.rockbreaker.machine import Rockbreaker, load_rockbreaker, rockbreaker_toml
@@ -27,7 +28,7 @@ PACKAGE = ROOT / "lhdmap"
 
 FLOORS = [
     {"errors"},
-    {"messages", "settings", "resources", "names", "interrupts", "descriptions"},
+    {"messages", "settings", "resources", "names", "interrupts", "descriptions", "extras"},
     {"geometry", "tables", "provenance", "outputs", "json_files", "roles", "settings_tree"},
     {"trajectory", "runfolder", "machine_sections"},
     {"machine", "mapfolder"},
@@ -72,6 +73,14 @@ def _part(path: Path) -> str:
 
 def _imports(path: Path) -> Iterator[str]:
     """Yield the parts of lhdmap that a file imports, inside functions too, but not those for type checkers alone."""
+    for name in _imported(path):
+        first, _, rest = name.partition(".")
+        if first == "lhdmap" and rest and rest != "__version__":
+            yield rest.split(".")[0]
+
+
+def _imported(path: Path) -> Iterator[str]:
+    """Yield all that a file imports, as `_imports` does."""
     tree = ast.parse(path.read_text(encoding="utf-8"))
     for_types = {
         id(node)
@@ -86,10 +95,7 @@ def _imports(path: Path) -> Iterator[str]:
         if isinstance(node, ast.ImportFrom):
             assert node.level == 0, f"{path}: a relative import hides where it points"
             names = [f"{node.module}.{alias.name}" for alias in node.names]
-        for name in names:
-            first, _, rest = name.partition(".")
-            if first == "lhdmap" and rest and rest != "__version__":
-                yield rest.split(".")[0]
+        yield from names
 
 
 def _level(part: str) -> int:
@@ -114,6 +120,13 @@ def test_the_rule_finds_a_wrong_import(tmp_path: Path) -> None:
     file = tmp_path / "stage.py"
     file.write_text("from lhdmap.report.page import write_report\nimport lhdmap.cli.main\n", encoding="utf-8")
     assert list(_imports(file)) == ["report", "cli"]
+
+
+def test_optional_libraries_are_loaded_in_one_place() -> None:
+    """Elsewhere they are named for type checkers alone, or asked for with `lhdmap.extras.library`."""
+    for path in MODULES:
+        found = {name.split(".")[0] for name in _imported(path)} & set(LIBRARIES)
+        assert not found, f"{path} imports {found}"
 
 
 @pytest.mark.parametrize("statement", ["import lhdmap", "from lhdmap.cli.main import main; main(['--help'])"])

@@ -19,7 +19,8 @@ from lhdmap.cli.console import STANDARD_OUTPUT, Console
 from lhdmap.cli.interrupt import EXIT_INTERRUPTED, told
 from lhdmap.cli.options import add_common
 from lhdmap.cli.parser import CommandLineError, Parser
-from lhdmap.errors import LhdmapError, LhdmapWarning, kept_with
+from lhdmap.errors import InstallationError, LhdmapError, LhdmapWarning, kept_with
+from lhdmap.extras import missing_text
 
 COMMANDS = {
     "demo": "generate the sample drive, build its map, evaluate it, write report and recording",
@@ -45,7 +46,6 @@ COMMANDS = {
 }
 EXIT_USAGE, EXIT_INPUT = 2, 3
 _COMMON = ("--json", "--quiet", "--debug")
-INSTALL_HINT = "on Debian, open3d needs: apt-get install libegl1 libgl1 libx11-6 libusb-1.0-0; all else comes with pip"
 FAULT_HINT = "please report it with the output of the same command and --debug"
 _HINTS = {
     **dict.fromkeys((errno.ENOSPC, errno.EDQUOT), "; make room, or name another place with -o"),
@@ -138,7 +138,7 @@ def _told(error: Exception) -> tuple[str, str, int]:
         case MemoryError():
             return "system", f"not enough memory: {error}".rstrip(": "), EXIT_INPUT
         case ImportError():
-            return "installation", f"the installation is not complete: {error}\n{INSTALL_HINT}", EXIT_INPUT
+            return InstallationError.kind, missing_text(error), EXIT_INPUT
     text = f"a fault in lhdmap, not in what you asked for: {type(error).__name__}: {error}\n{FAULT_HINT}"
     return "fault", text, EXIT_INPUT
 

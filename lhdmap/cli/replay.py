@@ -16,6 +16,7 @@ from lhdmap.cli.console import Console
 from lhdmap.cli.options import add_output, add_settings, suggest
 from lhdmap.cli.viewer import started, viewer
 from lhdmap.errors import EvaluationShortfall
+from lhdmap.extras import require
 from lhdmap.resources import resource
 
 _HOST = "127.0.0.1"
@@ -142,6 +143,7 @@ def _viewer(port: int | None, console: Console) -> Iterator[None]:
     if port is None:
         yield
         return
+    require("rerun")
     data = f"rerun+http://{_HOST}:{port}/proxy"
     if os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY") or not sys.platform.startswith("linux"):
         with started(viewer(data), stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) as process:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
+from lhdmap.extras import library
 from lhdmap.messages import Float32Array, FloatArray
 
 if TYPE_CHECKING:
@@ -51,7 +52,7 @@ class GridCloud:
 
     def to_open3d(self) -> PointCloud:
         """Return an `open3d.geometry.PointCloud` with points and, where they are known, normals; both are copied."""
-        import open3d as o3d
+        o3d = library("open3d")
 
         cloud = o3d.geometry.PointCloud(o3d.utility.Vector3dVector(self.points_m.astype(np.float64)))
         if self.normals is not None:

@@ -26,7 +26,9 @@ class Inspection:
     def __init__(self, folder: Path, title: str, start_ns: int, settings: Settings) -> None:
         self._folder = folder
         self._pile = PileWatch(settings)
-        self._recording = RecordingWriter(folder / "recording.rrd", title, start_ns, settings.recording)
+        self._recording = RecordingWriter(
+            folder / "recording.rrd", title, start_ns, settings.recording, warns=False
+        )  # `Outcome` does: a helper process is not heard
         self._written = False
         self._compiling = CompileClock().start()
         threading.Thread(target=charts.load, name="charts").start()

@@ -39,6 +39,7 @@ from lhdmap.pipeline.said import said_once
 from lhdmap.pipeline.topology import counts_of, seen_of
 from lhdmap.report.bounded import bounded
 from lhdmap.report.data import ReportData, Summary
+from lhdmap.report.recording_end import left_out
 from lhdmap.smoothing.trust import expected_error
 from lhdmap.topology.build import Topology, topology_of
 from lhdmap.topology.points import with_piles
@@ -71,7 +72,7 @@ class MapOutcome:
         self.topology, self.landmarks = self._with_landmarks(*found)
         told = [*source.warnings, *source.damage, *odd_of_the_run(pipeline, inputs), *of_sweeps]
         told += holes_of(rows) if inputs.poses else remarks_of(pipeline)
-        self.warnings = said_once([*told, *odd_of_the_pile(self.pile)])
+        self.warnings = said_once([*told, *odd_of_the_pile(self.pile), *left_out()])
         stamps, records = ways.odometry.stamps_ns, pipeline.records
         self.duration_s = source.duration_s or float(stamps[-1] - stamps[0]) * 1e-9
         self.summary: dict[str, Any] = {

@@ -18,6 +18,7 @@ from lhdmap.machine import Machine
 from lhdmap.messages import FloatArray
 from lhdmap.report.localization_data import LocalizationData
 from lhdmap.report.recording import PathStyle, RecordingWriter
+from lhdmap.report.recording_end import rerun
 from lhdmap.report.recording_layout import Curves
 from lhdmap.report.topology_recording import add_topology
 from lhdmap.trajectory import Trajectory
@@ -71,8 +72,7 @@ def record_localization(writer: RecordingWriter, data: LocalizationData, machine
 
 
 def _add_map(writer: RecordingWriter, data: LocalizationData) -> None:
-    import rerun as rr
-
+    rr = rerun()
     if len(data.walls):
         walls = data.walls[:: max(len(data.walls) // _MOST_WALLS, 1)] + np.array([0.0, 0.0, 1.0])
         writer.add_shape("map/walls", rr.Points3D(walls, colors=_GREY, radii=rr.Radius.ui_points(1.0)))
@@ -107,8 +107,7 @@ def _add_machine(
 
 def _add_ellipses(writer: RecordingWriter, placed: Sequence[LocalizationRow]) -> None:
     """Record how sure the place is, twice a second."""
-    import rerun as rr
-
+    rr = rerun()
     next_ns = 0
     for row in placed:
         if row.stamp_ns < next_ns or not math.isfinite(row.std_along_m):
@@ -128,8 +127,7 @@ def ellipse(row: LocalizationRow) -> FloatArray:
 
 def _add_candidates(writer: RecordingWriter, searches: Sequence[Search]) -> None:
     """Record the places of each search with their probabilities, until the next one; and why none was believed."""
-    import rerun as rr
-
+    rr = rerun()
     for said in searches:
         if said.candidates:
             at = np.array([[*one.pose[:2], one.height_m + 2.0 * _ABOVE_M] for one in said.candidates])

@@ -24,7 +24,7 @@ from lhdmap.machine import Machine
 from lhdmap.mapfolder import Diagnostics
 from lhdmap.messages import Float32Array, FloatArray
 from lhdmap.names import in_utf8, shown
-from lhdmap.report.recording_end import load_quietly, write_out
+from lhdmap.report.recording_end import rerun, warn_if_left_out, write_out
 from lhdmap.report.recording_layout import RUN_CURVES, Curves, blueprint, whole_of
 from lhdmap.settings import setting
 from lhdmap.trajectory import Trajectory
@@ -92,11 +92,15 @@ class RecordingWriter:
         settings: RecordingSettings | None = None,
         *,
         live_port: int | None = None,
+        warns: bool = True,
     ) -> None:
         """Open the file in the background; `start_ns` is the stamp that counts as time zero.
 
-        `live_port`: viewers on this machine may follow there while it is written.
+        `live_port`: viewers on this machine may follow there while it is written. `warns`: says where Rerun is not
+        installed, and nothing will be written.
         """
+        if warns:
+            warn_if_left_out(path)
         self._settings = settings or RecordingSettings()
         self._path, self._failed = path, False
         self._start_ns = self._end_ns = start_ns
@@ -323,7 +327,7 @@ class RecordingWriter:
 
 def _open(path: Path, title: str, start_ns: int, live_port: int | None) -> tuple[Any, Any]:
     """Return the module of Rerun, and a stream into the file; what goes wrong is told by `close`, in our words."""
-    rr = load_quietly()
+    rr = rerun()
     title = shown(title)
     stream = rr.RecordingStream(APPLICATION, recording_id=f"{title} {start_ns}")
     with in_utf8(path) as written:  # it is open from here on

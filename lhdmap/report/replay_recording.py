@@ -15,6 +15,7 @@ from lhdmap.machine import Machine
 from lhdmap.messages import FloatArray
 from lhdmap.report.loading_recording import add_load
 from lhdmap.report.recording import PathStyle, RecordingWriter
+from lhdmap.report.recording_end import rerun
 from lhdmap.report.recording_layout import REPLAY_CURVES, REPLAY_GRAPH
 from lhdmap.report.replay_data import COLUMNS, DriveData, ReplayData
 from lhdmap.report.topology_recording import add_topology, raised
@@ -55,8 +56,7 @@ class ReplayRecording:
 
     def begin(self, lines_m: Sequence[FloatArray], expected_s: float) -> None:
         """Record the machine's bodies and the walls as lines (N, 3); viewers that follow get their layout."""
-        import rerun as rr
-
+        rr = rerun()
         self._writer.add_bodies(self._machine)
         if len(lines_m):
             lines = rr.LineStrips3D(list(lines_m), colors=_GREY, radii=rr.Radius.ui_points(1.0))
@@ -92,8 +92,7 @@ class ReplayRecording:
 
     def add_horizon(self, stamp_ns: int, way_m: FloatArray) -> None:
         """Record the way (K, 3) that guidance predicts at a time; empty: none."""
-        import rerun as rr
-
+        rr = rerun()
         if len(way_m) or self._planned:
             lines = [way_m] if len(way_m) else []
             strip = rr.LineStrips3D(lines, colors=_PINK, radii=rr.Radius.ui_points(3.0))
@@ -121,8 +120,7 @@ class ReplayRecording:
         self._writer.close()
 
     def _add_paths(self, data: ReplayData) -> None:
-        import rerun as rr
-
+        rr = rerun()
         positions = data.rows[:, 1:4]
         self._writer.widen(positions)
         self._writer.add_path("true", _trajectory(positions), _TRUE)
@@ -136,8 +134,7 @@ class ReplayRecording:
 
     def _add_drive(self, drive: DriveData) -> None:
         """Record the map where it fits best, the legs that were asked for, and by how much the place on the map was off."""
-        import rerun as rr
-
+        rr = rerun()
         if drive.topology is not None:
             self.add_map(drive.topology)
         for gear, (rgba, colour) in _GEARS.items():

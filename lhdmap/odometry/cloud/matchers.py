@@ -11,6 +11,7 @@ from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
+from lhdmap.extras import library
 from lhdmap.geometry import se3
 from lhdmap.geometry.twist import exp, log, orthonormal
 from lhdmap.messages import FloatArray
@@ -34,7 +35,7 @@ class PreparedCloud(NamedTuple):
 
 def prepare(points_m: FloatArray, sample_m: float) -> PreparedCloud | None:
     """Return the cloud of points (M, 3) thinned to one per cell of `sample_m`; None where too few are left."""
-    import small_gicp
+    small_gicp = library("small_gicp")
 
     if len(points_m) < _LEAST_POINTS:
         return None
@@ -115,7 +116,7 @@ class VgicpMatcher:
         return self._planes
 
     def _align(self, voxels: Any, cloud: PreparedCloud, start: FloatArray, reach_m: float) -> FloatArray:
-        import small_gicp
+        small_gicp = library("small_gicp")
 
         result = small_gicp.align(
             voxels,
@@ -131,7 +132,7 @@ class VgicpMatcher:
 
 
 def _voxel_map(settings: CloudOdometrySettings, voxel_m: float) -> Any:
-    import small_gicp
+    small_gicp = library("small_gicp")
 
     voxels = small_gicp.GaussianVoxelMap(voxel_m)
     # the map counts insertions, which come once in `insert_m` of travel
@@ -158,15 +159,14 @@ class KissMatcher:
 
     def clear(self) -> None:
         """Begin a new map."""
-        from kiss_icp.config import load_config
-        from kiss_icp.kiss_icp import KissICP
+        load_config = library("kiss_icp.config").load_config
 
         config = load_config(None)
         config.data.deskew = False  # done before, with the motion model's velocity
         config.data.min_range, config.data.max_range = 0.0, self._settings.max_range_m
         config.mapping.voxel_size = self._settings.kiss_voxel_m
         config.registration.max_num_threads = 1
-        self._kiss = KissICP(config)
+        self._kiss = library("kiss_icp.kiss_icp").KissICP(config)
         self._judge = VgicpMatcher(self._settings)
 
     def __len__(self) -> int:
