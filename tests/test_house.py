@@ -46,7 +46,7 @@ FLOORS = [
     {"traffic"},
     {"haulage"},
     {"production"},
-    {"exports"},
+    {"exports", "console"},
     {"smoothing", "simulation", "evaluation"},
     {"update"},
     {"localization"},
@@ -61,7 +61,7 @@ FLOORS = [
 
 HEAVY = {
     "numpy", "scipy", "numba", "open3d", "rerun", "matplotlib", "pyarrow", "gtsam", "small_gicp", "kiss_icp", "laspy",
-    "rosbags", "mcap", "rich", "cv2", "skimage", "ezdxf",
+    "rosbags", "mcap", "rich", "cv2", "skimage", "ezdxf", "starlette", "uvicorn", "websockets", "pyotp",
 }  # fmt: skip
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import contextlib
+import dataclasses
 import os
 import socket
 import subprocess
@@ -12,6 +13,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
+from lhdmap.cli.attendants import add_operator, attendant_of
 from lhdmap.cli.console import Console
 from lhdmap.cli.options import add_output, add_settings, suggest
 from lhdmap.cli.viewer import started, viewer
@@ -35,6 +37,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_settings(parser)
     parser.add_argument("--seed", type=int, metavar="N", help="over the scenario's; same seed, same journal to the bit")
     parser.add_argument("--view", action="store_true", help="follow the run in Rerun: a window, or a page without one")
+    add_operator(parser)
     parser.add_argument("--no-truth", action="store_true", help="no /ground_truth/odometry in run.mcap")
     parser.add_argument("--no-recording", action="store_true", help="no recording.rrd: faster, less disk")
 
@@ -44,6 +47,7 @@ def run(arguments: argparse.Namespace, console: Console) -> int:
     from lhdmap.config import load_settings
     from lhdmap.errors import UsageError
     from lhdmap.outputs import free_folder
+    from lhdmap.replay.assemble_station import check_attended
     from lhdmap.replay.run import ReplayRequest, replay
     from lhdmap.replay.scenario import find_scenario, load_scenario
 
@@ -55,6 +59,9 @@ def run(arguments: argparse.Namespace, console: Console) -> int:
     scenario = load_scenario(path, **({} if arguments.seed is None else {"seed": arguments.seed}))
     target = arguments.output or Path(f"{path.stem}_run")
     free_folder(target, force=arguments.force, inputs=[path])
+    if arguments.operator != "script":
+        check_attended(scenario)
+    settings = load_settings(arguments.config, arguments.set)
     port = _free_port() if arguments.view else None
     request = ReplayRequest(
         scenario,
@@ -66,10 +73,10 @@ def run(arguments: argparse.Namespace, console: Console) -> int:
         force=arguments.force,
         sources=[path],
         progress=_progress_of(console),
-        settings=load_settings(arguments.config, arguments.set),
+        settings=settings,
     )
-    with _viewer(port, console):
-        result = replay(request)
+    with _viewer(port, console), attendant_of(arguments, path.stem, settings, console) as attendant:
+        result = replay(dataclasses.replace(request, attendant=attendant))
     values = {"run": str(result.folder), **result.verdict}
     failure = None if result.verdict["ok"] else EvaluationShortfall(f"not ok: {result.verdict['reason']}")
     console.result(values, verdict_text(values), failure=failure)
