@@ -46,8 +46,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--new-operator", metavar="NAME", help="add an operator, print what his authenticator takes, and end"
     )
     other.add_argument("--check-audit", type=Path, metavar="FILE", help="is the audit whole; exit code 1 where not")
-    parser.add_argument("--kept", action="append", default=[], metavar="JOURNAL", type=Path,
-                        help="with --check-audit: journal.jsonl of a machine; the audit must have its hashes; repeatable")  # fmt: skip
+    text = "with --check-audit: journal.jsonl of a machine; the audit must have its hashes; repeatable"
+    parser.add_argument("--kept", action="append", default=[], metavar="JOURNAL", type=Path, help=text)
 
 
 def run(arguments: argparse.Namespace, console: Console) -> int:
