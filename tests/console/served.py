@@ -73,7 +73,10 @@ class Served:
             connection.putheader("Content-Length", str(len(data)))
             connection.endheaders(data)
             got = connection.getresponse()
-            return Answer(got.status, {name.lower(): value for name, value in got.getheaders()}, got.read())
+            read = b""
+            with contextlib.suppress(ConnectionResetError):  # it has refused to read all that was sent
+                read = got.read()
+            return Answer(got.status, {name.lower(): value for name, value in got.getheaders()}, read)
 
     def log_in(self, name: str) -> str:
         """Return the cookie of a new session."""

@@ -88,7 +88,10 @@ def ask(served: Served, page: Page, chance: random.Random) -> int:
         else {chance.choice(("Origin", "Host", "Content-Type", "Cookie")): chance.choice(("", "x", "é\x7f", "a" * 999))}
     )
     data = body(chance, page.number)
-    return served.ask(chance.choice(_METHODS), chance.choice(_PATHS), data, page.cookie, **headers).status
+    method, path = chance.choice(_METHODS), chance.choice(_PATHS)
+    if chance.random() < 0.5:
+        method, path = "POST", chance.choice(_PATHS[:3])
+    return served.ask(method, path, data, page.cookie, **headers).status
 
 
 def socket(served: Served, page: Page, chance: random.Random) -> None:
