@@ -35,7 +35,7 @@ class Alarms:
         name = machine, key
         known = self._alarms.get(name)
         if known is not None:
-            self._alarms[name] = known._replace(times=known.times + (known.text != text or rank == WARNING), text=text)
+            self._alarms[name] = known._replace(times=known.times + (rank == WARNING), text=text)
             return
         self._forget(now_s)
         if rank != STOPPED and len(self._new) >= self._most:

@@ -40,7 +40,7 @@ class Recorded:
 
     def __init__(self, lines: Sequence[Mapping[str, Any]]) -> None:
         self._left = deque(
-            (int(line["t_ns"]), _command_of(line["values"]))
+            (int(line["t_ns"]), _command_of(line["values"], line["cause"]))
             for line in lines
             if line["process"] == PROCESS and line["event"] == COMMAND
         )
@@ -74,8 +74,8 @@ class Recorded:
         return found
 
 
-def _command_of(values: Mapping[str, Any]) -> Command:
-    command = Command(**values)
+def _command_of(values: Mapping[str, Any], cause: str) -> Command:
+    command = Command(**values, cause=cause)
     if command.kind not in COMMANDS:
         raise ValueError(f"kind '{command.kind}' of a command")
     return command

@@ -71,7 +71,8 @@ class Attended(Process):
 
     def _obey(self, command: Command, now_ns: int) -> Word:
         """Write a command down, and return what it is for the machine; one that does not fit is a sign of life alone."""
-        self._scribe.event(COMMAND, command.cause, **command._asdict())
+        values = {name: value for name, value in command._asdict().items() if name != "cause"}
+        self._scribe.event(COMMAND, command.cause, **values)
         why = self._unfit(command)
         self._attendant.told(Outcome(command.id, not why, why))
         if why:
