@@ -39,6 +39,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--view", action="store_true", help="follow the run in Rerun: a window, or a page without one")
     add_operator(parser)
     parser.add_argument("--no-truth", action="store_true", help="no /ground_truth/odometry in run.mcap")
+    parser.add_argument(
+        "--view-port", type=int, metavar="N", help="with --view: a page at this port, its data at the next"
+    )
     parser.add_argument("--no-recording", action="store_true", help="no recording.rrd: faster, less disk")
 
 
@@ -53,6 +56,8 @@ def run(arguments: argparse.Namespace, console: Console) -> int:
 
     if arguments.view and arguments.no_recording:
         raise UsageError("--view shows the recording while it is written; --no-recording was found beside it")
+    if arguments.view_port is not None and not (arguments.view and 1 <= arguments.view_port <= 65_534):
+        raise UsageError(f"--view-port {arguments.view_port}: --view, and a port from 1 to 65534, were wanted")
     if arguments.seed is not None and arguments.seed < 0:
         raise UsageError(f"--seed {arguments.seed}: 0 or more was wanted")
     path = find_scenario(arguments.scenario)
@@ -62,7 +67,8 @@ def run(arguments: argparse.Namespace, console: Console) -> int:
     if arguments.operator != "script":
         check_attended(scenario)
     settings = load_settings(arguments.config, arguments.set)
-    port = _free_port() if arguments.view else None
+    page = arguments.view_port
+    port = (page + 1 if page else _free_port()) if arguments.view else None
     request = ReplayRequest(
         scenario,
         target,
@@ -75,7 +81,7 @@ def run(arguments: argparse.Namespace, console: Console) -> int:
         progress=_progress_of(console),
         settings=settings,
     )
-    with _viewer(port, console), attendant_of(arguments, path.stem, settings, console) as attendant:
+    with _viewer(port, page, console), attendant_of(arguments, path.stem, settings, console) as attendant:
         result = replay(dataclasses.replace(request, attendant=attendant))
     values = {"run": str(result.folder), **result.verdict}
     failure = None if result.verdict["ok"] else EvaluationShortfall(f"not ok: {result.verdict['reason']}")
@@ -144,19 +150,23 @@ def _progress_of(console: Console) -> Any:
 
 
 @contextlib.contextmanager
-def _viewer(port: int | None, console: Console) -> Iterator[None]:
-    """Have a viewer follow the run: a window where there is a display, which stays open afterwards; else a page."""
+def _viewer(port: int | None, page: int | None, console: Console) -> Iterator[None]:
+    """Have a viewer follow the run: a window where there is a display, which stays open afterwards; else a page.
+
+    `port`: of the data, None: nobody follows; `page`: where a page is wanted, whatever there is.
+    """
     if port is None:
         yield
         return
     data = f"rerun+http://{_HOST}:{port}/proxy"
-    if os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY") or not sys.platform.startswith("linux"):
+    windows = os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY") or not sys.platform.startswith("linux")
+    if windows and page is None:
         with started(viewer(data), stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) as process:
             yield
             console.note("the run has ended; close the window to go on")
             process.wait()
         return
-    page = _free_port()
+    page = page or _free_port()
     options = ("--serve-web", "--bind", _HOST, "--web-viewer-port", str(page), "--port", str(_free_port()))
     with started(viewer(*options, data), stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL):
         console.note(f"follow the run at http://{_HOST}:{page}/?url=rerun%2Bhttp://{_HOST}:{port}/proxy")

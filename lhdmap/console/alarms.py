@@ -12,7 +12,7 @@ STOPPED, ASKS, WARNING = 1, 2, 3
 
 
 class Alarm(NamedTuple):
-    """An alarm: rank, machine, what, since when, how often. An alarm of rank 1 or 2 goes when its reason goes."""
+    """An alarm: rank, machine, what, since when, how often. Those of rank 1 and 2 are states: shown as long as they last."""
 
     rank: int
     machine: str
@@ -22,7 +22,7 @@ class Alarm(NamedTuple):
 
 
 class Alarms:
-    """`shown`: by rank, then the newest first; `held_back`: how many there were no places for."""
+    """`shown`: by rank, then the newest first; `held_back`: how many warnings there were no places for."""
 
     def __init__(self, settings: ConsoleSettings) -> None:
         self._most, self._window_s = settings.alarms_most, settings.alarms_window_s
@@ -38,10 +38,11 @@ class Alarms:
             self._alarms[name] = known._replace(times=known.times + (rank == WARNING), text=text)
             return
         self._forget(now_s)
-        if rank != STOPPED and len(self._new) >= self._most:
-            self.held_back += 1
-            return
-        self._new.append(now_s)
+        if rank == WARNING:
+            if len(self._new) >= self._most:
+                self.held_back += 1
+                return
+            self._new.append(now_s)
         self._alarms[name] = Alarm(rank, machine, text, now_s)
 
     def clear(self, key: str, machine: str) -> None:

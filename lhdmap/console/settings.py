@@ -32,7 +32,11 @@ class ConsoleSettings:
         0.1, unit="s", minimum=0.01, maximum=1.0, doc="How often a machine asks the page for a sign of life."
     )
     alarms_most: int = setting(
-        10, minimum=1, maximum=1000, source=_ISA, doc="Alarms that are shown in a window; stops are always shown."
+        10,
+        minimum=1,
+        maximum=1000,
+        source=_ISA,
+        doc="Warnings that are shown in a window; stops and requests always are.",
     )
     alarms_window_s: float = setting(600.0, unit="s", minimum=1.0, maximum=86_400.0, source=_ISA, doc="That window.")
     login_tries: int = setting(5, minimum=1, maximum=100, doc="Wrong codes in a window; then all are refused.")

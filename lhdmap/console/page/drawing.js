@@ -46,7 +46,7 @@ function drawPlan(canvas, plan, status, trail) {
   (plan ? plan.places : []).forEach(([name, x, y]) => {
     const [px, py] = toPixel([x, y]);
     pen.fillRect(px - 2, py - 2, 4, 4);
-    pen.fillText(name, px + 5, py - 4);
+    pen.fillText(name, Math.min(px + 5, canvas.width - pen.measureText(name).width - 2), py - 4);
   });
   if (trail.length > 1) stroke(pen, trail.map(toPixel), "#64b5f6", 2);
   if (pose) body(pen, toPixel, pose, status.armed ? "#2e7d32" : "#c62828");
