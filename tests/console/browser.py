@@ -19,7 +19,7 @@ from websockets.sync.client import ClientConnection, connect
 NAMES = ("chromium", "chromium-browser", "google-chrome")
 _FLAGS = (
     "--headless=new", "--no-sandbox", "--disable-gpu", "--no-first-run", "--disable-extensions", "--disable-background-networking",
-    "--remote-debugging-port=0", "--window-size=1280,1000",
+    "--remote-debugging-port=0", "--window-size=1280,1100",
 )  # fmt: skip
 
 

@@ -94,13 +94,33 @@ def test_a_stop_goes_out_in_the_same_turn_with_its_cause() -> None:
 def test_an_answer_reaches_the_loading_task_with_its_name_and_one_to_another_request_does_not() -> None:
     request = Request(2, START_NS, "loading", "charging", "time limit", ("a",), {"fill": 0.31, "log": "x"}, "free it")
     now = LoadingNow(START_NS, 1, "loading_assistance", "", 1, 0.3, 0.03, request)
-    script = Script((0.2, command(ANSWER, 1, "go_on")), (0.4, command(ANSWER, 2, "loaded")))
+    script = Script((0.2, command(ANSWER, 2, "go_on")), (0.4, command(ANSWER, 1, "loaded")))  # the page's numbers
     answers = [word.answer for word in words(script, ARMED, loading=now) if word.answer]
     assert [(one.number, one.kind, one.by) for one in answers] == [(2, "loaded", "anna")]
     assert [outcome.taken for outcome in script.outcomes] == [False, True]
     shown = script.seen[-1][1]
     assert shown is not None
     assert (shown.why, shown.tried, shown.evidence) == ("time limit", ("a",), (("fill", "0.31"), ("log", "x")))
+
+
+def test_what_the_machine_still_says_of_a_request_that_has_ended_is_no_new_one() -> None:
+    request = Request(1, START_NS, "positioning", "positioning", "operator took over", (), {}, "free it")
+    shown, now = Shown(on_map=False), LoadingNow(START_NS, 1, "held", "", 1, 0.3, 0.03, None)
+    asks = ARMED._replace(asks="assistance: operator took over")
+    told = [
+        (now._replace(request=request), ARMED),
+        (now._replace(request=request), asks),
+        (now, asks),
+        (now, ARMED),
+        (now, asks),
+    ]
+    numbers = []
+    for loading, health in told:
+        shown.take(Received(LOADING, START_NS, loading))
+        shown.take(Received(MACHINE_SAYS, START_NS, health))
+        asked = shown.request()
+        numbers.append(None if asked is None else (asked.number, asked.kind))
+    assert numbers == [(1, "positioning"), (1, "positioning"), None, None, (2, "navigation")]
 
 
 def test_navigation_is_told_to_go_on_as_long_as_it_asks_and_is_given_up_for_good() -> None:

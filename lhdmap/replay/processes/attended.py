@@ -92,7 +92,7 @@ class Attended(Process):
             if command.answer == ABORT:
                 self._gave_up = f"{command.by or 'the operator'} aborts: {asked.why}"
             return Word(now_ns, go_on=self._goes_on, gave_up=self._gave_up)
-        return Word(now_ns, answer=Answer(command.number, command.answer, by=command.by))
+        return Word(now_ns, answer=Answer(self._shown.task_number, command.answer, by=command.by))
 
     def _unfit(self, command: Command) -> str:
         """Return why a command does not count."""

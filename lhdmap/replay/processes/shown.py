@@ -35,7 +35,8 @@ class Shown:
         self._located: Located | None = None
         self._seen: Seen | None = None
         self._pile: Snapshot | None = None
-        self._asks, self._count = "", 0
+        self._asks, self._ended, self._count = "", "", 0
+        self.task_number = 0  # of the open request, as the loading task counts; 0: it is navigation's
         self._ask: Ask | None = None
 
     def take(self, received: Received) -> None:
@@ -67,13 +68,20 @@ class Shown:
         )
 
     def request(self) -> Ask | None:
-        """Return the open request: the loading task's, else what navigation asks for."""
+        """Return the open request: the loading task's, else what navigation asks for. Its number is that of this run."""
         request = None if self.loading is None else self.loading.request
         asks = "" if self.health is None else self.health.asks.removeprefix(_PREFIX)
+        if request is not None:
+            self._ended = request.why
+        elif asks == self._ended:
+            asks = ""  # what the machine says is a little older than what the task says
+        else:
+            self._ended = ""
         key = asks if request is None else f"{request.number}: {request.why}"
         if key != self._asks:
             self._asks = key
             self._count += bool(key)
+            self.task_number = 0 if request is None else request.number
             self._ask = self._ask_of(request, asks) if key else None
         return self._ask
 
@@ -84,9 +92,8 @@ class Shown:
         evidence = tuple(
             (name, value if isinstance(value, str) else f"{value:.4g}") for name, value in request.evidence.items()
         )
-        return Ask(
-            request.number, request.kind, request.during, request.why, request.asks, request.tried, evidence, hits, pile
-        )
+        told = (request.kind, request.during, request.why, request.asks, request.tried)
+        return Ask(self._count, *told, evidence, hits, pile)
 
     def _place(self) -> Pose | None:
         """Return the pose of now (x, y, heading) on the plan."""
