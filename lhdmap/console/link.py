@@ -7,7 +7,7 @@ import time
 from collections import deque
 from collections.abc import Callable, Sequence
 
-from lhdmap.console.client import Client
+from lhdmap.console.client import Address, Client
 from lhdmap.console.messages import REARM, STOP, Ask, Asked, Beat, Command, Event, Message, Outcome, Plan, Status, Tick
 from lhdmap.console.settings import ConsoleSettings
 from lhdmap.console.watch import Watch
@@ -38,7 +38,7 @@ class MachineLink:
         self._begun: tuple[int, int] | None = None
         self._stopped, self._shown_ns = False, 0
         self._asked: Ask | None = None
-        self._client = Client(machine, url, key, self._heard, self._tick, settings.tick_s)
+        self._client = Client(Address(url, machine, key), self._heard, self._tick, settings.tick_s)
 
     def connect(self, patience_s: float = 10.0) -> None:
         """Begin; raises InputError where no console answers."""
@@ -46,7 +46,7 @@ class MachineLink:
         if not self._client.connected.wait(patience_s):
             self.close()
             why = self._client.why or "nobody answers"
-            raise InputError(f"console at {self._client.url}: {why}; `lhdmap console` starts one")
+            raise InputError(f"console at {self._client.address.url}: {why}; `lhdmap console` starts one")
 
     def wait_for_operator(self) -> str:
         """Wait until an operator's page answers; return who he is."""

@@ -42,7 +42,7 @@ async def page_socket(socket: WebSocket, room: Room, who: Callable[[], str], clo
             room.beat(by, page, beat.machine, beat.number, clock())
 
     try:
-        await _until(listen(), _send(socket, outbox))
+        await _until(listen(), _send(socket, outbox, lambda: who() == by))
     finally:
         room.page_goes(page, clock())
     await _closed(socket)
@@ -64,7 +64,7 @@ async def machine_socket(socket: WebSocket, room: Room, clock: Clock) -> None:
                 room.heard(name, message, clock())
 
     try:
-        await _until(listen(), _send(socket, outbox))
+        await _until(listen(), _send(socket, outbox, lambda: True))
     finally:
         room.machine_goes(name, outbox, clock())
     await _closed(socket)
@@ -81,9 +81,13 @@ async def _hello(socket: WebSocket) -> str:
     return hello.machine if fits else ""
 
 
-async def _send(socket: WebSocket, outbox: Outbox) -> None:
-    while True:
-        await socket.send_text(await outbox.take())
+async def _send(socket: WebSocket, outbox: Outbox, may: Callable[[], bool]) -> None:
+    """Send what waits, as long as the other side may have it and keeps up: who is far behind comes again and gets what is."""
+    while not outbox.lost:
+        text = await outbox.take()
+        if not may():
+            return
+        await socket.send_text(text)
 
 
 async def _until(*jobs: Coroutine[Any, Any, None]) -> None:

@@ -167,6 +167,15 @@ def test_a_forged_cookie_opens_nothing(served: Served, anna: Page, cookie: str) 
         served.page(cookie)
 
 
+def test_who_has_logged_out_is_shown_nothing_any_more(served: Served, anna: Page) -> None:
+    machine = served.machine("m8")
+    anna.until("machine", name="m8")
+    assert served.ask("POST", "/logout", {}, anna.cookie).status == 204
+    machine.say(Event(1.0, "executor", "secret"))
+    with pytest.raises(ConnectionClosed):
+        anna.until("event", machine="m8")
+
+
 def test_a_session_that_has_ended_gives_no_sign_of_life(served: Served, anna: Page) -> None:
     machine = served.machine("m7")
     anna.until("machine", name="m7")

@@ -20,7 +20,7 @@ def operated(settings: ConsoleSettings) -> list[Any]:
     silent.answered(silent.tick(0), "anna", _MS)
     alarms, tries, sessions = Alarms(settings), Tries(settings), Sessions(settings)
     told: list[Any] = [[bool(silent.fault(k * _MS)) for k in range(0, 2000, 10)], _slow_from(settings)]
-    told.append(MachineLink("one", "http://127.0.0.1:1", "key", settings)._client._tick_s)
+    told.append(MachineLink("one", "http://127.0.0.1:1", "key", settings)._client.tick_s)
     for k in range(60):
         alarms.raises(f"{k}", WARNING, "one", f"{k}", 30.0 * k)
         told.append((len(alarms.shown(30.0 * k)), alarms.held_back))
