@@ -38,6 +38,7 @@ class Fence:
             "X-Content-Type-Options": "nosniff",
             "X-Frame-Options": "DENY",
             "Referrer-Policy": "no-referrer",
+            "Origin-Agent-Cluster": "?1",  # a viewer that hangs in its frame should not hang the page
             "Cross-Origin-Opener-Policy": "same-origin",
             "Cross-Origin-Resource-Policy": "same-origin",
             "Cache-Control": "no-store",

@@ -6,7 +6,7 @@ const find = (selector, root = document) => root.querySelector(selector);
 const machines = new Map(); // name: {card, plan, status, trail, request, connected}
 const ANSWERS = { go_on: "Go on", loaded: "Loaded by hand", abort: "Abort" };
 const EVENTS_MOST = 200, TRAIL_MOST = 400;
-let socket = null, page = "", seat = { by: "", page: "" };
+let viewer = "", socket = null, page = "", seat = { by: "", page: "" };
 
 async function post(path, body) {
   const response = await fetch(path, { method: "POST", headers: { "Content-Type": "application/json" }, body: JSON.stringify(body) });
@@ -27,11 +27,9 @@ async function begin() {
   if (!response.ok) return;
   const me = await response.json();
   find("#me").textContent = me.name;
-  if (me.viewer && find("#viewer").hidden) {
-    find("#viewer").src = me.viewer;
-    find("#viewer").hidden = false;
-    find("#columns").classList.add("viewed");
-  }
+  viewer = me.viewer;
+  find("#picture").hidden = !viewer;
+  find("#columns").classList.toggle("viewed", Boolean(viewer));
   connect();
 }
 
@@ -55,7 +53,7 @@ const TAKES = {
   you: (m) => { page = m.page; find("#events").replaceChildren(); },
   seat: (m) => { seat = m; showSeat(); },
   machine: (m) => { machineOf(m.name).connected = m.connected; show(m.name); },
-  plan: (m) => { machineOf(m.machine).plan = m; show(m.machine); },
+  plan: (m) => { machineOf(m.machine).plan = m; show(m.machine); look(); }, // a machine that begins has its data ready
   status: (m) => {
     const machine = machineOf(m.machine), last = machine.trail[machine.trail.length - 1];
     machine.status = m;
@@ -76,6 +74,10 @@ const TAKES = {
   event: (m) => addEvent(m),
   alarms: (m) => showAlarms(m),
 };
+
+function look() {
+  if (viewer) find("#viewer").src = viewer;
+}
 
 const mine = () => page !== "" && seat.page === page;
 
@@ -171,5 +173,6 @@ find("#login").onsubmit = async (event) => {
   if (!find("#login-why").textContent) begin();
 };
 find("#logout").onclick = async () => { await post("/logout", {}); socket.close(); };
+find("#look").onclick = look;
 find("#seat").onclick = () => asks("/seat", { page, take: !mine() });
 begin();
