@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from lhdmap.console.settings import ConsoleSettings
 from lhdmap.docking.settings import DockingSettings
 from lhdmap.errors import ConfigError
 from lhdmap.executor.settings import ExecutorSettings
@@ -84,6 +85,7 @@ class Settings:
     traffic: TrafficSettings = field(default_factory=TrafficSettings)
     recording: RecordingSettings = field(default_factory=RecordingSettings)
     rockbreaker: RockbreakerSettings = field(default_factory=RockbreakerSettings)
+    console: ConsoleSettings = field(default_factory=ConsoleSettings)
 
 
 SECTIONS: dict[str, Any] = {section.name: section.default_factory for section in dataclasses.fields(Settings)}

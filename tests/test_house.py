@@ -47,7 +47,7 @@ FLOORS = [
     {"traffic"},
     {"haulage"},
     {"production"},
-    {"exports"},
+    {"exports", "console"},
     {"smoothing", "simulation", "evaluation"},
     {"update"},
     {"localization"},
@@ -62,7 +62,7 @@ FLOORS = [
 
 HEAVY = {
     "numpy", "scipy", "numba", "open3d", "rerun", "matplotlib", "pyarrow", "gtsam", "small_gicp", "kiss_icp", "laspy",
-    "rosbags", "mcap", "rich", "cv2", "skimage", "ezdxf",
+    "rosbags", "mcap", "rich", "cv2", "skimage", "ezdxf", "starlette", "uvicorn", "websockets", "pyotp",
 }  # fmt: skip
 
 

@@ -17,6 +17,7 @@ import tempfile
 import time
 from pathlib import Path
 
+from lhdmap.console.operators import Operators
 from lhdmap.pipeline.build import BuildRequest, build_map
 from lhdmap.topology.geojson import to_geojson
 from tests.cli.logs import write_room_log
@@ -71,8 +72,16 @@ def commands(work: Path) -> dict[str, list[str]]:
         "localize": ["localize", str(work / "later.mcap"), "--map", first_map, "-o", "{out}"],
         "batch": ["batch", str(work / "batch.csv"), "-o", "{out}", "--jobs", "2"],
         "replay-grizzly": ["replay", str(work / "grizzly.toml"), "-o", "{out}"],
+        "console": ["console", "--folder", str(_operated(work))],
         "demo": ["demo", "-o", "{out}"],
     }
+
+
+def _operated(work: Path) -> Path:
+    """Make the folder of a console."""
+    folder = work / "console"
+    Operators(folder).add("anna")
+    return folder
 
 
 def _built(work: Path) -> Path:

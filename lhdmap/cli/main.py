@@ -39,11 +39,13 @@ COMMANDS = {
     "check-map": "is the map ready to run on, and if not, why",
     "production": "what replays produced, and what their time went into",
     "export": "a map in a format that other tools read",
+    "console": "the operator's page: requests for help, answers, arming, alarms",
     "batch": "many logs, on all cores or on a cluster: one table, one page",
     "eval": "compare results with ground truth",
     "config": "print the settings with unit and source",
     "completion": "print the tab completion for bash, zsh or fish",
 }
+_MODULES = {"console": "operator_console"}  # `console` is what a command prints with
 EXIT_USAGE, EXIT_INPUT = 2, 3
 _COMMON = ("--json", "--quiet", "--debug")
 FAULT_HINT = "please report it with the output of the same command and --debug"
@@ -105,7 +107,7 @@ def _command_first(words: list[str]) -> list[str]:
 
 
 def _module(name: str):  # type: ignore[no-untyped-def]  # a module has no type of its own
-    return importlib.import_module("lhdmap.cli." + name.replace("-", "_"))
+    return importlib.import_module("lhdmap.cli." + _MODULES.get(name, name.replace("-", "_")))
 
 
 def _run(arguments: argparse.Namespace, console: Console) -> int:

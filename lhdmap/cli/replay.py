@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import contextlib
+import dataclasses
 import os
 import socket
 import subprocess
@@ -12,6 +13,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
+from lhdmap.cli.attendants import add_operator, attendant_of
 from lhdmap.cli.console import Console
 from lhdmap.cli.options import add_output, add_settings, suggest
 from lhdmap.cli.viewer import started, viewer
@@ -36,7 +38,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_settings(parser)
     parser.add_argument("--seed", type=int, metavar="N", help="over the scenario's; same seed, same journal to the bit")
     parser.add_argument("--view", action="store_true", help="follow the run in Rerun: a window, or a page without one")
+    add_operator(parser)
     parser.add_argument("--no-truth", action="store_true", help="no /ground_truth/odometry in run.mcap")
+    parser.add_argument(
+        "--view-port", type=int, metavar="N", help="with --view: a page at this port, its data at the next"
+    )
     parser.add_argument("--no-recording", action="store_true", help="no recording.rrd: faster, less disk")
 
 
@@ -45,18 +51,25 @@ def run(arguments: argparse.Namespace, console: Console) -> int:
     from lhdmap.config import load_settings
     from lhdmap.errors import UsageError
     from lhdmap.outputs import free_folder
+    from lhdmap.replay.assemble_station import check_attended
     from lhdmap.replay.run import ReplayRequest, replay
     from lhdmap.replay.scenario import find_scenario, load_scenario
 
     if arguments.view and arguments.no_recording:
         raise UsageError("--view shows the recording while it is written; --no-recording was found beside it")
+    if arguments.view_port is not None and not (arguments.view and 1 <= arguments.view_port <= 65_534):
+        raise UsageError(f"--view-port {arguments.view_port}: --view, and a port from 1 to 65534, were wanted")
     if arguments.seed is not None and arguments.seed < 0:
         raise UsageError(f"--seed {arguments.seed}: 0 or more was wanted")
     path = find_scenario(arguments.scenario)
     scenario = load_scenario(path, **({} if arguments.seed is None else {"seed": arguments.seed}))
     target = arguments.output or Path(f"{path.stem}_run")
     free_folder(target, force=arguments.force, inputs=[path])
-    port = _free_port() if arguments.view else None
+    if arguments.operator != "script":
+        check_attended(scenario)
+    settings = load_settings(arguments.config, arguments.set)
+    page = arguments.view_port
+    port = (page + 1 if page else _free_port()) if arguments.view else None
     request = ReplayRequest(
         scenario,
         target,
@@ -67,10 +80,10 @@ def run(arguments: argparse.Namespace, console: Console) -> int:
         force=arguments.force,
         sources=[path],
         progress=_progress_of(console),
-        settings=load_settings(arguments.config, arguments.set),
+        settings=settings,
     )
-    with _viewer(port, console):
-        result = replay(request)
+    with _viewer(port, page, console), attendant_of(arguments, path.stem, settings, console) as attendant:
+        result = replay(dataclasses.replace(request, attendant=attendant))
     values = {"run": str(result.folder), **result.verdict}
     failure = None if result.verdict["ok"] else EvaluationShortfall(f"not ok: {result.verdict['reason']}")
     console.result(values, verdict_text(values), failure=failure)
@@ -138,20 +151,24 @@ def _progress_of(console: Console) -> Any:
 
 
 @contextlib.contextmanager
-def _viewer(port: int | None, console: Console) -> Iterator[None]:
-    """Have a viewer follow the run: a window where there is a display, which stays open afterwards; else a page."""
+def _viewer(port: int | None, page: int | None, console: Console) -> Iterator[None]:
+    """Have a viewer follow the run: a window where there is a display, which stays open afterwards; else a page.
+
+    `port`: of the data, None: nobody follows; `page`: where a page is wanted, whatever there is.
+    """
     if port is None:
         yield
         return
     require("rerun")
     data = f"rerun+http://{_HOST}:{port}/proxy"
-    if os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY") or not sys.platform.startswith("linux"):
+    windows = os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY") or not sys.platform.startswith("linux")
+    if windows and page is None:
         with started(viewer(data), stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) as process:
             yield
             console.note("the run has ended; close the window to go on")
             process.wait()
         return
-    page = _free_port()
+    page = page or _free_port()
     options = ("--serve-web", "--bind", _HOST, "--web-viewer-port", str(page), "--port", str(_free_port()))
     with started(viewer(*options, data), stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL):
         console.note(f"follow the run at http://{_HOST}:{page}/?url=rerun%2Bhttp://{_HOST}:{port}/proxy")

@@ -16,6 +16,7 @@ from lhdmap.navigation.control import NavigationControl
 from lhdmap.replay.assemble_haulage import haulage_processes, lane_of
 from lhdmap.replay.assemble_loading import guidance_of, loading_processes
 from lhdmap.replay.assemble_mission import mission_processes
+from lhdmap.replay.assemble_station import station_of
 from lhdmap.replay.engine import Engine, overrun_targets
 from lhdmap.replay.faults import Faults
 from lhdmap.replay.journal import Journal
@@ -33,7 +34,6 @@ from lhdmap.replay.processes.navigator import NAVIGATION, Navigator
 from lhdmap.replay.processes.perception import PERCEPTION, Perception
 from lhdmap.replay.processes.plant import Plant
 from lhdmap.replay.processes.recorder import Recorder
-from lhdmap.replay.processes.station import Station
 from lhdmap.replay.scenario import HAULAGE, TELEOPERATOR, Scenario
 from lhdmap.replay.verdict import Tally
 from lhdmap.settings import nearest
@@ -135,7 +135,7 @@ def _autonomous(scenario: Scenario, parts: Parts, given: Autonomous, journal: Jo
         Navigator(navigation, given.errand, journal.of(NAVIGATION)),
         Guide(guidance, settings.executor.jumps, journal.of(GUIDANCE)),
         Execute(control, machine, given.mode, journal.of(EXECUTOR)),
-        Station(scenario.wanted_modes, scenario.rearm_s, scenario.assist_s, journal.of(Station.name), scenario.assists),
+        station_of(scenario, parts, journal, scenario.assists),
     ]
 
 

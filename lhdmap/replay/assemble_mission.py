@@ -12,6 +12,7 @@ from lhdmap.haulage.of_map import layout_of_map
 from lhdmap.movement.routes import RoutePlanner
 from lhdmap.navigation.control import NavigationControl
 from lhdmap.replay.assemble_loading import guidance_of, task_of
+from lhdmap.replay.assemble_station import station_of
 from lhdmap.replay.journal import Journal
 from lhdmap.replay.parts import Autonomous, Parts
 from lhdmap.replay.process import Process
@@ -25,7 +26,6 @@ from lhdmap.replay.processes.navigator import NAVIGATION
 from lhdmap.replay.processes.ordered import OrderedNavigation
 from lhdmap.replay.processes.perception import PERCEPTION
 from lhdmap.replay.processes.scouting import PileAhead
-from lhdmap.replay.processes.station import Station
 from lhdmap.replay.scenario import Scenario
 
 
@@ -51,5 +51,5 @@ def mission_processes(scenario: Scenario, parts: Parts, given: Autonomous, journ
         Dumps(journal.of(DUMPS)),
         Guide(guidance, settings.executor.jumps, journal.of(GUIDANCE), models=models),
         Execute(control, machine, given.mode, journal.of(EXECUTOR), models=models),
-        Station(scenario.wanted_modes, scenario.rearm_s, scenario.assist_s, journal.of(Station.name)),
+        station_of(scenario, parts, journal),
     ]

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from typing import Any, NamedTuple, Protocol
 
 from lhdmap.config import Settings
+from lhdmap.console.attendant import Attendant
 from lhdmap.guidance.directive import Directive
 from lhdmap.machine import Machine
 from lhdmap.messages import Command, FloatArray
@@ -155,6 +156,7 @@ class Parts:
         loading: what a machine that loads is given; None: it does not.
         autonomous: what a machine that drives itself is given; None: nobody does, or the operator.
         haulage: what a machine on a surface site is given; None: it is in a mine.
+        attendant: who attends the machine, at a console or a terminal; None: the script does.
     """
 
     machine: Machine
@@ -174,3 +176,4 @@ class Parts:
     loading: Loading | None = None
     autonomous: Autonomous | None = None
     haulage: Haulage | None = None
+    attendant: Attendant | None = None

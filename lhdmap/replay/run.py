@@ -5,15 +5,17 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import ExitStack
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
 from lhdmap import __version__
 from lhdmap.config import Settings
+from lhdmap.console.attendant import Attendant
 from lhdmap.logs.writer import LogWriter
 from lhdmap.pipeline.interruption import Interruption
 from lhdmap.replay.assemble import Run, Watchers, assemble, parts_of
+from lhdmap.replay.assemble_station import check_attended
 from lhdmap.replay.journal import Journal
 from lhdmap.replay.mission_tally import MissionTally
 from lhdmap.replay.parts import Parts
@@ -43,7 +45,8 @@ class ReplayRequest:
 
     `truth`: the true pose in the log; `recording`: a Rerun recording; `live_port`: where it can be followed meanwhile;
     `sources`: files that the run is made from; `settings`: of perception
-    and control; `progress` shows the simulated times that it is given with their end (s).
+    and control; `progress` shows the simulated times that it is given with their end (s); `attendant`: who attends the machine
+    instead of the scripted station.
     """
 
     scenario: Scenario
@@ -56,6 +59,7 @@ class ReplayRequest:
     sources: Sequence[Path] = ()
     progress: Progress | None = None
     settings: Settings | None = None
+    attendant: Attendant | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,6 +78,8 @@ def replay(request: ReplayRequest, parts: Parts | None = None) -> ReplayResult:
         ConfigError: a fault of the scenario has no target here.
         KeyboardInterrupt: Ctrl-C was pressed; what was finished is kept in the partial folder.
     """
+    if request.attendant is not None:
+        check_attended(request.scenario)
     if request.scenario.kind == GRIZZLY:
         from lhdmap.replay.grizzly_folder import replay_grizzly  # it needs what is here
 
@@ -81,6 +87,7 @@ def replay(request: ReplayRequest, parts: Parts | None = None) -> ReplayResult:
     interruption = Interruption()
     with RunFolderWriter(KIND, request.target, force=request.force, inputs=request.sources) as folder:
         made = parts_of(request.scenario, folder.path, request.settings) if parts is None else parts
+        made = replace(made, attendant=request.attendant or made.attendant)
         with interruption.comes_first():
             verdict = _Replay(request, made, folder).run(interruption)
         path = folder.complete(run_info(request, verdict))

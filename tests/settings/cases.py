@@ -65,6 +65,7 @@ _SECTIONS = {
     "movement": Case("route"),
     "recording": Case("recording"),
     "rockbreaker": Case("plan"),
+    "console": Case("attended"),
     "topology": Case("topology"),
 }
 

@@ -50,6 +50,7 @@ from tests.movement.mines import fast_ladder
 from tests.report.synthetic import START_NS, report_data
 from tests.report.test_recording import read
 from tests.settings import loading, streams
+from tests.settings.consoled import operated
 from tests.settings.digs import charges, decisions, digs, weighings
 from tests.settings.guided import barred, plans, remembered, stops, trips
 from tests.settings.hauled import asked, fleet, tried
@@ -337,6 +338,11 @@ def tracked(settings: Settings) -> str:
     return digest(tracks(settings.tracking))
 
 
+def attended(settings: Settings) -> str:
+    """Return the digest of when a silent or slow operator stops a machine, of sessions, tries and alarms."""
+    return digest(operated(settings.console))
+
+
 def docked(settings: Settings) -> str:
     """Return the digest of ways to a dock on wide and tight aprons, or why there is none."""
     return digest(docks(settings.docking))
@@ -385,6 +391,7 @@ PROBES: dict[str, Probe] = {
     "loading_limits": loading_limits,
     "tracked": tracked,
     "docked": docked,
+    "attended": attended,
     "hauled": hauled,
     "shared": shared,
     "landmarks": landmarks,

@@ -116,13 +116,14 @@ class Idle(NamedTuple):
 class Word(NamedTuple):
     """What the station says: always a sign of life; a mode, arming, a stop, the joystick where they are wanted.
 
-    `gave_up`: it helps no more, and why.
+    `gave_up`: it helps no more, and why. `stop`: why the machine is to stop and disarm; armed again, it may go on.
     """
 
     stamp_ns: int
     mode: str = ""
     rearm: bool = False
     emergency: str = ""
+    stop: str = ""
     release: bool = False
     speed_mps: float | None = None
     steering_rate_rps: float = 0.0
