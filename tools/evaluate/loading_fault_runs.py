@@ -1,6 +1,6 @@
-"""What `loading_faults` drives: one run in which nothing is wrong, and at each moment that is asked for a copy of it that has a fault.
+"""What `loading_faults` drives: a run in which nothing is wrong, and at moments of it copies that have a fault.
 
-A copy is a child of this process (`fork`): it goes on from the very state of the run, so that the way there is driven once.
+A copy is a child of this process (`fork`): it goes on from the very state of the run, so the way there is driven once.
 """
 
 from __future__ import annotations
@@ -77,7 +77,7 @@ def in_a_copy(work: Callable[[], None]) -> None:
     if child == 0:
         try:
             work()
-        except Exception:
+        except Exception:  # noqa: BLE001  # a copy must not go on as if it were the run
             traceback.print_exc()
         finally:
             os._exit(0)
@@ -122,7 +122,8 @@ def _came(live: Live, fault: FaultSettings, later: Sequence[Event]) -> dict[str,
 def _stops(one: Event) -> bool:
     """Return whether somebody stops the machine here: the watchdog, or the task."""
     watched = one.event == "watchdog: armed" and one.values.get("after") == "disarmed"
-    return watched or (one.process == "loading" and one.event == "state" and one.after in _STILL - {str(State.DONE)})
+    told = one.process == "loading" and one.event == "state" and one.after in _STILL - {str(State.DONE)}
+    return watched or (told and one.before not in _HELPED)
 
 
 def _first(events: Sequence[Event], wanted: Callable[[Event], bool], at_s: float) -> tuple[float | None, str]:

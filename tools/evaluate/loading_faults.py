@@ -4,8 +4,8 @@
     python -m tools.evaluate.loading_faults page
 
 Each sensor dead, frozen, biased, delayed by 0.5 s, and the operator's link lost, for 10 s, in each state of the loading machine.
-Not all of the 224 combinations are run: a round has each (sensor, fault) once and, of each fault, each state at least once; further
-rounds pair them otherwise. Each run adds a line to evaluation/loading_faults.jsonl; what is there is not run again.
+Not all combinations are run: a round has each (sensor, fault) once and, of each fault, each state at least once; further rounds
+pair them otherwise. Each run adds a line to evaluation/loading_faults.jsonl; what is there is not run again.
 """
 
 from __future__ import annotations

@@ -120,7 +120,9 @@ def test_the_boom_is_lifted_no_higher_than_the_roof_allows(method: str, most_rad
     settings = DigSettings(common, replace(PaperDigSettings(), **far), replace(TunedDigSettings(), **far))
     dig, boom_rad = excavation_of(settings, method), -0.35
     for k in range(1500):
-        slips = QUIET._replace(now_ns=k * 20_000_000, scan_ns=k * 20_000_000, scan_mps=0.0, tacho_mps=1.0, boom_rad=boom_rad)
+        slips = QUIET._replace(
+            now_ns=k * 20_000_000, scan_ns=k * 20_000_000, scan_mps=0.0, tacho_mps=1.0, boom_rad=boom_rad
+        )
         if k == 0:
             dig.begin(slips)
         boom_rad += 0.02 * 0.25 * dig.step(slips).pedals.lift
