@@ -115,9 +115,10 @@ def test_stops(heard: dict[str, Any], ended: str) -> None:
 @pytest.mark.parametrize("most_rad", [0.1, 0.5])
 def test_the_boom_is_lifted_no_higher_than_the_roof_allows(method: str, most_rad: float) -> None:
     """All wheels slip for as long as it takes, and no other stop is near: what is not limited lifts to its stop at 0.85."""
-    far = {"boom_max_rad": 2.0, "advance_max_m": 10.0}
-    common = replace(ExcavationSettings(), lift_most_rad=most_rad, alpha_max_rad=2.0, **far)
-    settings = DigSettings(common, replace(PaperDigSettings(), **far), replace(TunedDigSettings(), **far))
+    common = ExcavationSettings(lift_most_rad=most_rad, alpha_max_rad=2.0, boom_max_rad=2.0, advance_max_m=10.0)
+    paper = PaperDigSettings(boom_max_rad=2.0, advance_max_m=10.0)
+    tuned = replace(TunedDigSettings(), boom_max_rad=2.0, advance_max_m=10.0)
+    settings = DigSettings(common, paper, tuned)
     dig, boom_rad = excavation_of(settings, method), -0.35
     for k in range(1500):
         slips = QUIET._replace(
