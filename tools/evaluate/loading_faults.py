@@ -5,7 +5,8 @@
 
 Each sensor dead, frozen, biased, delayed by 0.5 s, and the operator's link lost, for 10 s, in each state of the loading machine.
 Not all combinations are run: a round has each (sensor, fault) once and, of each fault, each state at least once; further rounds
-pair them otherwise. Each run adds a line to evaluation/loading_faults.jsonl; what is there is not run again.
+pair them otherwise; to them come sensors that freeze where the state lives on them. Each run adds a line to
+evaluation/loading_faults.jsonl; what is there is not run again.
 """
 
 from __future__ import annotations
@@ -44,6 +45,12 @@ WINDOWS_S = {
     State.POSITIONING_ASSISTANCE: (0.5, 15.0),
 }
 """When in a state a fault begins, by chance: as long as each lasts, about, where nothing is wrong."""
+MORE = (
+    (State.POSITIONING, JOINTS, "frozen"), (State.CHARGING, TACHOMETER, "frozen"), (State.CHARGING, TRANSMISSION, "frozen"),
+    (State.EXCAVATION, TACHOMETER, "frozen"), (State.EXCAVATION, TRANSMISSION, "frozen"), (State.PULL_BACK, JOINTS, "frozen"),
+    (State.WEIGHING, JOINTS, "frozen"), (State.WEIGHING, LIFT, "frozen"),
+)  # fmt: skip
+"""Beside the rounds: what says the same with new stamps, where the state lives on it."""
 SHORT_S = 4.0  # positioning may take no longer where help is to be asked for
 
 
@@ -75,6 +82,7 @@ def cases(rounds: int) -> list[Case]:
     for turn in range(rounds):
         for k, kind in enumerate(FAULTS):
             pairs += [(states[(j + 2 * k + 3 * turn) % 7], sensor, kind) for j, sensor in enumerate(SENSORS)]
+    pairs += MORE
     rng = np.random.default_rng(20)
     return [Case(*one, round(float(rng.uniform(*WINDOWS_S[one[0]])), 1)) for one in dict.fromkeys(pairs)]
 
