@@ -17,6 +17,9 @@ in each state. **Machine and ground are a model.**
 
 Wanted of each: no contact; a stop within the stopping distance; no motion on a signal that is silent or late (0.38 s, the link
 2.1 s, and 1.5 s to stand); after a stop nothing moves before it was armed again; no state longer than its limit.
+A sensor that repeats itself with new stamps is not silent: how long it took until that was noticed is in the table (what was
+found in the first runs: frozen joints let a dig go on, and nothing would have stopped the boom; mended). A bias is not noticed as
+such; wanted is that nothing is touched. What the state does not need may be broken: it goes on.
 
 | | |
 | --- | --- |
@@ -44,7 +47,9 @@ def page(rows: Sequence[dict[str, Any]], scenario: str = "loading_stope") -> str
 
 
 def _noticed(one: dict[str, Any]) -> bool:
-    return one["stopped_after_s"] is not None and one["stopped_after_s"] < _LASTS_S
+    """Return whether it was stopped while the fault lasted; that an operator hands over is no stop."""
+    within = one["stopped_after_s"] is not None and one["stopped_after_s"] < _LASTS_S
+    return within and not one["why"].startswith("operator says")
 
 
 _LASTS_S = 10.5
