@@ -11,7 +11,7 @@ from lhdmap.loading.excavation import excavation_of
 
 from tools.evaluate.loading_loads import TICK_S, Dug, Plan, charged, loader_on, run_load, with_common, with_paper
 
-PILES, TUNED_LOADS = 16, 16
+PILES, TUNED_LOADS = 12, 40
 _EP_MAX_BAR, _RELIEVED_BAR = 300.0, 385.0
 _UNLIMITED_RAD = 2.0
 _EVERY = Plan(detector="fused", most=4, forced=True)
