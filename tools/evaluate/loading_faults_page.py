@@ -18,8 +18,8 @@ in each state. **Machine and ground are a model.**
 Wanted of each: no contact; a stop within the stopping distance; no motion on a signal that is silent or late (0.38 s, the link
 2.1 s, and 1.5 s to stand); after a stop nothing moves before it was armed again; no state longer than its limit.
 A sensor that repeats itself with new stamps is not silent: how long it took until that was noticed is in the table (what was
-found first: frozen joints let a dig go on, and nothing would have stopped the boom; mended; the 9 runs with frozen joints, and those
-that freeze where a state lives on them, are with that, the other 38 from before). A bias is not noticed as
+found first: frozen joints let a dig go on, and nothing would have stopped the boom; mended; the 9 runs in which a sensor freezes
+that the state lives on are with that, the other 38 from before). A bias is not noticed as
 such; wanted is that nothing is touched. What the state does not need may be broken: it goes on.
 
 | | |
