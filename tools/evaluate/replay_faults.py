@@ -125,14 +125,14 @@ def run(scenario: Scenario, folder: Path) -> Outcome:
     tally = run.monitor.tally
     rows = np.array(drive.rows)
     model = drive_model(parts.machine, 1000.0 * scenario.load)
-    missed, worst = _stops(rows, events, model)
+    missed, worst = stops_missed(rows, events, model)
     missed += _stale(scenario.faults, rows, events)
     missed += [f"contact: {tally.reason}"] if tally.contacts else []
     stops = sum(1 for _ in _told(events, "watchdog: armed", "disarmed"))
     return Outcome(tally.reason, missed, float(tally.min_clearance_m or 0.0), worst, stops, tally.assists)
 
 
-def _told(events: list[Event], event: str, after: str) -> list[float]:
+def _told(events: Sequence[Event], event: str, after: str) -> list[float]:
     """Return when (s) the executor noted something; refusals to arm are none."""
     return [
         (one.t_ns - START_NS) / SECOND_NS
@@ -141,7 +141,7 @@ def _told(events: list[Event], event: str, after: str) -> list[float]:
     ]
 
 
-def _stops(rows: FloatArray, events: list[Event], model: DriveModel) -> tuple[list[str], float]:
+def stops_missed(rows: FloatArray, events: Sequence[Event], model: DriveModel) -> tuple[list[str], float]:
     """Return what was missed at stops of the watchdog, and the worst share of the stopping distance."""
     missed, worst = [], 0.0
     armed = [*_told(events, "watchdog: armed", "armed"), rows[-1, 0] + 1.0]
