@@ -171,11 +171,11 @@ NAMES_TWICE = {
     "Attempt", "Bodies", "Bumper", "Candidate", "Chance", "Change", "Column", "Crossing", "Cut", "Cycle",
     "Decision", "Digging", "Drift", "Drive", "Edge", "Errand", "Errors", "Event", "Face", "Facts", "Field",
     "Figure", "Floor", "Found", "Gains", "Grid", "Guard", "Health", "Help", "Landmarks", "Layout", "Ledger", "Leg",
-    "Load", "Loader", "Moment", "Node", "Operator", "Outcome", "Pairs", "Path", "PileTruth", "Place", "Plan",
-    "Planner", "Plant", "Profile", "Reach", "Refusal", "Request", "Rig", "Rock", "Room", "Row", "Rule", "Run",
-    "Sampled", "Seen", "Series", "Shaking", "Signals", "SkidFactor", "Span", "Speeds", "Start", "State", "Station",
-    "Step", "Stop", "Stops", "Table", "Target", "Task", "Trajectory", "Truth", "Tunnel", "Turn", "Vehicle",
-    "Verdict", "View", "Walls", "Way", "Weighing", "WheelSettings", "Whereabouts", "Word",
+    "Limits", "Load", "Loader", "Moment", "Node", "Operator", "Outcome", "Pairs", "Path", "PileTruth", "Place",
+    "Plan", "Planner", "Plant", "Profile", "Reach", "Refusal", "Request", "Rig", "Rock", "Room", "Row", "Rule",
+    "Run", "Sampled", "Seen", "Series", "Shaking", "Signals", "SkidFactor", "Span", "Speeds", "Start", "State",
+    "Station", "Step", "Stop", "Stops", "Table", "Target", "Task", "Trajectory", "Truth", "Tunnel", "Turn",
+    "Vehicle", "Verdict", "View", "Walls", "Way", "Weighing", "WheelSettings", "Whereabouts", "Word",
 }  # fmt: skip
 """Names that several classes have still, as `LONG_FILES`; none of them in the rooms of `UNIQUE`."""
 

@@ -10,8 +10,8 @@ import numpy as np
 import numpy.typing as npt
 
 from lhdmap.integration.beams import BeamTable
-from lhdmap.integration.project import RangeLimits, SweepPoints, SweepPoses, project_scan
-from lhdmap.integration.self_filter import ScannerRig
+from lhdmap.integration.project import Limits, SweepPoints, SweepPoses, project_scan
+from lhdmap.integration.self_filter import Rig
 from lhdmap.messages import Float32Array, FloatArray, LaserScan, PointCloud
 
 
@@ -105,9 +105,7 @@ class Scans(NamedTuple):
 
 
 @nb.njit(cache=True, nogil=True)
-def project_scans(
-    scans: Scans, beams: BeamTable, limits: RangeLimits, poses: BatchPoses, rig: ScannerRig, room: BatchRoom
-) -> None:
+def project_scans(scans: Scans, beams: BeamTable, limits: Limits, poses: BatchPoses, rig: Rig, room: BatchRoom) -> None:
     """Project scans of one scanner into the map, each as `project_scan` does; points and counts go into `room`."""
     size = scans.ranges_m.shape[1]
     for k in range(scans.places.shape[0]):

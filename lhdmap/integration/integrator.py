@@ -14,8 +14,8 @@ from lhdmap.integration.batch import BatchMaker, BatchPoses, BatchRoom, Scans, a
 from lhdmap.integration.beams import sweep_stamps_ns, table_of
 from lhdmap.integration.cloud import GridCloud
 from lhdmap.integration.normals import estimate_normals
-from lhdmap.integration.project import BeamCounts, RangeLimits, SweepPoses, project_cloud
-from lhdmap.integration.self_filter import ScannerRig, rig_of
+from lhdmap.integration.project import BeamCounts, Limits, SweepPoses, project_cloud
+from lhdmap.integration.self_filter import Rig, rig_of
 from lhdmap.integration.voxel_grid import VoxelGrid
 from lhdmap.machine import Machine
 from lhdmap.messages import FloatArray, LaserScan, Mount, PointCloud
@@ -88,7 +88,7 @@ class Integrator:
         self.grid = VoxelGrid(settings.voxel_size_m)
         self.totals = IntegrationTotals()
         self._machine = machine
-        self._rigs: dict[str, ScannerRig] = {}
+        self._rigs: dict[str, Rig] = {}
         self._maker = BatchMaker()
         for mount in mounts:
             self.add_mount(mount)
@@ -135,7 +135,7 @@ class Integrator:
         """Begin with an empty map: the memory of this one is given back."""
         self.grid = VoxelGrid(self.settings.voxel_size_m)
 
-    def _rig(self, frame_id: str) -> ScannerRig:
+    def _rig(self, frame_id: str) -> Rig:
         try:
             return self._rigs[frame_id]
         except KeyError:
@@ -166,12 +166,12 @@ class Integrator:
         out = room.of_sweep(place, size_of(message))
         room.counts[place] = project_cloud(cloud, offsets, limits, spans[0], poses.at(place), rig, out)
 
-    def _limits(self, message: LaserScan | PointCloud) -> RangeLimits:
+    def _limits(self, message: LaserScan | PointCloud) -> Limits:
         s = self.settings
         if not isinstance(message, LaserScan):
-            return RangeLimits(s.range_min_m, s.range_max_m)
+            return Limits(s.range_min_m, s.range_max_m)
         low_m, high_m = max(s.range_min_m, float(message.range_min_m)), min(s.range_max_m, float(message.range_max_m))
-        return RangeLimits(low_m, high_m, s.stray_m, s.stray_share)
+        return Limits(low_m, high_m, s.stray_m, s.stray_share)
 
     def _count(self, taken: int, given: int, counts: BeamCounts) -> None:
         totals = self.totals

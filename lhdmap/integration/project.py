@@ -16,7 +16,7 @@ import numpy.typing as npt
 
 from lhdmap.geometry.articulated import T_base_rear
 from lhdmap.integration.beams import BeamTable
-from lhdmap.integration.self_filter import ScannerRig, body_poses, in_boxes
+from lhdmap.integration.self_filter import Rig, body_poses, in_boxes
 from lhdmap.messages import Float32Array, FloatArray
 
 
@@ -46,7 +46,7 @@ class SweepPoints(NamedTuple):
         return cls(np.empty((points, 3)), np.empty(points, dtype=np.int64), np.empty(3))
 
 
-class RangeLimits(NamedTuple):
+class Limits(NamedTuple):
     """Which returns are taken: ranges in [`low_m`, `high_m`] that do not stick out of the sweep.
 
     A return is a stray one (dust, a drop of water) where it is nearer than the two beams on each side of it by more
@@ -79,7 +79,7 @@ class _Arc(NamedTuple):
 
 
 @nb.njit(cache=True, nogil=True)
-def sensor_pose(T_map_base: FloatArray, articulation_rad: float, rig: ScannerRig) -> FloatArray:
+def sensor_pose(T_map_base: FloatArray, articulation_rad: float, rig: Rig) -> FloatArray:
     """Return T_map_sensor, shape (4, 4)."""
     if rig.on_rear:
         return T_map_base @ T_base_rear(articulation_rad, rig.L_f_m, rig.L_r_m) @ rig.T_parent_sensor
@@ -87,7 +87,7 @@ def sensor_pose(T_map_base: FloatArray, articulation_rad: float, rig: ScannerRig
 
 
 @nb.njit(cache=True, nogil=True)
-def _arc(poses: SweepPoses, rig: ScannerRig) -> _Arc:
+def _arc(poses: SweepPoses, rig: Rig) -> _Arc:
     A = sensor_pose(poses.T_map_base_start, poses.articulation_start_rad, rig)
     B = sensor_pose(poses.T_map_base_end, poses.articulation_end_rad, rig)
     R, t = A[:3, :3].copy(), A[:3, 3].copy()
@@ -121,10 +121,10 @@ def _put(points: FloatArray, n: int, arc: _Arc, share: float, point: tuple[float
 def project_scan(
     ranges_m: Float32Array,
     beams: BeamTable,
-    limits: RangeLimits,
+    limits: Limits,
     span_ns: tuple[int, int],
     poses: SweepPoses,
-    rig: ScannerRig,
+    rig: Rig,
     out: SweepPoints,
 ) -> BeamCounts:
     """Project a scan into the map.
@@ -164,7 +164,7 @@ def project_scan(
 
 
 @nb.njit(cache=True, nogil=True)
-def _is_stray(ranges_m: Float32Array, i: int, limits: RangeLimits) -> bool:
+def _is_stray(ranges_m: Float32Array, i: int, limits: Limits) -> bool:
     """Return whether beam i is nearer than all of the four beams around it; a beam without a return counts as far."""
     if ranges_m.shape[0] < 5 or math.isinf(limits.stray_m):
         return False
@@ -179,10 +179,10 @@ def _is_stray(ranges_m: Float32Array, i: int, limits: RangeLimits) -> bool:
 def project_cloud(
     points_m: Float32Array,
     offsets_s: Float32Array,
-    limits: RangeLimits,
+    limits: Limits,
     span_ns: tuple[int, int],
     poses: SweepPoses,
-    rig: ScannerRig,
+    rig: Rig,
     out: SweepPoints,
 ) -> BeamCounts:
     """Project a 3D scanner's points, shape (N, 3), into the map; `offsets_s` (N,) or empty; else as `project_scan`."""

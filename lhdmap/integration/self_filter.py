@@ -15,7 +15,7 @@ from lhdmap.machine import Machine
 from lhdmap.messages import BODY_FRAMES, FloatArray, Mount
 
 
-class ScannerRig(NamedTuple):
+class Rig(NamedTuple):
     """A sensor and the bodies around it as the kernels take them; boxes, shape (N, 6), already carry the margin.
 
     No point farther than `reach_m` from the sensor can lie in a box.
@@ -30,7 +30,7 @@ class ScannerRig(NamedTuple):
     reach_m: float
 
 
-def rig_of(mount: Mount, machine: Machine, margin_m: float) -> ScannerRig:
+def rig_of(mount: Mount, machine: Machine, margin_m: float) -> Rig:
     """Return the rig of one sensor, its boxes grown by `margin_m` on all sides.
 
     Raises:
@@ -48,7 +48,7 @@ def rig_of(mount: Mount, machine: Machine, margin_m: float) -> ScannerRig:
     L_f, L_r = size.joint_to_front_axle_m, size.joint_to_rear_axle_m
     # All distances go through the joint, so that the bound holds at any articulation.
     reach_m = float(np.linalg.norm(T[:3, 3])) + L_f + L_r + max(_radius(front) + L_f, _radius(rear) + L_r)
-    return ScannerRig(T, mount.parent_frame == "rear_link", L_f, L_r, front, rear, reach_m)
+    return Rig(T, mount.parent_frame == "rear_link", L_f, L_r, front, rear, reach_m)
 
 
 def _radius(boxes: FloatArray) -> float:
@@ -74,7 +74,7 @@ def in_boxes(T_body_sensor: FloatArray, boxes: FloatArray, x: float, y: float, z
     return False
 
 
-def self_hits(rig: ScannerRig, points_sensor: FloatArray, articulation_rad: float) -> npt.NDArray[np.bool_]:
+def self_hits(rig: Rig, points_sensor: FloatArray, articulation_rad: float) -> npt.NDArray[np.bool_]:
     """Return which points, shape (N, 3) in the sensor's frame, lie on the machine; shape (N,)."""
     T_base_sensor, T_rear_sensor = body_poses(rig, articulation_rad)
     return np.array(
@@ -87,7 +87,7 @@ def self_hits(rig: ScannerRig, points_sensor: FloatArray, articulation_rad: floa
 
 
 @nb.njit(cache=True, nogil=True)
-def body_poses(rig: ScannerRig, articulation_rad: float) -> tuple[FloatArray, FloatArray]:
+def body_poses(rig: Rig, articulation_rad: float) -> tuple[FloatArray, FloatArray]:
     """Return (T_base_sensor, T_rear_sensor), each of shape (4, 4)."""
     if rig.on_rear:
         return T_base_rear(articulation_rad, rig.L_f_m, rig.L_r_m) @ rig.T_parent_sensor, rig.T_parent_sensor.copy()

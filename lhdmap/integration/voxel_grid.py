@@ -35,7 +35,7 @@ BLOCK = 8192  # points added between two looks at the table's load
 Rows = tuple[npt.NDArray[np.int64], npt.NDArray[np.int64]]  # of each sweep: first row, number of rows
 
 
-class VoxelTable(NamedTuple):
+class Table(NamedTuple):
     """Open addressing: `keys` (C,) int64, `slots` (C,) int32 into `voxels` (M,); C is a power of two."""
 
     keys: npt.NDArray[np.int64]
@@ -129,10 +129,8 @@ class VoxelGrid:
         self._table = table
 
 
-def _empty_table(capacity: int) -> VoxelTable:
-    return VoxelTable(
-        np.full(capacity, EMPTY, dtype=np.int64), np.zeros(capacity, dtype=np.int32), np.zeros(0, dtype=VOXEL)
-    )
+def _empty_table(capacity: int) -> Table:
+    return Table(np.full(capacity, EMPTY, dtype=np.int64), np.zeros(capacity, dtype=np.int32), np.zeros(0, dtype=VOXEL))
 
 
 @nb.njit(cache=True, nogil=True)
@@ -143,7 +141,7 @@ def _home(key: int | np.int64, mask: int) -> np.int64:
 
 
 @nb.njit(cache=True, nogil=True)
-def _place(table: VoxelTable, key: int | np.int64) -> np.int64:
+def _place(table: Table, key: int | np.int64) -> np.int64:
     """Return the place of `key`, or the empty place where it is to go."""
     mask = table.keys.shape[0] - 1
     place = _home(key, mask)
@@ -153,7 +151,7 @@ def _place(table: VoxelTable, key: int | np.int64) -> np.int64:
 
 
 @nb.njit(cache=True, nogil=True)
-def fill(table: VoxelTable, count: int) -> None:
+def fill(table: Table, count: int) -> None:
     """Enter the first `count` voxels into an empty table."""
     for slot in range(count):
         place = _place(table, table.voxels[slot].key)
@@ -163,7 +161,7 @@ def fill(table: VoxelTable, count: int) -> None:
 
 @nb.njit(cache=True, nogil=True)
 def insert(
-    table: VoxelTable,
+    table: Table,
     count: int,
     size_m: FloatArray,
     points: FloatArray,
@@ -197,7 +195,7 @@ def insert(
 
 @nb.njit(cache=True, nogil=True)
 def insert_sweeps(
-    table: VoxelTable,
+    table: Table,
     count: int,
     size_m: FloatArray,
     points: FloatArray,
@@ -226,7 +224,7 @@ def _open(voxels: npt.NDArray[np.void], slot: int, key: np.int64, stamp_ns: np.i
 
 
 @nb.njit(cache=True, nogil=True)
-def supported(table: VoxelTable, count: int, min_hits: int, min_neighbour_hits: int) -> npt.NDArray[np.bool_]:
+def supported(table: Table, count: int, min_hits: int, min_neighbour_hits: int) -> npt.NDArray[np.bool_]:
     """Return which voxels have `min_hits` hits or 26 neighbours with `min_neighbour_hits` together; shape (count,)."""
     keep = np.zeros(count, dtype=np.bool_)
     for slot in range(count):

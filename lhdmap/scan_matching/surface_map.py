@@ -38,7 +38,7 @@ _STEPS = 65536.0  # a mean is kept in so many steps of its cell: below a microme
 _COLUMNS = 0x0101010101010101  # the bit of the first cell of each of the eight rows of a tile
 
 
-class SurfaceLevel(NamedTuple):
+class Level(NamedTuple):
     """One grid of `size` x `size` columns of cells, which wraps around; T = (size / 8)² tiles.
 
     `tags` (T, LAYERS) int32: the place of the world (0: none); `cells` (T, LAYERS) int64: a bit for each cell with hits;
@@ -60,9 +60,9 @@ class SurfaceLevel(NamedTuple):
 class SurfaceMap(NamedTuple):
     """Grids from fine to coarse that hold the same hits."""
 
-    fine: SurfaceLevel
-    middle: SurfaceLevel
-    coarse: SurfaceLevel
+    fine: Level
+    middle: Level
+    coarse: Level
 
 
 def empty_map(cell_m: float, cells: int = 2048) -> SurfaceMap:
@@ -70,10 +70,10 @@ def empty_map(cell_m: float, cells: int = 2048) -> SurfaceMap:
     return SurfaceMap(_level(cell_m, cells), _level(3 * cell_m, cells // 2), _level(9 * cell_m, cells // 4))
 
 
-def _level(cell_m: float, cells: int) -> SurfaceLevel:
+def _level(cell_m: float, cells: int) -> Level:
     # zeros are mapped lazily by the operating system: only pages that walls touch take memory
     tiles = (cells // 8) ** 2
-    return SurfaceLevel(
+    return Level(
         cell_m,
         cells,
         np.zeros((tiles, LAYERS), np.int32),
@@ -121,7 +121,7 @@ def _averaged(step: int, offset: float, inverse_n: float) -> int:
 
 
 @nb.njit(cache=True, nogil=True)
-def insert(level: SurfaceLevel, points_m: FloatArray, count_limit: float) -> None:
+def insert(level: Level, points_m: FloatArray, count_limit: float) -> None:
     """Average points, shape (N, 3), map frame, into their cells; beyond `count_limit` hits the mean forgets the oldest."""
     shift = int(round(math.log2(level.size)))
     inverse = 1.0 / level.cell_m
@@ -166,7 +166,7 @@ _lowest_bit: Any = intrinsic(_trailing_zeros)  # the place of the lowest bit tha
 
 
 @nb.njit(cache=True, nogil=True, inline="always")
-def _neighbours(level: SurfaceLevel, z: float, layered: bool) -> tuple[int, int]:
+def _neighbours(level: Level, z: float, layered: bool) -> tuple[int, int]:
     """Return the first and the last layer to look at: coarse cells serve distant walls, seen at many heights."""
     own = int(math.floor(z * _LAYERS_PER_M))
     if not layered:
@@ -186,7 +186,7 @@ def _within(tile_ix: int, tile_iy: int, cx: int, cy: int) -> int:
 
 
 @nb.njit(cache=True, nogil=True)
-def _gather(level: SurfaceLevel, x: float, y: float, z: float, layered: bool, sums: FloatArray) -> bool:
+def _gather(level: Level, x: float, y: float, z: float, layered: bool, sums: FloatArray) -> bool:
     """Add up the cells around (x, y, z) with Gaussian weights; False where there are none.
 
     `sums`, shape (8,), receives: weights, squared weights, x, y, z, xx, xy, yy about the point.
@@ -228,7 +228,7 @@ def _gather(level: SurfaceLevel, x: float, y: float, z: float, layered: bool, su
 
 @nb.njit(cache=True, nogil=True)
 def fit_line(
-    level: SurfaceLevel,
+    level: Level,
     at: tuple[float, float, float],
     layered: bool,
     wanted: tuple[float, float],

@@ -17,7 +17,7 @@ import numpy as np
 from lhdmap.evaluation.navigation.drive import STANDING_MPS
 from lhdmap.evaluation.navigation.path import Moment, WheelPath
 from lhdmap.geometry.articulated import T_rear_base
-from lhdmap.integration.self_filter import ScannerRig, body_poses, in_boxes, rig_of
+from lhdmap.integration.self_filter import Rig, body_poses, in_boxes, rig_of
 from lhdmap.machine import Machine
 from lhdmap.messages import Float32Array, FloatArray, LaserScan, Mount
 from lhdmap.scan_matching.scan_points import half_sweep_ns
@@ -54,7 +54,7 @@ class WallGauge:
 
     def __init__(self, path: WheelPath, machine: Machine, start_ns: int) -> None:
         self._path, self._machine, self._start_ns = path, machine, start_ns
-        self._rigs: dict[str, ScannerRig] = {}
+        self._rigs: dict[str, Rig] = {}
         self._blocks: deque[_Block] = deque()
         self._kept_at_m: dict[str, float] = {}
         self._last_ranges: dict[str, Float32Array] = {}
@@ -101,7 +101,7 @@ class WallGauge:
         while self._blocks and moment.travelled_m - self._blocks[0].travelled_m > self._length_m + _KEPT_MORE_M:
             self._blocks.popleft()
 
-    def _points(self, scan: LaserScan, rig: ScannerRig, moment: Moment) -> FloatArray:
+    def _points(self, scan: LaserScan, rig: Rig, moment: Moment) -> FloatArray:
         limits = np.array([scan.range_min_m, min(scan.range_max_m, _SEEN_M)])
         top_m = self._machine.dimensions.height_m + _OVER_M
         return _seen(
