@@ -41,7 +41,7 @@ def test_an_operator_is_added_once(tmp_path: Path, capsys: pytest.CaptureFixture
     [
         ((), "--new-operator"),
         (("--host", "0.0.0.0"), "--certificate"),  # noqa: S104  # that is what is refused
-        (("--host", "0.0.0.0", "--origin", "http://mine.example"), "--certificate"),  # noqa: S104
+        (("--host", "0.0.0.0", "--origin", "https://mine.example"), "--certificate"),  # noqa: S104
         (("--viewer", "javascript:alert(1)"), "--viewer"),
         (("--certificate", "x.pem"), "both or none"),
         (("--kept", "journal.jsonl"), "--check-audit"),
