@@ -37,7 +37,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--viewer", default="", metavar="URL", help="a Rerun web viewer that is shown beside the machines"
     )
-    parser.add_argument("--origin", default="", metavar="URL", help="address of the page behind a proxy")
+    parser.add_argument(
+        "--origin",
+        default="",
+        metavar="URL",
+        help="address of the page as browsers see it: behind a proxy, or by a name",
+    )
     parser.add_argument("--certificate", type=Path, metavar="FILE", help="TLS certificate (PEM) ...")
     parser.add_argument("--certificate-key", type=Path, metavar="FILE", help="... and its key")
     add_settings(parser, ["console"])

@@ -25,7 +25,7 @@ _PATIENCE_S = 10.0
 
 @dataclass(frozen=True, slots=True)
 class Listening:
-    """How a console is reached. `origin`: what browsers see where a proxy stands before it; certificate and its key: TLS here."""
+    """How a console is reached. `origin`: its address as browsers see it, where that is another; certificate and its key: TLS."""
 
     host: str = HOST
     port: int = PORT
@@ -45,10 +45,9 @@ class Listening:
         for file in (self.certificate, self.certificate_key):
             if file is not None and not file.is_file():
                 raise InputError(f"{file}: no such file")
-        if not _loopback(self.host) and self.certificate is None and not self.origin.startswith("https://"):
-            raise UsageError(
-                f"--host {self.host}: beyond this machine --certificate, or --origin https://… of a proxy, was wanted"
-            )
+        if not _loopback(self.host) and (self.certificate is None or not self.origin.startswith("https://")):
+            wanted = "--certificate, --certificate-key and --origin https://NAME:PORT"
+            raise UsageError(f"--host {self.host}: beyond this machine {wanted} were wanted")
 
     @property
     def url(self) -> str:

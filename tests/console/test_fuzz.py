@@ -77,7 +77,7 @@ def body(chance: random.Random, page: str) -> bytes:
     for _ in range(chance.randrange(1, 3)):
         name = chance.choice([*wish, "take", "name", "code", "more"])
         typed = chance.randrange(4, 99) if name == "number" else chance.choice(_WORDS)
-        wish[name] = typed if chance.random() < 0.5 and name in wish else value(chance)
+        wish[name] = typed if chance.random() < 0.8 and name in wish else value(chance)
     return json.dumps(wish).encode()[: chance.choice((10_000, 10_000, 25))] + chance.choice((b"", b"", b"}", b"\xff"))
 
 
@@ -98,15 +98,19 @@ def socket(served: Served, page: Page, chance: random.Random) -> None:
     """Say something bad on a socket: of a page that has no seat, or of a machine with the key."""
     machine = chance.random() < 0.5
     headers = {"Authorization": f"Bearer {served.key}"} if machine else {"Cookie": page.cookie, "Origin": served.url}
-    with contextlib.suppress(WebSocketException, OSError, TimeoutError):
-        path = "/machine" if machine else "/page"
-        with connect(
-            f"ws://127.0.0.1:{served.port}{path}", additional_headers=headers, proxy=None, open_timeout=5
-        ) as one:
-            for _ in range(3):
-                data = body(chance, page.number)
-                one.send(data if chance.random() < 0.3 else data.decode("utf-8", "replace"))
-            one.recv(timeout=0.01)
+    bad = [
+        body(chance, page.number) for _ in range(3)
+    ]  # drawn first: when the other side closes is no matter of the seed
+    texts = [data if chance.random() < 0.3 else data.decode("utf-8", "replace") for data in bad]
+    path = "/machine" if machine else "/page"
+    address = f"ws://127.0.0.1:{served.port}{path}"
+    with (
+        contextlib.suppress(WebSocketException, OSError, TimeoutError),
+        connect(address, additional_headers=headers, proxy=None, open_timeout=5) as one,
+    ):
+        for text in texts:
+            one.send(text)
+        one.recv(timeout=0.01)
 
 
 def fuzz(served: Served, count: int, seed: int) -> tuple[Counter[int], list[dict[str, Any]]]:
