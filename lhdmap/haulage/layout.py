@@ -31,7 +31,8 @@ class Point(NamedTuple):
 class Edge(NamedTuple):
     """A way from a point to another. `line_m` (N, 2+): its path; `gives_way`: its turn crosses the opposing lane.
 
-    `node`: what the map calls the place that it lies in; `reverse_from_m`: from there on in reverse (a dock), inf: never.
+    `node`: what the map calls the place that it lies in; `section`: of traffic, empty: the node is one; `reverse_from_m`: from
+    there on in reverse (a dock), inf: never.
     """
 
     start: str
@@ -44,6 +45,12 @@ class Edge(NamedTuple):
     line_m: FloatArray | None = None
     speed_kmh: float = 0.0
     reverse_from_m: float = np.inf
+    section: str = ""
+
+    @property
+    def held(self) -> str:
+        """What one machine holds at a time to be on it."""
+        return self.section or self.node
 
 
 @dataclass(frozen=True)
