@@ -7,7 +7,7 @@ Sections of draw points, dumps and parks stay alone: others have to pass them.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from itertools import groupby
 
@@ -18,12 +18,12 @@ from lhdmap.navigation.hold import beyond_of
 from lhdmap.navigation.leg import Leg
 from lhdmap.topology.model import TopologicalMap
 
-LegsOf = Callable[[str, str], Sequence[Leg]]
-"""Legs that navigation drives from a point of the map to another."""
+Drives = Mapping[tuple[str, str], Sequence[Leg]]
+"""Legs that navigation drives, by where from and where to."""
 
 
 def with_sections(
-    layout: Layout, topology: TopologicalMap, errands: Mapping[str, Errand], legs_of: LegsOf, least_m: float
+    layout: Layout, topology: TopologicalMap, errands: Mapping[str, Errand], drives: Drives, least_m: float
 ) -> Layout:
     """Return the layout with the sections of its edges named; `least_m`: shorter ones are joined to the next on a way.
 
@@ -32,18 +32,18 @@ def with_sections(
     """
     works = {layout.edges[layout.entering[point][0]].node for errand in errands.values() for point in errand}
     joined = _Joined(works, layout.ids)
-    ways = list(dict.fromkeys(pair for errand in errands.values() for pair in _pairs(errand)))
-    for start, goal in ways:
-        for leg in legs_of(start, goal):
+    for (start, goal), legs in drives.items():
+        for leg in legs:
             arm = beyond_of(topology, leg) if leg.inversion else ""
             if arm:
                 joined.join(leg.targets[-1].node, arm, f"from {start} to {goal} machines change gear")
-    for start, goal in ways:
+    for start, goal in drives:
         _join_short(joined, _edges(layout, start, goal), least_m)
     return replace(layout, edges=tuple(edge._replace(section=joined.name(edge.node)) for edge in layout.edges))
 
 
-def _pairs(errand: Errand) -> list[tuple[str, str]]:
+def ways_of(errand: Errand) -> list[tuple[str, str]]:
+    """Return where a machine drives from and to on its errand."""
     return [
         (errand.park, errand.load),
         (errand.load, errand.dump),

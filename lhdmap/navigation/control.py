@@ -10,7 +10,7 @@ planning -> driving -> resting (a change of gear) -> driving … -> arrived
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Iterator
 from typing import Any
 
 import numpy as np
@@ -56,6 +56,9 @@ class NavigationControl:
         self.leg = 0
         self.may_move = True  # whether the machine is armed: one that is not does not move, and is not stuck
         self.closed: tuple[str, ...] = ()
+        self.avoid: tuple[
+            str, ...
+        ] = ()  # nodes (ids) that routes touch only where they begin or end: others come there
         self.free: Collection[str] | None = None  # nodes (ids) that may be entered; None: all
         self._target = 0
         self._since_ns = 0
@@ -92,7 +95,7 @@ class NavigationControl:
         if not begins:
             self._ask("no route: there is no point of the map near")
             return
-        errand = Errand(self.goal, float(located.pose_map[2]), self.closed)
+        errand = Errand(self.goal, float(located.pose_map[2]), (*self._avoided(begins), *self.closed))
         body = Reach(self._nose_m, self._tail_m, settings.room_m)
         begin, route = best_begin(begins, lambda point: route_from(self._planner, point, errand, body))
         if not route.feasible:
@@ -111,6 +114,11 @@ class NavigationControl:
             return
         told = {"legs": len(self.legs), "distance_m": route.distance_m, "gear": self.legs[0].gear, "begin": begin.point}
         self._goes(DRIVING, "route", goal=self.goal, **told)
+
+    def _avoided(self, begins: list[Begin]) -> Iterator[str]:
+        points, goal = self._planner.topology.points, self._planner.topology.called(self.goal)
+        ends = {points[one.point].node for one in begins} | {getattr(goal, "node", "")}
+        return (node for node in self.avoid if node not in ends)
 
     def step(self, now_ns: int, motion: Motion, located: Located) -> Directive | None:
         """Return the directive of now."""

@@ -11,7 +11,7 @@ from lhdmap.driving.bodies import bodies_of
 from lhdmap.driving.model import drive_model
 from lhdmap.errors import UsageError
 from lhdmap.haulage.fleet import Fleet, Member
-from lhdmap.haulage.joining import with_sections
+from lhdmap.haulage.joining import ways_of, with_sections
 from lhdmap.haulage.layout import Layout, checked
 from lhdmap.haulage.machine import Errand
 from lhdmap.haulage.mission_io import Buckets
@@ -32,10 +32,11 @@ _OUT_M = 1.0  # a section is given back so far after the rear has left it
 
 
 class Job(NamedTuple):
-    """What a machine of a fleet is to do, and the fleet's word on it."""
+    """What a machine of a fleet is to do, the fleet's word on it, and the nodes (ids) in which others work or park."""
 
     task: Member
     orders: Sequence[Buckets]
+    avoid: tuple[str, ...]
 
 
 class CrewMission(NamedTuple):
@@ -59,10 +60,9 @@ def crew_mission(scenario: Scenario, crew: Mapping[str, Parts]) -> CrewMission:
     planner = RoutePlanner(topology, parts.settings.movement)
 
     def legs(start: str, goal: str) -> list[Leg]:
-        begin = _waypoint(topology, start)
-        route = route_from(
-            planner, begin.id, Way(goal, float(begin.pose[3]), ()), Reach(nose_m, tail_m, navigation.room_m)
-        )
+        begin, end = _waypoint(topology, start), _waypoint(topology, goal)
+        way = Way(goal, float(begin.pose[3]), tuple(node for node in avoid if node not in (begin.node, end.node)))
+        route = route_from(planner, begin.id, way, Reach(nose_m, tail_m, navigation.room_m))
         if not route.feasible:
             raise UsageError(f"mission: {route.reason}")
         return legs_of(topology, route, model.wheelbase_m, nose_m, navigation)
@@ -70,12 +70,13 @@ def crew_mission(scenario: Scenario, crew: Mapping[str, Parts]) -> CrewMission:
     parks = dict(zip(crew, (one.park for one in crew.values()), strict=True))
     wanted = errands_of(scenario, list(crew))
     errands = {name: Errand(ones[0].source, ones[0].to, parks[name]) for name, ones in wanted.items()}
-    layout = checked(layout_of_map(topology, scenario.mine))
+    avoid = tuple(sorted({_waypoint(topology, point).node for errand in errands.values() for point in errand}))
+    drives = {way: legs(*way) for errand in errands.values() for way in ways_of(errand)}
     least_m = tail_m + _OUT_M + tail_m + ROOM_M  # in reverse the rear is ahead of `base_link` by so much
-    layout = with_sections(layout, topology, errands, legs, least_m)
+    layout = with_sections(checked(layout_of_map(topology, scenario.mine)), topology, errands, drives, least_m)
     fleet = Fleet(layout, errands, parts.settings.haulage, tail_m + _OUT_M)
     orders = {name: [Buckets(one.source, one.to, one.buckets) for one in ones] for name, ones in wanted.items()}
-    return CrewMission({name: Job(fleet.member(name), orders[name]) for name in crew}, layout)
+    return CrewMission({name: Job(fleet.member(name), orders[name], avoid) for name in crew}, layout)
 
 
 def section_watch(given: CrewMission, crew: Mapping[str, Parts], scribe: Scribe) -> SectionWatch:
