@@ -55,13 +55,17 @@ class Edge(NamedTuple):
 
 @dataclass(frozen=True)
 class Layout:
-    """Points and edges; `roles`: what is done in each area (`load`, `dump`, …); `ids`: names of nodes by the map's ids."""
+    """Points and edges; `roles`: what is done in each area (`load`, `dump`, …); `ids`: names of nodes by the map's ids.
+
+    `aprons`: corners (N, 2) of the ground of areas, where they are known.
+    """
 
     name: str
     points: tuple[Point, ...]
     edges: tuple[Edge, ...]
     roles: dict[str, str] = field(default_factory=dict)
     ids: dict[str, str] = field(default_factory=dict)
+    aprons: dict[str, FloatArray] = field(default_factory=dict)
 
     @cached_property
     def point(self) -> dict[str, Point]:

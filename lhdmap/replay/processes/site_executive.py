@@ -8,9 +8,11 @@ from collections.abc import Iterator, Sequence
 from lhdmap.haulage.mission_io import Buckets, MissionInput, MissionOutput, Navigation, Report
 from lhdmap.replay.journal import Scribe
 from lhdmap.replay.process import (
+    MACHINE_SAYS,
     MILLISECOND_NS,
     NAVIGATING,
     SITE_POSE,
+    STATION_SAYS,
     WORK,
     Outgoing,
     Process,
@@ -19,16 +21,20 @@ from lhdmap.replay.process import (
 from lhdmap.replay.processes.executive import EXECUTIVE
 from lhdmap.replay.processes.order_book import OrderBook, Task
 from lhdmap.replay.processes.site_driver import BLOCKED
-from lhdmap.replay.processes.told import Navigating, Orders, WorkNow
+from lhdmap.replay.processes.told import Health, Navigating, Orders, WorkNow
 
+_MODE = "autonomous"
 _STEP_M = 0.5  # of the odometer: less is noise of the pose
 
 
 class SiteExecutive(Process):
-    """Each 100 ms the mission task is told what is, and its outputs become orders."""
+    """Each 100 ms the mission task is told what is, and its outputs become orders.
+
+    The station hears what help is asked for, and answers; after a `go on` the drive is begun anew from where the machine is.
+    """
 
     name, period_ns, latency_ns, priority = EXECUTIVE, 100 * MILLISECOND_NS, 5 * MILLISECOND_NS, 15
-    reads = (SITE_POSE, NAVIGATING, WORK)
+    reads = (SITE_POSE, NAVIGATING, WORK, STATION_SAYS)
 
     def __init__(self, task: Task, orders: Sequence[Buckets], full_t: float, scribe: Scribe) -> None:
         self.task, self._buckets, self._full_t, self._book = task, tuple(orders), full_t, OrderBook(scribe)
@@ -37,6 +43,7 @@ class SiteExecutive(Process):
         self._navigating: Navigating | None = None
         self._work: WorkNow | None = None
         self._orders, self._key = Orders(0, 0, "", loaded=False), ("", False)
+        self._go_on = self._gave_up = False
 
     def step(self, now_ns: int, inbox: Sequence[Received]) -> Iterator[Outgoing]:
         """Take what has come; give orders, and each cycle that has ended."""
@@ -45,8 +52,12 @@ class SiteExecutive(Process):
         if self._pose is None:
             return
         out = self.task.update(self._told(now_ns))
+        if self._go_on and out.asks:
+            self._key = ("", out.loaded)
+        self._go_on = False
         self._orders = self._ordered(now_ns, out)
         yield from self._book.say(now_ns, out, self._orders, self._odometer_m)
+        yield Outgoing(MACHINE_SAYS, Health(now_ns, True, _MODE, bool(out.asks), (), out.asks))
 
     def _told(self, now_ns: int) -> MissionInput:
         told, orders, work = self._navigating, self._orders, self._work
@@ -70,6 +81,8 @@ class SiteExecutive(Process):
             dumping=dumping,
             obstacle=blocked,
             orders=self._buckets,
+            abort=self._gave_up,
+            answer="go_on" if self._go_on else "",
         )
 
     def _ordered(self, now_ns: int, out: MissionOutput) -> Orders:
@@ -85,7 +98,10 @@ class SiteExecutive(Process):
 
     def _take(self, received: Received) -> None:
         topic, _, message = received
-        if topic == NAVIGATING:
+        if topic == STATION_SAYS:
+            self._go_on |= bool(message.go_on)
+            self._gave_up |= bool(message.gave_up)
+        elif topic == NAVIGATING:
             self._navigating = message
         elif topic == WORK:
             self._work = message
