@@ -89,12 +89,14 @@ class Judges:
         whole["max_speed_kmh"] = max(one["max_speed_kmh"] for one in ones)
         whole["mean_speed_kmh"] = 3.6 * whole["distance_m"] / max(duration_s * len(ones), 1e-9)
         phases = sorted({name for one in ones for name in one.get("time_by_phase_s", {})})
-        whole["time_by_phase_s"] = {name: sum(one["time_by_phase_s"].get(name, 0.0) for one in ones) for name in phases}
+        whole["time_by_phase_s"] = {
+            name: sum(one.get("time_by_phase_s", {}).get(name, 0.0) for one in ones) for name in phases
+        }
         whole["sections_shared"] = list(self._shared)
         whole["machines"] = [
             {"machine": name}
             | {key: one[key] for key in _OWN if key in one}
-            | {"contacts": len(one["contacts"]), "time_by_phase_s": one["time_by_phase_s"]}
+            | {"contacts": len(one["contacts"]), "time_by_phase_s": one.get("time_by_phase_s", {})}
             for name, one in each.items()
         ]
         return whole

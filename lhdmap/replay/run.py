@@ -15,10 +15,11 @@ from lhdmap.logs.writer import LogWriter
 from lhdmap.pipeline.interruption import Interruption
 from lhdmap.replay.assemble import Run, Watchers, assemble, parts_of
 from lhdmap.replay.crew_parts import FIRST
-from lhdmap.replay.journal import Journal
+from lhdmap.replay.journal import Event, Journal, Listener
 from lhdmap.replay.mission_tally import MissionTally
-from lhdmap.replay.namespace import only
+from lhdmap.replay.namespace import machine_of, only, role_of
 from lhdmap.replay.parts import Parts
+from lhdmap.replay.processes.executive import EXECUTIVE
 from lhdmap.replay.processes.film import Film
 from lhdmap.replay.processes.film_drive import DriveFilm
 from lhdmap.replay.processes.film_load import LoadFilm
@@ -101,7 +102,7 @@ class _Replay:
     def run(self, interruption: Interruption) -> dict[str, Any]:
         """Run, write all files, return the verdict."""
         journal = Journal(self._folder.path / JOURNAL)
-        journal.listeners += [self._timeline, only("", self._stops)]
+        journal.listeners += [_shown_of(self._timeline), only("", self._stops)]
         with ExitStack() as open_files:
             open_files.callback(journal.close)
             log = open_files.enter_context(LogWriter(self._folder.path / LOG))
@@ -189,7 +190,18 @@ class _Replay:
             f"Replay {self._request.name}", verdict, rows, START_NS, self._timeline.changes,
             self._parts.lines_m, film.believed_m(), self._parts.goal_m, made, scenario_toml(scenario),
             warnings if left_out else (), drive, self._stops.rows(), None if film.load is None else film.load.data(),
+            {name: one.series.rows() for name, one in self._others.items()},
         )  # fmt: skip
+
+
+def _shown_of(timeline: Timeline) -> Listener:
+    """Return a listener that is told of the first machine's events, and of the missions of the others."""
+
+    def listen(event: Event) -> None:
+        if not machine_of(event.process) or role_of(event.process) == EXECUTIVE:
+            timeline(event)
+
+    return listen
 
 
 def _space(name: str) -> str:

@@ -35,6 +35,10 @@ def plan_chart(data: ReplayData) -> Figure:
         axes.plot(line[:, 0], line[:, 1], color=charts.INK, linewidth=0.6, alpha=0.35)
     if data.drive is not None:
         draw_drive(axes, data.drive)
+    for (name, others), colour in zip(data.others.items(), _SHADES[3:], strict=False):
+        if len(others):
+            rows = charts.thinned(len(others))
+            axes.plot(others[rows, 1], others[rows, 2], color=colour, linewidth=1.2, label=f"true path of {name}")
     rows = charts.thinned(len(way))
     axes.plot(way[rows, 0], way[rows, 1], color=charts.FINAL, label="true path")
     if len(data.believed_m):

@@ -173,7 +173,7 @@ def test_a_machine_among_others_is_told_where_it_may_be() -> None:
         task, [], map_of_plan("cycle"), 10.0, Journal().of("mission"), free=lambda: frozenset({"T1.1", "I1"})
     )
     orders = Bench(made, task, []).orders(TO_LOAD, (LOCATED, located()), (MACHINE_SAYS, HEALTH))
-    assert orders.free == {"T1.1", "I1"}
+    assert orders.free == frozenset({"T1.1", "I1"})
 
 
 @pytest.mark.parametrize("bench", ["underground", "surface"])
