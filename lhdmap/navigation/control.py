@@ -10,7 +10,7 @@ planning -> driving -> resting (a change of gear) -> driving … -> arrived
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Collection, Iterator
+from collections.abc import Callable, Collection
 from typing import Any
 
 import numpy as np
@@ -23,7 +23,7 @@ from lhdmap.guidance.directive import WAY, Directive, moved
 from lhdmap.messages import FloatArray
 from lhdmap.movement.routes import RoutePlanner
 from lhdmap.navigation.along import Located, along_m, on_map, part_of
-from lhdmap.navigation.begin import Begin, Errand, Reach, begins_at, best_begin, route_from
+from lhdmap.navigation.begin import Begin, Errand, Reach, begins_at, best_begin, passed_by, route_from
 from lhdmap.navigation.goals import Approach, overrun, reached
 from lhdmap.navigation.hold import ROOM_M, hold_of
 from lhdmap.navigation.leg import Leg, legs_of
@@ -95,7 +95,9 @@ class NavigationControl:
         if not begins:
             self._ask("no route: there is no point of the map near")
             return
-        errand = Errand(self.goal, float(located.pose_map[2]), (*self._avoided(begins), *self.closed))
+        errand = Errand(
+            self.goal, float(located.pose_map[2]), (*passed_by(topology, self.avoid, begins, self.goal), *self.closed)
+        )
         body = Reach(self._nose_m, self._tail_m, settings.room_m)
         begin, route = best_begin(begins, lambda point: route_from(self._planner, point, errand, body))
         if not route.feasible:
@@ -114,11 +116,6 @@ class NavigationControl:
             return
         told = {"legs": len(self.legs), "distance_m": route.distance_m, "gear": self.legs[0].gear, "begin": begin.point}
         self._goes(DRIVING, "route", goal=self.goal, **told)
-
-    def _avoided(self, begins: list[Begin]) -> Iterator[str]:
-        points, goal = self._planner.topology.points, self._planner.topology.called(self.goal)
-        ends = {points[one.point].node for one in begins} | {getattr(goal, "node", "")}
-        return (node for node in self.avoid if node not in ends)
 
     def step(self, now_ns: int, motion: Motion, located: Located) -> Directive | None:
         """Return the directive of now."""

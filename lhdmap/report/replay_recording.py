@@ -1,7 +1,8 @@
 """A replay in a Rerun recording, written while it goes on: machine, newest scan, curves, events as texts, states as steps.
 
 Entities: `map/base_link/…` (the machine as it truly is), `map/scan/…`, `map/walls`, `map/path/…`, `motion/…`, `state/…`, `log`; of
-a machine that drives itself (`map/lhd2/…` are other machines of a crew) `map/topology/…`, `map/route/…` (its legs), `map/plan/horizon` (what guidance predicts), `place/…`.
+a machine that drives itself `map/topology/…`, `map/route/…` (its legs), `map/plan/horizon` (what guidance predicts), `place/…`; of
+other machines of a crew `map/lhd2/base_link/…`.
 """
 
 from __future__ import annotations
