@@ -10,7 +10,7 @@ import pytest
 from lhdmap.executor.notes import Note
 from lhdmap.guidance.directive import Directive, path_of
 from lhdmap.loading.assistance import ABORT, GO_ON, Request
-from lhdmap.loading.moment import LoadingInput, LoadingOutput, Target
+from lhdmap.loading.moment import LoadingInput, LoadingOutput, Mission, Target
 from lhdmap.loading.signals import Pedals
 from lhdmap.loading.states import State
 from lhdmap.loading.task import LoadingTask
@@ -96,8 +96,7 @@ def test_without_orders_the_machine_is_not_its_own() -> None:
 def test_with_orders_navigation_goes_through_it() -> None:
     bench, asked = Bench(None), way()
     said = bench.turn(LOOKS._replace(directive=asked), orders(3), (APPROACH, Asked(START_NS, asked, "driving")))
-    assert bench.heard().mission is not None
-    assert bench.heard().mission.number == 3
+    assert bench.heard().mission == Mission(3)
     assert bench.heard().approach is asked
     directive = said[DIRECTIVE].message
     assert (directive.directive.stamp_ns, directive.cause) == (bench.now_ns, State.IDENTIFICATION.value)
@@ -134,7 +133,9 @@ def test_an_answer_names_the_open_request(word: dict[str, Any], kind: str) -> No
     assert said[LOADING].message.request == request
     bench.turn(LOOKS, (STATION_SAYS, Word(START_NS, **word)))
     assert bench.heard().answer is not None
-    assert (bench.heard().answer.number, bench.heard().answer.kind) == (4, kind)
+    answer = bench.heard().answer
+    assert answer is not None
+    assert (answer.number, answer.kind) == (4, kind)
     bench.turn(LOOKS)
     assert bench.heard().answer is None  # once
 
@@ -159,8 +160,7 @@ def test_on_a_taught_way_the_mission_begins_once_the_pose_has_held_for_a_second(
     assert turns.index(True) * TICK_NS * 1e-9 == pytest.approx(1.0, abs=0.05)
     x, y = draw_point_of(taught)
     assert (x, y) == pytest.approx((float(taught.path[-1, 0]) + 7.5, 0.0))
-    assert bench.heard().mission is not None
-    assert bench.heard().mission.draw_point_m == pytest.approx((x, y))
+    assert bench.heard().mission == Mission(1, (x, y))
     assert bench.turn(LoadingOutput(State.DONE))[MISSION].message.text == "done"
 
 
