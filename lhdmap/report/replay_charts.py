@@ -28,7 +28,8 @@ _SHADES = (charts.FINAL, charts.ODOMETRY, charts.TRUTH, charts.FLAGGED, charts.W
 def plan_chart(data: ReplayData) -> Figure:
     """Draw walls, true path, what perception believed, start, end, goal, contacts and where faults began."""
     way = data.rows[:, 1:4]
-    whole = np.vstack([way, *data.lines_m]) if data.drive is None else extent_m(data.drive, way)
+    ways = np.vstack([way, *(rows[:, 1:4] for rows in data.others.values())])
+    whole = np.vstack([ways, *data.lines_m]) if data.drive is None else extent_m(data.drive, ways)
     figure = charts.new_figure(charts.plan_height_in(whole, least=3.0) + _LEGEND_ROW_IN)
     axes = figure.add_subplot()
     for line in data.lines_m:
