@@ -37,6 +37,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_output(parser, "folder to make (default: SCENARIO_run here)", "RUN")
     add_settings(parser)
     parser.add_argument("--seed", type=int, metavar="N", help="over the scenario's; same seed, same journal to the bit")
+    parser.add_argument(
+        "--machines",
+        type=int,
+        choices=(1, 2, 3),
+        metavar="N",
+        help="over the scenario's: machines of a mission, 1 to 3",
+    )
     parser.add_argument("--view", action="store_true", help="follow the run in Rerun: a window, or a page without one")
     add_operator(parser)
     parser.add_argument("--no-truth", action="store_true", help="no /ground_truth/odometry in run.mcap")
@@ -62,7 +69,8 @@ def run(arguments: argparse.Namespace, console: Console) -> int:
     if arguments.seed is not None and arguments.seed < 0:
         raise UsageError(f"--seed {arguments.seed}: 0 or more was wanted")
     path = find_scenario(arguments.scenario)
-    scenario = load_scenario(path, **({} if arguments.seed is None else {"seed": arguments.seed}))
+    over = {"seed": arguments.seed, "machines": arguments.machines}
+    scenario = load_scenario(path, **{key: value for key, value in over.items() if value is not None})
     target = arguments.output or Path(f"{path.stem}_run")
     free_folder(target, force=arguments.force, inputs=[path])
     if arguments.operator != "script":
@@ -106,6 +114,7 @@ def verdict_text(values: Mapping[str, Any]) -> str:
         f"{'lane ' if values['kind'] == 'haulage' else 'walls'}        {len(values['contacts'])} contacts"
         + ("" if near is None else f", never nearer than {near:.2f} m"),
         *_haulage_lines(values),
+        *_crew_lines(values),
         *([f"faults       {len(values['faults'])} injected"] if values["faults"] else []),
         f"journal      {values['journal_sha256'][:16]}…, {values['realtime_factor']:.1f} x real time",
     ]
@@ -120,6 +129,16 @@ def _haulage_lines(values: Mapping[str, Any]) -> list[str]:
         f"loads        {values['cycles']}, {values['tonnes']:.1f} t",
         f"both bodies  off by {values['sum_rms_m']:.3f} m rms, {values['sum_max_m']:.2f} m at most; {used}",
     ]
+
+
+def _crew_lines(values: Mapping[str, Any]) -> list[str]:
+    if "machines" not in values:
+        return []
+    lines = [
+        f"{one['machine']:<12} {one['cycles']} buckets, {one['tonnes']:.1f} t, {one['distance_m']:.0f} m, {one['reason']}"
+        for one in values["machines"]
+    ]
+    return [*lines, f"sections     {len(values['sections_shared'])} times shared by two machines"]
 
 
 def _grizzly_lines(values: Mapping[str, Any]) -> list[str]:

@@ -157,6 +157,9 @@ class Parts:
         autonomous: what a machine that drives itself is given; None: nobody does, or the operator.
         haulage: what a machine on a surface site is given; None: it is in a mine.
         attendant: who attends the machine, at a console or a terminal; None: the script does.
+        park: of a machine of a crew: where it stands at first, and goes when nothing is left.
+        T_mine_map: where the map's frame began in the mine's grid (4,: x, y, z, yaw), for those who judge by the truth.
+        crew: the parts of all machines by name, this one first; empty: there is one.
     """
 
     machine: Machine
@@ -177,3 +180,6 @@ class Parts:
     autonomous: Autonomous | None = None
     haulage: Haulage | None = None
     attendant: Attendant | None = None
+    crew: Mapping[str, Parts] = field(default_factory=dict)
+    park: str = ""
+    T_mine_map: FloatArray | None = None

@@ -70,6 +70,11 @@ def _start(topology: TopologicalMap, name: str) -> tuple[str, FloatArray]:
     return "", poses_in(topology, found.id)
 
 
+def start_on(topology: TopologicalMap, name: str) -> FloatArray:
+    """Return poses (4,) or (N, 4) on the map that a machine at a place begins with."""
+    return _start(topology, name)[1]
+
+
 def _known(topology: TopologicalMap, name: str, key: str) -> object:
     found = topology.called(name)
     if found is None:

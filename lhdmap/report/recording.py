@@ -206,18 +206,20 @@ class RecordingWriter:
         self.add_joint(stamps_ns, angles_rad, machine)
         self._boxes("map/base_link/rear_link/rear_body", machine.boxes("rear_link"))
 
-    def add_bodies(self, machine: Machine) -> None:
+    def add_bodies(self, machine: Machine, entity: str = "map/base_link") -> None:
         """Record the boxes of both bodies; their poses come with `add_moving` and `add_joint`."""
-        self._boxes("map/base_link/front_body", machine.boxes("base_link"))
-        self._boxes("map/base_link/rear_link/rear_body", machine.boxes("rear_link"))
+        self._boxes(f"{entity}/front_body", machine.boxes("base_link"))
+        self._boxes(f"{entity}/rear_link/rear_body", machine.boxes("rear_link"))
 
-    def add_joint(self, stamps_ns: Stamps, angles_rad: FloatArray, machine: Machine) -> None:
+    def add_joint(
+        self, stamps_ns: Stamps, angles_rad: FloatArray, machine: Machine, entity: str = "map/base_link"
+    ) -> None:
         """Record how the rear body stands to the front one, by joint angles (M,)."""
         front_m, rear_m = machine.dimensions.joint_to_front_axle_m, machine.dimensions.joint_to_rear_axle_m
         x, y = -front_m - rear_m * np.cos(angles_rad), rear_m * np.sin(angles_rad)
         zero = np.zeros(len(x))
         quaternions = np.column_stack([zero, zero, np.sin(-angles_rad / 2), np.cos(-angles_rad / 2)])
-        self.add_moving("map/base_link/rear_link", stamps_ns, np.column_stack([x, y, zero]), quaternions)
+        self.add_moving(f"{entity}/rear_link", stamps_ns, np.column_stack([x, y, zero]), quaternions)
 
     def add_cloud(self, cloud: GridCloud) -> None:
         """Record the cloud in parts, each from the time on at which its points were first measured."""

@@ -1,7 +1,8 @@
 """A replay in a Rerun recording, written while it goes on: machine, newest scan, curves, events as texts, states as steps.
 
 Entities: `map/base_link/…` (the machine as it truly is), `map/scan/…`, `map/walls`, `map/path/…`, `motion/…`, `state/…`, `log`; of
-a machine that drives itself `map/topology/…`, `map/route/…` (its legs), `map/plan/horizon` (what guidance predicts), `place/…`.
+a machine that drives itself `map/topology/…`, `map/route/…` (its legs), `map/plan/horizon` (what guidance predicts), `place/…`; of
+other machines of a crew `map/lhd2/base_link/…`.
 """
 
 from __future__ import annotations
@@ -112,6 +113,7 @@ class ReplayRecording:
         """
         if data is not None:
             self._add_paths(data)
+            self._add_others(data)
             self._add_states(data)
         if data is not None and data.drive is not None:
             self._add_drive(data.drive)
@@ -131,6 +133,18 @@ class ReplayRecording:
             points = rr.Points3D(spots, colors=_RED, radii=rr.Radius.ui_points(6.0))
             self._writer.add_shape("map/contacts", points)
             self._writer.explain("red points", "contacts")
+
+    def _add_others(self, data: ReplayData) -> None:
+        """Record the bodies of the other machines of a crew as they moved, and their paths."""
+        for (name, rows), rgba in zip(data.others.items(), (_PINK, _GREEN, _RED), strict=False):
+            if not len(rows):
+                continue
+            entity = f"map/{name}/base_link"
+            stamps = self._start_ns + np.round(1e9 * rows[:, 0]).astype(np.int64)
+            self._writer.add_bodies(self._machine, entity)
+            self._writer.add_moving(entity, stamps, rows[:, 1:4], _quaternions(rows, np.zeros((len(rows), 2))))
+            self._writer.add_joint(stamps, rows[:, COLUMNS.index("articulation_rad")], self._machine, entity)
+            self._writer.add_path(name, _trajectory(rows[:, 1:4]), PathStyle(f"path of {name}", "thin", rgba, 0.75))
 
     def _add_drive(self, drive: DriveData) -> None:
         """Record the map where it fits best, the legs that were asked for, and by how much the place on the map was off."""
