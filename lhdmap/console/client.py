@@ -11,6 +11,7 @@ from typing import Any, NamedTuple
 from lhdmap.console.codec import decode, encode
 from lhdmap.console.messages import CONSOLE_SAYS, Asked, Hello, Message, Plan, Tick
 from lhdmap.console.outbox import Outbox
+from lhdmap.extras import library
 
 _AGAIN_S, _OPEN_S, _MOST_BYTES = 0.5, 5.0, 65_536
 PATH = "/machine"
@@ -79,18 +80,18 @@ class Client:
 
     async def _stay(self) -> None:
         """Connect, and connect again."""
-        from websockets.exceptions import WebSocketException
+        failed = library("websockets.exceptions").WebSocketException
 
         while True:
             try:
                 await self._once()
                 self.why = "the console has closed the connection"
-            except (OSError, WebSocketException, TimeoutError) as error:
+            except (OSError, failed, TimeoutError) as error:
                 self.why = str(error).partition(";")[0] or type(error).__name__
             await asyncio.sleep(_AGAIN_S)
 
     async def _once(self) -> None:
-        from websockets.asyncio.client import connect
+        connect = library("websockets.asyncio.client").connect
 
         address = self.address.url.replace("http", "ws", 1).rstrip("/") + PATH
         headers = {"Authorization": f"Bearer {self.address.key}"}

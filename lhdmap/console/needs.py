@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-import importlib.util
+from lhdmap.errors import InstallationError
+from lhdmap.extras import is_installed
 
-from lhdmap.errors import UsageError
-
-_PACKAGES = ("starlette", "uvicorn", "websockets", "pyotp")
+_LIBRARIES = ("starlette", "uvicorn", "websockets", "pyotp")
 
 
 def check_installed(what: str) -> None:
-    """Raise UsageError with the line that installs what is missing; `what` needs it."""
-    missing = [name for name in _PACKAGES if importlib.util.find_spec(name) is None]
+    """Raise InstallationError with the line that installs what is missing; `what` needs it."""
+    missing = [name for name in _LIBRARIES if not is_installed(name)]
     if missing:
-        verb = "which is" if len(missing) == 1 else "which are"
-        raise UsageError(f"{what} needs {', '.join(missing)}, {verb} not installed: pip install 'lhdmap[console]'")
+        raise InstallationError(f"{what}: not installed: {', '.join(missing)}; pip install 'lhdmap[console]'")

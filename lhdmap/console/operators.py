@@ -13,6 +13,7 @@ from typing import Any
 
 from lhdmap.console.settings import ConsoleSettings
 from lhdmap.errors import InputError, UsageError
+from lhdmap.extras import library
 
 FILE, KEY_FILE, AUDIT_FILE = "operators.json", "machine.key", "audit.jsonl"
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9 ._-]{0,39}")
@@ -40,7 +41,7 @@ class Operators:
         Raises:
             UsageError: the name is taken, or none.
         """
-        import pyotp
+        pyotp = library("pyotp")
 
         if not _NAME.fullmatch(name):
             raise UsageError(f"'{name}': a name of letters, digits, spaces and . _ - was wanted")
@@ -53,7 +54,7 @@ class Operators:
 
     def accepts(self, name: str, code: str, now_s: float) -> bool:
         """Return whether a code is that of an operator now, and later than the last one that he used."""
-        import pyotp
+        pyotp = library("pyotp")
 
         entry = self._table.get(name)
         totp = pyotp.TOTP(pyotp.random_base32() if entry is None else entry["secret"])
