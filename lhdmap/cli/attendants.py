@@ -54,7 +54,9 @@ def attendant_of(
     elif arguments.operator == _TERMINAL:
         from lhdmap.cli.operator import TerminalAttendant
 
-        yield TerminalAttendant(input, console.note)
+        if console.quiet:
+            raise UsageError("--quiet and --operator terminal: a terminal asks; one of them was wanted")
+        yield TerminalAttendant(console.ask, console.note)
     elif kind == _CONSOLE:
         with _linked(arguments, name, url or _URL, settings, console) as link:
             yield link

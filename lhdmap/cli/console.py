@@ -36,6 +36,11 @@ class Console:
         if not self.quiet:
             print(shown(text), file=sys.stderr)
 
+    def ask(self, prompt: str) -> str:
+        """Return a line that is typed after a prompt on standard error; raises EOFError where there is none any more."""
+        print(shown(prompt), end="", file=sys.stderr, flush=True)
+        return input()
+
     def warn(self, text: str) -> None:
         """Print a warning once."""
         if text not in self._warned:

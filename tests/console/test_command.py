@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import builtins
 import importlib.util
+import io
 import json
 import signal
 import socket
@@ -13,6 +14,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from lhdmap.cli.console import Console
 from lhdmap.cli.main import main
 
 EXTRA = all(importlib.util.find_spec(name) for name in ("starlette", "uvicorn", "websockets", "pyotp"))
@@ -128,6 +130,7 @@ def test_what_is_not_installed_is_told_with_the_line_that_installs_it(
         (("ring_manual", "--operator", "terminal"), 2, "nobody asks"),
         (("grizzly_twelve", "--operator", "terminal"), 2, "nobody asks"),
         (("tram_short", "--view-port", "9000"), 2, "--view"),
+        (("tram_short", "--operator", "terminal", "--quiet"), 2, "a terminal asks"),
     ],
 )
 def test_an_operator_that_cannot_be_is_refused(
@@ -158,3 +161,11 @@ def test_a_console_that_does_not_answer_is_told(
     exit_code, told = said(capsys, *words)
     assert exit_code == 3
     assert "`lhdmap console` starts one" in told["error"]["message"]
+
+
+def test_a_prompt_is_on_standard_error_alone(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("sys.stdin", io.StringIO("y\n"))
+    assert Console(json=True).ask("arm? ") == "y"
+    assert capsys.readouterr() == ("", "arm? ")
