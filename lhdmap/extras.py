@@ -36,7 +36,6 @@ LIBRARIES = {
     "cyclonedds": Library("cyclonedds", "dds"),
     "starlette": Library("starlette", "console"),
     "uvicorn": Library("uvicorn", "console"),
-    "itsdangerous": Library("itsdangerous", "console"),
     "pyotp": Library("pyotp", "console"),
 }
 """By the name that is imported."""

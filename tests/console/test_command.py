@@ -94,10 +94,7 @@ def _bound(port: int) -> set[str]:
 
 @pytest.fixture
 def without_extra(monkeypatch: pytest.MonkeyPatch) -> None:
-    found = importlib.util.find_spec
-    monkeypatch.setattr(
-        importlib.util, "find_spec", lambda name, *more: None if name == "uvicorn" else found(name, *more)
-    )
+    monkeypatch.setitem(sys.modules, "uvicorn", None)
     real = builtins.__import__
 
     def refuse(name: str, *more: Any) -> Any:
@@ -115,9 +112,9 @@ def test_what_is_not_installed_is_told_with_the_line_that_installs_it(
 ) -> None:
     monkeypatch.chdir(tmp_path)
     exit_code, told = said(capsys, *words)
-    assert exit_code == 2
+    assert exit_code == 3
     assert "uvicorn" in told["error"]["message"]
-    assert "not installed: pip install 'lhdmap[console]'" in told["error"]["message"]
+    assert "; pip install 'lhdmap[console]'" in told["error"]["message"]
 
 
 @pytest.mark.parametrize(
