@@ -53,7 +53,7 @@ FLOORS = [
     {"report"},
     {"config"},
     {"pipeline"},
-    {"front", "replay", "batch"},
+    {"front", "replay", "batch", "live"},
     {"cli"},
     {"__main__"},
 ]

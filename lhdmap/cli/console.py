@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import json
 import math
+import shutil
 import sys
 import time
 from collections.abc import Iterable, Iterator, Mapping
@@ -35,6 +36,14 @@ class Console:
         """Print a line of information on standard error."""
         if not self.quiet:
             print(shown(text), file=sys.stderr)
+
+    def status(self, text: str, *, terminal: bool) -> None:
+        """Print how things are: on a terminal over the line before, up to its width; otherwise as a line of its own."""
+        if self.quiet:
+            return
+        width = shutil.get_terminal_size().columns - 1
+        line = f"\r{shown(text)[:width]:<{width}}" if terminal else shown(text)
+        print(line, end="" if terminal else "\n", file=sys.stderr, flush=True)
 
     def warn(self, text: str) -> None:
         """Print a warning once."""

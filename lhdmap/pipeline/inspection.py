@@ -21,12 +21,18 @@ from lhdmap.report.run_recording import record_run
 
 
 class Inspection:
-    """Takes placed scans while the run goes on, and writes recording and report once it is over."""
+    """Takes placed scans while the run goes on, and writes recording and report once it is over.
 
-    def __init__(self, folder: Path, title: str, start_ns: int, settings: Settings) -> None:
+    `live_port`: where viewers on this machine may follow the recording.
+    """
+
+    def __init__(
+        self, folder: Path, title: str, start_ns: int, settings: Settings, live_port: int | None = None
+    ) -> None:
         self._folder = folder
         self._pile = PileWatch(settings)
-        self._recording = RecordingWriter(folder / "recording.rrd", title, start_ns, settings.recording)
+        drawn = folder / "recording.rrd"
+        self._recording = RecordingWriter(drawn, title, start_ns, settings.recording, live_port=live_port)
         self._written = False
         self._compiling = CompileClock().start()
         threading.Thread(target=charts.load, name="charts").start()
