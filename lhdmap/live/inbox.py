@@ -71,6 +71,11 @@ class Inbox:
         with self._changed:
             self.tally.missed[topic] += count
 
+    def backlog_given_up(self) -> None:
+        """Count that messages which the sender still held were given up."""
+        with self._changed:
+            self.tally.backlogs += 1
+
     def say(self, text: str) -> None:
         """Tell a person something."""
         with self._changed:

@@ -84,7 +84,9 @@ class LiveContainer:
         """Nothing is held open here."""
 
     def _came(self) -> Iterator[tuple[int, int, bytes]]:
-        yield from list(self._kept)  # the clocks are looked for in the first second once more: until here nothing is used up
+        yield from list(
+            self._kept
+        )  # the clocks are looked for in the first second once more: until here nothing is used up
         self._kept.clear()
         while not self._inbox.over:
             message = self._next()

@@ -49,6 +49,10 @@ class Sink(Protocol):
         """Take note of messages that the sender counted and that did not come."""
         ...
 
+    def backlog_given_up(self) -> None:
+        """Take note that messages which the sender still held were given up for newer ones."""
+        ...
+
     def say(self, text: str) -> None:
         """Tell a person something."""
         ...

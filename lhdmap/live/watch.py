@@ -120,6 +120,7 @@ class Watch:
             "gaps": tally.gaps,
             "longest_gap_s": tally.longest_gap_s,
             "reconnects": tally.reconnects,
+            "backlogs_given_up": tally.backlogs,
             "clock_steps": 0 if self._source is None else len(self._source.clock_steps),
             "caught_up_s": self.caught_up_s,
             "latency": {"pose": self.pose_latency.to_json(), "scan": self.scan_latency.to_json()},
