@@ -33,13 +33,14 @@ class Raw:
 
 def raw_type(type_name: str) -> type[IdlStruct]:
     """Return the class of a ROS 2 type whose samples come as `Raw`."""
-    made = _struct(type_name)
+    made = struct_of(type_name)
     made.deserialize = classmethod(lambda _cls, data, **_: Raw(bytes(data)))
     return made
 
 
 @cache
-def _struct(type_name: str) -> Any:
+def struct_of(type_name: str) -> Any:
+    """Return the class of a ROS 2 type, as a writer uses it."""
     fields = {name: _field(kind) for name, kind in field_definitions(type_name)}
     plain = dds_type(type_name).replace("::", ".")
     return make_idl_struct(type_name.replace("/", "_"), plain, fields)
@@ -50,6 +51,6 @@ def _field(kind: Any) -> Any:
     if node == Nodetype.BASE:
         return _BASE[what[0]]
     if node == Nodetype.NAME:
-        return _struct(what)
+        return struct_of(what)
     inner, count = what
     return _array[_field(inner), count] if node == Nodetype.ARRAY else _sequence[_field(inner)]

@@ -101,8 +101,8 @@ class Inbox:
 
     @property
     def over(self) -> bool:
-        """Whether nothing is left, and nothing will come."""
-        return self._ended and not self._queue
+        """Whether nothing is left, and nothing will come: not while there is an error to raise."""
+        return self._ended and not self._queue and self._error is None
 
     def end(self, error: BaseException | None = None) -> None:
         """Close the log: no more will come; `error`: why, where it went wrong."""

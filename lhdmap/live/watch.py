@@ -78,13 +78,18 @@ class Watch:
             if role == primary and isinstance(message, (LaserScan, PointCloud)):
                 self._scan_done(stages, message.stamp_ns)
             self.look()
+        self._tell()
 
     def look(self) -> None:
         """Tell the status where it is time to; called also while nothing comes."""
         now_s = time.monotonic()
         if now_s - self._shown_s < self._interval_s:
             return
-        self._shown_s = now_s
+        self._tell()
+
+    def _tell(self) -> None:
+        """Tell what was odd since the last time, and the status."""
+        self._shown_s = time.monotonic()
         steps = [] if self._source is None else self._source.clock_steps
         for step in steps[self._steps :]:
             start_ns = None if self._source is None else self._source.start_ns
