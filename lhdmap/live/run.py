@@ -16,6 +16,7 @@ from lhdmap.live.inbox import MOST_BYTES, MOST_MESSAGES, Inbox
 from lhdmap.live.recorder import LiveRecorder
 from lhdmap.live.source import LiveSource
 from lhdmap.live.tally import Tally
+from lhdmap.live.warm_up import warm_up
 from lhdmap.live.watch import Status, Watch
 from lhdmap.logs.source import LogSource
 from lhdmap.machine import Machine
@@ -39,7 +40,7 @@ class LiveRequest:
 
     `map`: localize on it instead of building one; `start` (4,) about where the machine is then. `for_s`: how long, None until the
     source ends, or Ctrl-C. `show` is told the status at an interval (s), `say` what happens. `most`: messages and bytes that may
-    wait. `live_port`: where viewers on this machine may follow.
+    wait. `warm`: have all kernels ready before the first message. `live_port`: where viewers on this machine may follow.
     """
 
     source: LiveSource
@@ -52,6 +53,7 @@ class LiveRequest:
     for_s: float | None = None
     force: bool = False
     helper: bool = False
+    warm: bool = True
     live_port: int | None = None
     interval_s: float = 1.0
     show: Callable[[Status], None] = _nothing
@@ -79,6 +81,9 @@ def live(request: LiveRequest) -> LiveResult:
     free_folder(request.target, force=request.force, inputs=inputs)
     with RunFolderWriter(KIND, request.target, force=request.force, inputs=inputs) as folder:
         log = folder.finished(folder.path / LOG)
+        if request.warm:
+            warm_up(request.settings, request.machine)
+        request.say(f"{request.source.address}: followed from now on")
         with _followed(request, log) as followed:
             made = _map if request.map is None else _places
             inner, summary, told = made(request, followed, log)

@@ -74,7 +74,7 @@ def test_a_growing_file_gives_the_map_of_the_log(drive: Path, mapped: Path, tmp_
 
 def test_places_on_a_map_are_those_of_the_log(drive: Path, mapped: Path, tmp_path: Path) -> None:
     start = np.zeros(4)
-    request = LiveRequest(source_of(f"mcap:{drive}"), tmp_path / "run", mapped, SETTINGS, start=start)
+    request = LiveRequest(source_of(f"mcap:{drive}"), tmp_path / "run", mapped, SETTINGS, start=start, warm=False)
     result = live(request)
     afterwards = localize(LocalizeRequest([result.folder / LOG], mapped, tmp_path / "again", SETTINGS, start=start))
     one, other = (
@@ -94,7 +94,7 @@ def test_a_bridge_that_is_cut_twice(drive: Path, tmp_path: Path) -> None:
     ended = threading.Event()
     with bridge.served() as url, running(_stop_at_end, bridge, ended):
         source = _Until(source_of(f"foxglove:{url}"), ended)
-        result = live(LiveRequest(source, tmp_path / "run", settings=LIGHT, say=said.append))
+        result = live(LiveRequest(source, tmp_path / "run", settings=LIGHT, warm=False, say=said.append))
     stream = result.summary["stream"]
     assert bridge.cuts == 2
     assert stream["reconnects"] >= 2
@@ -111,7 +111,7 @@ def test_a_clock_that_is_set_back_is_told_and_taken_out(drive: Path, tmp_path: P
     write_growing(tmp_path / "stepped.mcap", moved, 1e9)
     said: list[str] = []
     source = source_of(str(tmp_path / "stepped.mcap"))
-    result = live(LiveRequest(source, tmp_path / "run", settings=LIGHT, interval_s=0.01, say=said.append))
+    result = live(LiveRequest(source, tmp_path / "run", settings=LIGHT, warm=False, interval_s=0.01, say=said.append))
     assert result.summary["stream"]["clock_steps"] == 1
     assert any("set back by 3.0" in text for text in said)
     assert result.summary["distance_m"] == pytest.approx(DISTANCE_M, abs=0.5)
@@ -122,7 +122,9 @@ def test_a_computer_that_is_too_slow_drops_and_says_so(drive: Path, tmp_path: Pa
     messages = messages_of(drive)
     said: list[str] = []
     source = _Flood(messages)
-    result = live(LiveRequest(source, tmp_path / "run", settings=LIGHT, most=(100, 1 << 20), say=said.append))
+    result = live(
+        LiveRequest(source, tmp_path / "run", settings=LIGHT, warm=False, most=(100, 1 << 20), say=said.append)
+    )
     stream = result.summary["stream"]
     assert stream["messages"] == len(messages)
     assert sum(stream["dropped"].values()) > 0

@@ -2,8 +2,9 @@
 
     python -m tools.bench.live zenoh|mcap [--seconds 300] [--cuts 30] [-o FILE.json]
 
-A process of its own plays a simulated drive of 40 m forwards and backwards with stamps of now, over zenoh on this machine or into an
-MCAP file that is flushed ten times a second; `lhdmap live` follows it in another. `--cuts N`: the link is cut for 2 s each N seconds.
+A process of its own plays a simulated drive of 40 m forwards and backwards with stamps of now, over zenoh on this machine or
+into an MCAP file that is flushed at each message; `lhdmap live` follows it in another. `--cuts N`: the link is cut for 2 s each
+N seconds.
 """
 
 from __future__ import annotations
@@ -142,10 +143,12 @@ def run(how: str, seconds: float, cuts_s: float, work: Path) -> dict[str, Any]:
     result = context.Queue()
     send, target = (send_zenoh, work / "grows.mcap") if how == "zenoh" else (send_file, work / "grows.mcap")
     source = f"zenoh:tcp/127.0.0.1:{_PORT}" if how == "zenoh" else str(target)
-    command = [sys.executable, "-m", "lhdmap", "live", source, "-o", str(work / "run"), "--json", "--quiet"]
+    command = [sys.executable, "-m", "lhdmap", "live", source, "-o", str(work / "run"), "--json"]
     command += ["--for", str(seconds + 15.0)] if how == "zenoh" else ["--quiet-end", "20"]
-    with (work / "out.json").open("w") as out, subprocess.Popen(command, stdout=out) as follower:
-        time.sleep(3.0)  # it waits for the sender
+    with (work / "out.json").open("w") as out, (work / "said").open("w") as said:
+        follower = subprocess.Popen(command, stdout=out, stderr=said)
+        while "followed from now on" not in (work / "said").read_text() and follower.poll() is None:
+            time.sleep(0.2)
         sender = context.Process(target=send, args=(log, target, seconds, cuts_s, result))
         sender.start()
         over, memory = threading.Event(), list[float]()
