@@ -35,7 +35,8 @@ class OverZenoh:
         try:
             session: Any = zenoh.open(_config(self._endpoint))
         except zenoh.ZError as error:
-            raise LinkLost(f"no connection ({str(error).splitlines()[0][:200]})") from error
+            reason = str(error).partition(" at /")[0]  # where in zenoh's source is of no use here
+            raise LinkLost(f"no connection ({reason})") from error
         try:
             held = self._subscribed(session, _Receiver(sink), sink)
             self._wait(session, stop)

@@ -28,6 +28,7 @@ from lhdmap.pipeline.cost import CompileClock, Spent, cost, peak_memory_mib
 from lhdmap.pipeline.given import GROUND_TRUTH, given_rows
 from lhdmap.pipeline.inspection import Inspection, Inspector, PileBeside
 from lhdmap.pipeline.interruption import Interruption
+from lhdmap.pipeline.live_view import LiveView
 from lhdmap.pipeline.mapping import MappingPipeline
 from lhdmap.pipeline.mounts import machine_of
 from lhdmap.pipeline.outcome import ROLES_READ, Inputs, Outcome, odometry_of, ways_of
@@ -120,13 +121,17 @@ def build_map(request: BuildRequest) -> BuildResult:
         interruption = Interruption()
         with pool, _inspector(request, source, folder.path) as inspector, interruption.comes_first():
             primary: Literal["front", "points"] = "front" if "front" in source.roles else "points"
+            view = LiveView(inspector) if request.stream and request.stream.live_port is not None else None
             pipeline = MappingPipeline(
                 request.settings,
                 machine_of(source, request.machine),
                 _sweep_sink(inspector, request.settings.recording.scan_interval_s),
                 primary,
                 pile=PileBeside(inspector),
+                on_step=None if view is None else view.take,
             )
+            if view is not None:
+                view.pipeline = pipeline
             with pipeline:
                 _run(pipeline, source, request, interruption)
             hashes = hashes or _hash_in_background(pool, request.logs)

@@ -14,6 +14,7 @@ from lhdmap.pipeline.cost import CompileClock, Spent, peak_memory_mib
 from lhdmap.pipeline.pile import PileWatch, PlacedScan
 from lhdmap.report import charts
 from lhdmap.report.data import ReportData
+from lhdmap.report.live_recording import add_pose_now
 from lhdmap.report.page import write_report
 from lhdmap.report.pile_recording import add_pile
 from lhdmap.report.recording import RecordingWriter
@@ -49,6 +50,10 @@ class Inspection:
         """Record an integrated sweep, points (N, 3) in map."""
         self._recording.add_scan(stamp_ns, points_map, name)
 
+    def place(self, stamp_ns: int, pose: FloatArray) -> None:
+        """Show those who follow where the machine is: x, y, z (m), roll, pitch, heading (rad)."""
+        add_pose_now(self._recording, stamp_ns, pose)
+
     def write(self, data: ReportData, machine: Machine) -> None:
         """Complete the recording and write the report."""
         record_run(self._recording, data, machine)
@@ -77,6 +82,11 @@ class PileBeside:
 
     def __init__(self, inspector: Inspector) -> None:
         self._inspector = inspector
+
+    @property
+    def apart(self) -> bool:
+        """Whether it works in a process of its own, which one other thread may ask."""
+        return isinstance(self._inspector, Beside)
 
     def update(self, scan: PlacedScan) -> None:
         """Show it a scan."""

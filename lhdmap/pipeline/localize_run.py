@@ -26,15 +26,17 @@ from lhdmap.pipeline.mounts import machine_of
 from lhdmap.pipeline.outcome import ROLES_READ
 from lhdmap.pipeline.stream import Stream
 from lhdmap.provenance import source_entry
+from lhdmap.report.live_recording import add_pose_now
 from lhdmap.report.localization_data import LocalizationData
 from lhdmap.report.localization_page import write_localization_report
 from lhdmap.report.localization_recording import record_localization
-from lhdmap.report.recording import RecordingWriter
+from lhdmap.report.recording import RecordingWriter, Thinning
 from lhdmap.runfolder import RunFolderWriter, RunInfo
 from lhdmap.topology.model import TopologicalMap
 from lhdmap.trajectory import Trajectory, write_tum
 
 KIND = "localization"
+_NOW_S = 0.2  # between the poses that those who follow a running machine are shown
 
 
 @dataclass(frozen=True, slots=True)
@@ -137,10 +139,16 @@ def _localized(
             messages = request.progress(messages, source.duration_s)
         if request.stream is not None:
             messages = request.stream.through(source, messages, localizer)
+        now = Thinning(_NOW_S) if request.stream is not None and request.stream.live_port is not None else None
         for role, message in messages:
             localizer.update(role, message)
             if localizer.newest is not None:
                 recording.add_scan(*localizer.newest)
+                if now is not None and localizer.fix is not None and now.take(localizer.newest[0], "now"):
+                    x, y, heading = localizer.fix.pose_map
+                    add_pose_now(
+                        recording, localizer.newest[0], np.array([x, y, localizer.fix.height_m, 0, 0, heading])
+                    )
         localizer.finish()
     return localizer
 

@@ -109,7 +109,9 @@ def send_zenoh(log: Path, _target: Path, seconds: float, cuts_s: float, result: 
         if "/tf_static" not in publishers or message.type_name == _FIXED:
             cache = ext.CacheConfig(1)
             key = f"0/tf_static/{dds_type(_FIXED)}/RIHS01_0"
-            publishers["/tf_static"] = ext.declare_advanced_publisher(session, key, cache=cache)
+            publishers["/tf_static"] = ext.declare_advanced_publisher(
+                session, key, cache=cache, publisher_detection=True
+            )
             publishers["/tf_static"].put(mounts)
         if message.type_name != _FIXED:
             count = (ext.Int64(sent[message.topic]), ext.Int64(message.log_time_ns), b"0123456789abcdef")
@@ -124,16 +126,14 @@ def _key(message: Sent) -> str:
     return f"0{message.topic}/{dds_type(message.type_name)}/RIHS01_0"
 
 
-def memory_mib(process: int, every_s: float, until: threading.Event) -> list[float]:
-    """Return the resident memory of a process over time."""
-    found: list[float] = []
+def watch_memory(process: int, every_s: float, until: threading.Event, found: list[float]) -> None:
+    """Note the resident memory (MiB) of a process over time."""
     while not until.wait(every_s):
         try:
             words = Path(f"/proc/{process}/statm").read_text(encoding="ascii").split()
         except OSError:
-            break
+            return
         found.append(int(words[1]) * os.sysconf("SC_PAGE_SIZE") / 2**20)
-    return found
 
 
 def run(how: str, seconds: float, cuts_s: float, work: Path) -> dict[str, Any]:
@@ -152,7 +152,7 @@ def run(how: str, seconds: float, cuts_s: float, work: Path) -> dict[str, Any]:
         sender = context.Process(target=send, args=(log, target, seconds, cuts_s, result))
         sender.start()
         over, memory = threading.Event(), list[float]()
-        watch = threading.Thread(target=lambda: memory.extend(memory_mib(follower.pid, 10.0, over)))
+        watch = threading.Thread(target=watch_memory, args=(follower.pid, 10.0, over, memory))
         watch.start()
         sent, cuts = result.get(timeout=seconds + 120.0)
         sender.join(20.0)
