@@ -39,9 +39,11 @@ class Inbox:
         self._error: BaseException | None = None
         self.announced: dict[tuple[str, str, str], Announced] = {}
         self.said: deque[str] = deque(maxlen=_SAID_KEPT)
+        self.kept = 0  # messages that the reader took and has not handed on yet
 
     def __len__(self) -> int:
-        return len(self._queue)
+        """How many messages wait."""
+        return len(self._queue) + self.kept
 
     def announce(self, topic: Announced) -> None:
         """Take note of a topic that there is."""

@@ -19,13 +19,14 @@ import tempfile
 import threading
 import time
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from lhdmap.live.zenoh_keys import dds_type
 from lhdmap.logs.formats import open_log
+from lhdmap.roles import SCAN
 from lhdmap.simulation.drive import simulate_drift
 from lhdmap.simulation.scenario import DriftScenario
 from lhdmap.simulation.sections import DriftSettings, DriveSettings
@@ -45,9 +46,10 @@ _PORT, _CUT_S = 17448, 2.0
 _SCANS = "/lidar/"
 
 
-def played(log: Path, seconds: float) -> Iterator[Sent]:
-    """Yield the drive's messages forwards and backwards at their pace, with stamps of now."""
+def played(log: Path, seconds: float, begin: Callable[[], None] = lambda: None) -> Iterator[Sent]:
+    """Yield the drive's messages forwards and backwards at their pace, with stamps of now; `begin` is called before the first."""
     messages = messages_of(log)
+    begin()
     yield from (one._replace(log_time_ns=time.time_ns()) for one in messages if one.type_name == _FIXED)
     moving = [one for one in messages if one.type_name != _FIXED and not any(w in one.topic for w in _NOT_BACKWARDS)]
     began_ns, ahead_ns = time.time_ns(), 0
@@ -80,46 +82,73 @@ def send_file(log: Path, target: Path, seconds: float, _cuts_s: float, result: A
 def send_zenoh(log: Path, _target: Path, seconds: float, cuts_s: float, result: Any) -> None:
     """Publish the drive as rmw_zenoh would; while the link is cut it goes on, and nobody hears it."""
     import zenoh
-    from zenoh import ext
 
     config = zenoh.Config()
     config.insert_json5("mode", '"peer"')
     config.insert_json5("listen/endpoints", f'["tcp/127.0.0.1:{_PORT}"]')
     config.insert_json5("scouting/multicast/enabled", "false")
     config.insert_json5("timestamping/enabled", "true")
-    sent, cuts = Counter[str](), 0
-    session: Any = None
-    publishers: dict[str, Any] = {}
+    sent, cuts, heard = Counter[str](), 0, _Session(config)
     next_cut_s, back_s = time.monotonic() + (cuts_s or np.inf), 0.0
-    mounts = b""
-    for message in played(log, seconds):
+    for message in played(log, seconds, heard.opened):
         now_s = time.monotonic()
         if now_s > next_cut_s:
-            session.close()
-            session, publishers, cuts = None, {}, cuts + 1
-            next_cut_s, back_s = now_s + cuts_s, now_s + _CUT_S
-        if session is None and now_s > back_s:
-            session = zenoh.open(config)
+            heard.close()
+            cuts, next_cut_s, back_s = cuts + 1, now_s + cuts_s, now_s + _CUT_S
+        if not heard.open and now_s > back_s:
+            heard.opened()
         sent[message.topic] += 1
-        mounts = message.data if message.type_name == _FIXED else mounts
-        if session is None:
-            continue
-        if message.topic not in publishers:
-            publishers[message.topic] = session.declare_publisher(_key(message))
-        if "/tf_static" not in publishers or message.type_name == _FIXED:
-            cache = ext.CacheConfig(1)
-            key = f"0/tf_static/{dds_type(_FIXED)}/RIHS01_0"
-            publishers["/tf_static"] = ext.declare_advanced_publisher(
-                session, key, cache=cache, publisher_detection=True
-            )
-            publishers["/tf_static"].put(mounts)
-        if message.type_name != _FIXED:
-            count = (ext.Int64(sent[message.topic]), ext.Int64(message.log_time_ns), b"0123456789abcdef")
-            publishers[message.topic].put(message.data, attachment=ext.z_serialize(count))
+        if heard.open:
+            heard.put(message, sent[message.topic])
     time.sleep(0.5)
+    heard.close()
     result.put((dict(sent), cuts))
-    if session is not None:
-        session.close()
+
+
+class _Session:
+    """A session of zenoh with its publishers; mounts are kept for those who come late, as rmw_zenoh does."""
+
+    def __init__(self, config: Any) -> None:
+        self._config = config
+        self._session: Any = None
+        self._publishers: dict[str, Any] = {}
+        self._mounts: list[Sent] = []
+
+    @property
+    def open(self) -> bool:
+        return self._session is not None
+
+    def opened(self) -> None:
+        """Open it, and wait until somebody listens to scans."""
+        import zenoh
+
+        self._session = zenoh.open(self._config)
+        waited = self._session.declare_publisher(f"0/waited/{dds_type(SCAN)}/RIHS01_0")
+        while not waited.matching_status.matching:
+            time.sleep(0.02)
+        for message in self._mounts:
+            self.put(message, 1)
+
+    def close(self) -> None:
+        if self._session is not None:
+            self._session.close()
+        self._session, self._publishers = None, {}
+
+    def put(self, message: Sent, number: int) -> None:
+        from zenoh import ext
+
+        fixed, topic = message.type_name == _FIXED, message.topic
+        if topic not in self._publishers:
+            cache = ext.CacheConfig(10)
+            self._publishers[topic] = (
+                ext.declare_advanced_publisher(self._session, _key(message), cache=cache, publisher_detection=True)
+                if fixed
+                else self._session.declare_publisher(_key(message))
+            )
+        if fixed and message not in self._mounts:
+            self._mounts.append(message)
+        count = (ext.Int64(number), ext.Int64(message.log_time_ns), b"0123456789abcdef")
+        self._publishers[topic].put(message.data, attachment=ext.z_serialize(count))
 
 
 def _key(message: Sent) -> str:
