@@ -80,11 +80,12 @@ def live(request: LiveRequest) -> LiveResult:
     inputs = [] if request.map is None else [request.map]
     free_folder(request.target, force=request.force, inputs=inputs)
     with RunFolderWriter(KIND, request.target, force=request.force, inputs=inputs) as folder:
-        log = folder.finished(folder.path / LOG)
         if request.warm:
             warm_up(request.settings, request.machine)
         request.say(f"{request.source.address}: followed from now on")
+        log = folder.path / LOG
         with _followed(request, log) as followed:
+            folder.finished(log)
             made = _map if request.map is None else _places
             inner, summary, told = made(request, followed, log)
         told = [*followed.inbox.said, *told]
