@@ -54,7 +54,7 @@ FLOORS = [
     {"report"},
     {"config"},
     {"pipeline"},
-    {"front", "replay", "batch"},
+    {"front", "replay", "batch", "live"},
     {"cli"},
     {"__main__"},
 ]
@@ -122,13 +122,16 @@ def test_the_rule_finds_a_wrong_import(tmp_path: Path) -> None:
     assert list(_imports(file)) == ["report", "cli"]
 
 
-SERVER = {"console/app.py", "console/fence.py", "console/serve.py", "console/sockets.py"}
-"""The console's server: `lhdmap console` loads it once `lhdmap.extras.require` has found its libraries."""
+OF_AN_EXTRA = {
+    "console/app.py", "console/fence.py", "console/serve.py", "console/sockets.py",
+    "live/dds_types.py", "live/foxglove.py", "live/over_dds.py", "live/over_zenoh.py",
+}  # fmt: skip
+"""What is of an extra as a whole, the console's server and the live sources: loaded once its libraries have been found."""
 
 
 def test_optional_libraries_are_loaded_in_one_place() -> None:
-    """Elsewhere they are named for type checkers alone, or asked for with `lhdmap.extras.library`; a server is its library's."""
-    for path in (path for path in MODULES if path.relative_to(PACKAGE).as_posix() not in SERVER):
+    """Elsewhere they are named for type checkers alone, or asked for with `lhdmap.extras.library`."""
+    for path in (path for path in MODULES if path.relative_to(PACKAGE).as_posix() not in OF_AN_EXTRA):
         found = {name.split(".")[0] for name in _imported(path)} & set(LIBRARIES)
         assert not found, f"{path} imports {found}"
 

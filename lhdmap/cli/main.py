@@ -26,6 +26,7 @@ COMMANDS = {
     "demo": "generate the sample drive, build its map, evaluate it, write report and recording",
     "doctor": "what is in a log and what is wrong with it",
     "build-map": "the main job: log in, map folder out",
+    "live": "follow a running machine: map or place while it drives, and the log",
     "localize": "where was the machine on the map, message by message",
     "update-map": "a new version of a map from another drive, with a difference report",
     "info": "what is in a map or run folder, in ten lines",

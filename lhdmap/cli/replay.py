@@ -3,25 +3,17 @@
 from __future__ import annotations
 
 import argparse
-import contextlib
 import dataclasses
-import os
-import socket
-import subprocess
-import sys
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
 from lhdmap.cli.attendants import add_operator, attendant_of
 from lhdmap.cli.console import Console
+from lhdmap.cli.following import free_port, viewer_of
 from lhdmap.cli.options import add_output, add_settings, suggest
-from lhdmap.cli.viewer import started, viewer
 from lhdmap.errors import EvaluationShortfall
-from lhdmap.extras import require
 from lhdmap.resources import resource
-
-_HOST = "127.0.0.1"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -77,7 +69,7 @@ def run(arguments: argparse.Namespace, console: Console) -> int:
         check_attended(scenario)
     settings = load_settings(arguments.config, arguments.set)
     page = arguments.view_port
-    port = (page + 1 if page else _free_port()) if arguments.view else None
+    port = (page + 1 if page else free_port()) if arguments.view else None
     request = ReplayRequest(
         scenario,
         target,
@@ -90,7 +82,7 @@ def run(arguments: argparse.Namespace, console: Console) -> int:
         progress=_progress_of(console),
         settings=settings,
     )
-    with _viewer(port, page, console), attendant_of(arguments, path.stem, settings, console) as attendant:
+    with viewer_of(port, console, page), attendant_of(arguments, path.stem, settings, console) as attendant:
         result = replay(dataclasses.replace(request, attendant=attendant))
     values = {"run": str(result.folder), **result.verdict}
     failure = None if result.verdict["ok"] else EvaluationShortfall(f"not ok: {result.verdict['reason']}")
@@ -167,34 +159,3 @@ def _progress_of(console: Console) -> Any:
         return console.progress(moments, total=duration_s, label="replay", position=position)
 
     return wrap
-
-
-@contextlib.contextmanager
-def _viewer(port: int | None, page: int | None, console: Console) -> Iterator[None]:
-    """Have a viewer follow the run: a window where there is a display, which stays open afterwards; else a page.
-
-    `port`: of the data, None: nobody follows; `page`: where a page is wanted, whatever there is.
-    """
-    if port is None:
-        yield
-        return
-    require("rerun")
-    data = f"rerun+http://{_HOST}:{port}/proxy"
-    windows = os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY") or not sys.platform.startswith("linux")
-    if windows and page is None:
-        with started(viewer(data), stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) as process:
-            yield
-            console.note("the run has ended; close the window to go on")
-            process.wait()
-        return
-    page = page or _free_port()
-    options = ("--serve-web", "--bind", _HOST, "--web-viewer-port", str(page), "--port", str(_free_port()))
-    with started(viewer(*options, data), stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL):
-        console.note(f"follow the run at http://{_HOST}:{page}/?url=rerun%2Bhttp://{_HOST}:{port}/proxy")
-        yield
-
-
-def _free_port() -> int:
-    """Return a port of this machine that nobody listens on."""
-    with socket.create_server((_HOST, 0)) as server:
-        return int(server.getsockname()[1])

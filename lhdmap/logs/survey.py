@@ -46,14 +46,17 @@ class Survey:
         return repair.applied(message) if repair is not None and isinstance(message, LaserScan) else message
 
 
-def take_survey(readers: Sequence[LogReader], roles: Mapping[str, str]) -> Survey:
-    """Look through the files of a log; `roles`: the topic of each."""
+def take_survey(readers: Sequence[LogReader], roles: Mapping[str, str], *, begun: bool = False) -> Survey:
+    """Look through the files of a log; `roles`: the topic of each.
+
+    `begun`: only the beginning is there: that a value has not changed yet says nothing.
+    """
     survey = Survey()
     scans, values = _sampled(readers, roles, survey.frames)
     needed = roles.get("front", roles.get("points"))
     for topic, listed in scans.items():
         _judge_scans(survey, topic, listed, next((reader for reader in readers if topic in reader.topics()), None))
-    for role, watch in values.items():
+    for role, watch in () if begun else values.items():
         _judge_values(survey, role, watch)
     for index, finding in enumerate(survey.findings):
         if finding.severity is Severity.FATAL and finding.topic != needed:
