@@ -9,10 +9,10 @@ from pathlib import Path
 from typing import Any
 
 from lhdmap.errors import UsageError
+from lhdmap.extras import library
 from lhdmap.live.source import LiveSource
 
 FORMS = "mcap:FILE (or a path), foxglove:ws://HOST:8765, zenoh:tcp/HOST:7447 or dds:DOMAIN"
-_EXTRA = {"websockets": "live", "zenoh": "live", "cyclonedds": "dds"}
 
 
 def source_of(address: str, quiet_s: float | None = None) -> LiveSource:
@@ -58,10 +58,6 @@ def _domain() -> int:
 
 
 def _made(module: str, name: str, package: str, *arguments: Any) -> LiveSource:
-    try:
-        importlib.import_module(package)
-    except ImportError as error:
-        extra = _EXTRA[package]
-        raise UsageError(f"{package} is not installed ({error}): pip install 'lhdmap[{extra}]'") from error
+    library(package)
     made: LiveSource = getattr(importlib.import_module(f"lhdmap.live.{module}"), name)(*arguments)
     return made

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from lhdmap.errors import InputError, UsageError
+from lhdmap.errors import InputError, InstallationError, UsageError
 from lhdmap.live.addresses import source_of
 from lhdmap.live.backlog import Backlog
 from lhdmap.live.foxglove import Foxglove
@@ -256,5 +256,5 @@ def test_a_package_that_is_missing_is_named_with_its_extra(
     address: str, package: str, extra: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setitem(__import__("sys").modules, package, None)
-    with pytest.raises(UsageError, match=rf"pip install 'lhdmap\[{extra}\]'"):
+    with pytest.raises(InstallationError, match=rf"pip install 'lhdmap\[{extra}\]'"):
         source_of(address)
