@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from lhdmap.console.settings import ConsoleSettings
 from lhdmap.docking.settings import DockingSettings
 from lhdmap.errors import ConfigError
 from lhdmap.executor.settings import ExecutorSettings
@@ -22,10 +23,10 @@ from lhdmap.loading.weighing_settings import AttemptSettings, WeighingSettings
 from lhdmap.localization.settings import LocalizationSettings
 from lhdmap.movement.settings import MovementSettings
 from lhdmap.navigation.settings import NavigationSettings
-from lhdmap.odometry.cloud_settings import CloudOdometrySettings
+from lhdmap.odometry.cloud.settings import CloudOdometrySettings
 from lhdmap.odometry.settings import AnchorSettings, OdometrySettings, RangeFlowSettings, SearchSettings
 from lhdmap.odometry.trust_settings import TrustSettings
-from lhdmap.pile.figure9_settings import Figure9Constants, RepairedConstants
+from lhdmap.pile.figure9.settings import Figure9Constants, RepairedConstants
 from lhdmap.pile.settings import PileSettings
 from lhdmap.proprioception.attitude import AttitudeSettings
 from lhdmap.proprioception.gyro import GyroSettings
@@ -84,6 +85,7 @@ class Settings:
     traffic: TrafficSettings = field(default_factory=TrafficSettings)
     recording: RecordingSettings = field(default_factory=RecordingSettings)
     rockbreaker: RockbreakerSettings = field(default_factory=RockbreakerSettings)
+    console: ConsoleSettings = field(default_factory=ConsoleSettings)
 
 
 SECTIONS: dict[str, Any] = {section.name: section.default_factory for section in dataclasses.fields(Settings)}

@@ -35,6 +35,12 @@ class InputError(LhdmapError):
     """The input cannot be used: missing, empty, of an unknown format, without the needed topic (exit code 3)."""
 
 
+class InstallationError(LhdmapError):
+    """A library that the request needs is not installed, or cannot be loaded (exit code 3); the text has its install line."""
+
+    kind = "installation"
+
+
 class EvaluationShortfall(LhdmapError):
     """A check or an evaluation fell short of its target (exit code 1)."""
 

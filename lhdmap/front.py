@@ -10,7 +10,7 @@ from typing import Any
 
 from lhdmap.config import Settings, load_settings, settings_from
 from lhdmap.errors import InputError, UsageError
-from lhdmap.integration.cloud import Cloud
+from lhdmap.integration.cloud import GridCloud
 from lhdmap.machine import Machine, load_machine
 from lhdmap.mapfolder import Diagnostics, MapFolder
 from lhdmap.names import beside
@@ -50,7 +50,7 @@ class Map:
         """The same from odometry alone, before loop closure; raises InputError as `trajectory` does."""
         return self._files.odometry()
 
-    def cloud(self) -> Cloud:
+    def cloud(self) -> GridCloud:
         """Read the cloud of N points; `.to_open3d()` makes an `open3d.geometry.PointCloud` of it.
 
         Its fields are `points_m` (N, 3) float32 in `map`, `normals` (N, 3) float32 towards the scanner (zero where unknown),

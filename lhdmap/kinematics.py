@@ -11,6 +11,7 @@ import math
 import numba as nb
 import numpy as np
 
+from lhdmap.geometry import articulated
 from lhdmap.machine import Machine
 from lhdmap.messages import FloatArray
 
@@ -39,13 +40,9 @@ def articulation_for_curvature(curvature_pm: float, machine: Machine) -> float:
 
 
 def T_base_rear(articulation_rad: float, machine: Machine) -> FloatArray:  # noqa: N802  # frames in the name
-    """Return the pose of `rear_link` in `base_link`, shape (4, 4): both on one plane, joined by the upright joint."""
-    front_m, rear_m = machine.dimensions.joint_to_front_axle_m, machine.dimensions.joint_to_rear_axle_m
-    c, s = math.cos(articulation_rad), math.sin(articulation_rad)
-    T = np.eye(4)
-    T[:2, :2] = [[c, s], [-s, c]]  # the rear body is turned by −γ
-    T[:2, 3] = [-front_m - rear_m * c, rear_m * s]
-    return T
+    """Return the pose of `rear_link` in `base_link`, shape (4, 4)."""
+    size = machine.dimensions
+    return articulated.T_base_rear(articulation_rad, size.joint_to_front_axle_m, size.joint_to_rear_axle_m)
 
 
 @nb.njit(cache=True)

@@ -30,7 +30,7 @@ class Diagnostics(NamedTuple):
     `information_across` (1/m^2) and `information_heading` (1/rad^2) in the machine's frame, `degenerate` (an axis was
     not observed), `substitute` (what was used instead: `wheels`, `motion`, or empty), `slip` (skid factor of
     the wheels, Eq. (7) of the loading paper; NaN where not known), `wheels` (what became of the wheels' step before the scan,
-    and why: `lhdmap.odometry.wheel_model`). `std_along`, `std_across` (m), `std_heading` (rad): standard deviations of what the
+    and why: `lhdmap.odometry.wheels.model`). `std_along`, `std_across` (m), `std_heading` (rad): standard deviations of what the
     step from the processed scan before adds to the error of the path; None in maps that do not tell it.
     """
 

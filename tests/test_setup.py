@@ -58,4 +58,4 @@ def test_a_python_without_venv_is_missing_its_package(tmp_path: Path) -> None:
 def test_no_fitting_python_is_said(tmp_path: Path, python: str) -> None:
     done = _run(tmp_path, libraries=LIBRARIES, user=0, python=python)
     assert done.returncode == 1
-    assert "Python 3.11 or 3.12 was wanted" in done.stderr
+    assert "Python 3.11 to 3.13 was wanted" in done.stderr

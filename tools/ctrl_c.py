@@ -17,6 +17,7 @@ import tempfile
 import time
 from pathlib import Path
 
+from lhdmap.console.operators import Operators
 from lhdmap.pipeline.build import BuildRequest, build_map
 from lhdmap.topology.geojson import to_geojson
 from tests.cli.logs import write_room_log
@@ -69,10 +70,26 @@ def commands(work: Path) -> dict[str, list[str]]:
         "check-map": ["check-map", str(work / "t.geojson")],
         "export": ["export", str(map_folder(work / "map")), "--format", "dxf", "-o", "{out}.dxf"],
         "localize": ["localize", str(work / "later.mcap"), "--map", first_map, "-o", "{out}"],
+        "live": ["live", str(_unfinished(long_log, work / "grows.mcap")), "-o", "{out}"],
         "batch": ["batch", str(work / "batch.csv"), "-o", "{out}", "--jobs", "2"],
         "replay-grizzly": ["replay", str(work / "grizzly.toml"), "-o", "{out}"],
+        "console": ["console", "--folder", str(_operated(work))],
         "demo": ["demo", "-o", "{out}"],
     }
+
+
+def _operated(work: Path) -> Path:
+    """Make the folder of a console."""
+    folder = work / "console"
+    Operators(folder).add("anna")
+    return folder
+
+
+def _unfinished(log: Path, path: Path) -> Path:
+    """Write the first half of a log: what follows it waits for more, until Ctrl-C ends the stream and the run is finished."""
+    content = log.read_bytes()
+    path.write_bytes(content[: len(content) // 2])
+    return path
 
 
 def _built(work: Path) -> Path:

@@ -24,7 +24,7 @@ import numpy as np
 import zstandard
 from lhdmap.errors import InputError
 from lhdmap.logs import open_log
-from lhdmap.logs.health import examine
+from lhdmap.logs.doctor.health import examine
 from lhdmap.logs.ros_messages import definition, serialized
 from lhdmap.messages import (
     Command,

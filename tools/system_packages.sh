@@ -1,15 +1,15 @@
 #!/bin/sh
-# Checks for what pip cannot install: Python's venv module and the libraries that open3d links to.
+# Checks for what pip cannot install: Python's venv module and the libraries that open3d (extra `sim`) links to.
 # As root on Debian or Ubuntu it installs what is missing, else it prints the line that does. Usage: system_packages.sh [PYTHON]
 set -eu
 
 python=${1:-}
 if [ -z "$python" ]; then
-    echo "Python 3.11 or 3.12 was wanted, none was found (Debian: apt-get install python3 python3-venv)" >&2
+    echo "Python 3.11 to 3.13 was wanted, none was found (Debian: apt-get install python3 python3-venv)" >&2
     exit 1
 fi
-if ! "$python" -c 'import sys; sys.exit(not (3, 11) <= sys.version_info[:2] <= (3, 12))'; then
-    echo "Python 3.11 or 3.12 was wanted, $python is $("$python" -V); name another with make PYTHON=..." >&2
+if ! "$python" -c 'import sys; sys.exit(not (3, 11) <= sys.version_info[:2] <= (3, 13))'; then
+    echo "Python 3.11 to 3.13 was wanted, $python is $("$python" -V); name another with make PYTHON=..." >&2
     exit 1
 fi
 

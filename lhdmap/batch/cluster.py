@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib.util
 import time
 from collections.abc import Callable, Iterator, Sequence
 from typing import Any
@@ -10,6 +9,7 @@ from typing import Any
 from lhdmap.batch.pool import RETRIES
 from lhdmap.batch.work import Job, Outcome, Ran, Work
 from lhdmap.errors import InputError, UsageError
+from lhdmap.extras import install_line, is_installed, library
 
 _CONNECT_S = 10.0
 _LOOK_S = 5.0
@@ -18,8 +18,8 @@ PATIENCE_S = 300.0  # without any worker
 
 def check_installed() -> None:
     """Raise UsageError with the line that installs it where dask.distributed is not there."""
-    if importlib.util.find_spec("distributed") is None:
-        raise UsageError("--cluster needs dask.distributed, which is not installed: pip install 'lhdmap[cluster]'")
+    if not is_installed("distributed"):
+        raise UsageError(f"--cluster needs dask.distributed: {install_line('distributed')}")
 
 
 def run_on_cluster(
@@ -34,8 +34,7 @@ def run_on_cluster(
         InputError: nobody answers at the address, or there were no workers for too long.
     """
     check_installed()
-    import distributed
-
+    distributed = library("distributed")
     try:
         client = distributed.Client(address, timeout=_CONNECT_S)
     except (OSError, ValueError) as error:

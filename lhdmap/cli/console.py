@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import json
 import math
+import shutil
 import sys
 import time
 from collections.abc import Iterable, Iterator, Mapping
@@ -29,17 +30,39 @@ class Console:
         self._warned: set[str] = set()
         self._values: dict[str, Any] = {}
         self._printed = False
+        self._unended = False  # whether a status stands in the line of the cursor
         Console.current = self
 
     def note(self, text: str) -> None:
         """Print a line of information on standard error."""
         if not self.quiet:
+            self._end_line()
             print(shown(text), file=sys.stderr)
+
+    def ask(self, prompt: str) -> str:
+        """Return a line that is typed after a prompt on standard error; raises EOFError where there is none any more."""
+        print(shown(prompt), end="", file=sys.stderr, flush=True)
+        return input()
+
+    def status(self, text: str, *, terminal: bool) -> None:
+        """Print how things are: on a terminal over the line before, up to its width; otherwise as a line of its own."""
+        if self.quiet:
+            return
+        width = shutil.get_terminal_size().columns - 1
+        line = f"\r{shown(text)[:width]:<{width}}" if terminal else shown(text)
+        print(line, end="" if terminal else "\n", file=sys.stderr, flush=True)
+        self._unended = terminal
+
+    def _end_line(self) -> None:
+        if self._unended:
+            self._unended = False
+            print(file=sys.stderr)
 
     def warn(self, text: str) -> None:
         """Print a warning once."""
         if text not in self._warned:
             self._warned.add(text)
+            self._end_line()
             print(f"warning: {shown(text)}", file=sys.stderr)
 
     def usage(self, text: str) -> None:
@@ -56,6 +79,7 @@ class Console:
         self._values |= _plain(values)
         if failure is not None:
             self._values |= failure_of(failure.kind, str(failure), failure.exit_code)
+        self._end_line()
         if not self.json:
             _out(shown(text))
         if at_once:

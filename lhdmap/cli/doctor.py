@@ -12,8 +12,8 @@ from lhdmap.cli.console import Console
 from lhdmap.cli.options import add_topics, topic_overrides
 from lhdmap.errors import InputError
 from lhdmap.logs.base import LogReader
-from lhdmap.logs.finding import Finding, Severity
-from lhdmap.logs.health import Examination, Verdict, examine
+from lhdmap.logs.doctor.finding import LogFinding, Severity
+from lhdmap.logs.doctor.health import Examination, LogVerdict, examine
 from lhdmap.logs.inventory import Inventory, TopicSummary
 from lhdmap.messages import Record
 from lhdmap.names import name_of
@@ -51,7 +51,7 @@ def run(arguments: argparse.Namespace, console: Console) -> int:
 def _failure(outcomes: list[Examination]) -> InputError | None:
     """Return why the exit code is 3, None where all logs are usable."""
     for outcome in outcomes:
-        if outcome.verdict is Verdict.UNUSABLE:
+        if outcome.verdict is LogVerdict.UNUSABLE:
             fatal = [finding.text for finding in outcome.findings if finding.severity is Severity.FATAL]
             text = "; ".join(fatal) or str(outcome.verdict)
             return InputError(text if text.startswith(str(outcome.path)) else f"{outcome.path}: {text}")
@@ -89,7 +89,7 @@ def _row(topic: TopicSummary) -> tuple[str, ...]:
     return topic.name, topic.type_name, count, rate, gap, topic.role or ""
 
 
-def _finding_lines(finding: Finding) -> list[str]:
+def _finding_lines(finding: LogFinding) -> list[str]:
     where = f"{finding.topic}: " if finding.topic else ""
     advice = f"; {finding.advice}" if finding.advice else ""
     label = f"  {finding.severity:<8}"

@@ -39,7 +39,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace, console: Console) -> int:
     """Evaluate and print the figures."""
     from lhdmap.evaluation.localization import LocalizationTable, MapTruth, evaluated, names_of, read_nodes
-    from lhdmap.localization.rows import Row
+    from lhdmap.localization.rows import LocalizationRow
     from lhdmap.mapfolder import MapFolder
     from lhdmap.runfolder import RunFolder
     from lhdmap.topology.files import read_topology
@@ -47,7 +47,7 @@ def run(arguments: argparse.Namespace, console: Console) -> int:
 
     folder = RunFolder.open(arguments.run_folder, ["localization"])
     map_folder = MapFolder.open(arguments.map or Path(folder.info["options"]["request"]["map"]))
-    columns = folder.table("localization.parquet", Row._fields)
+    columns = folder.table("localization.parquet", LocalizationRow._fields)
     topology = map_folder.file("topology.geojson")
     columns["node"] = _named(columns["node"], names_of(topology, "tunnel", "intersection"))
     teaching = MapTruth(read_tum(arguments.map_truth), map_folder.trajectory(), globally=arguments.globally)

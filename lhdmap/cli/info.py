@@ -20,6 +20,7 @@ _WHAT = {
     "navigation": "tables of drives",
     "production": "production of replays",
     "batch": "batch of logs",
+    "live": "live run",
 }
 
 

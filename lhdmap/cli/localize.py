@@ -47,7 +47,7 @@ def run(arguments: argparse.Namespace, console: Console) -> int:
             load_settings(arguments.config, [*arguments.set, *_method(arguments)]),
             topic_overrides(arguments.topic),
             load_machine(arguments.machine) if arguments.machine else None,
-            _start(arguments.start, arguments.map) if arguments.start else None,
+            start_on(arguments.start, arguments.map) if arguments.start else None,
             progress_of(console),
             arguments.force,
             arguments.smoother,
@@ -63,7 +63,7 @@ def _method(arguments: argparse.Namespace) -> list[str]:
     return [f"localization.method={arguments.method}"] if arguments.method else []
 
 
-def _start(text: str, map_folder: Path) -> Any:
+def start_on(text: str, map_folder: Path) -> Any:
     """Return x, y, yaw and height of a start, or those of all places in a node, of which the first scan chooses."""
     from lhdmap.cli.update_map import start_of
     from lhdmap.localization.starting import poses_in

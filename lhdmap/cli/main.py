@@ -19,12 +19,14 @@ from lhdmap.cli.console import STANDARD_OUTPUT, Console
 from lhdmap.cli.interrupt import EXIT_INTERRUPTED, told
 from lhdmap.cli.options import add_common
 from lhdmap.cli.parser import CommandLineError, Parser
-from lhdmap.errors import LhdmapError, LhdmapWarning, kept_with
+from lhdmap.errors import InstallationError, LhdmapError, LhdmapWarning, kept_with
+from lhdmap.extras import missing_text
 
 COMMANDS = {
     "demo": "generate the sample drive, build its map, evaluate it, write report and recording",
     "doctor": "what is in a log and what is wrong with it",
     "build-map": "the main job: log in, map folder out",
+    "live": "follow a running machine: map or place while it drives, and the log",
     "localize": "where was the machine on the map, message by message",
     "update-map": "a new version of a map from another drive, with a difference report",
     "info": "what is in a map or run folder, in ten lines",
@@ -38,14 +40,15 @@ COMMANDS = {
     "check-map": "is the map ready to run on, and if not, why",
     "production": "what replays produced, and what their time went into",
     "export": "a map in a format that other tools read",
+    "console": "the operator's page: requests for help, answers, arming, alarms",
     "batch": "many logs, on all cores or on a cluster: one table, one page",
     "eval": "compare results with ground truth",
     "config": "print the settings with unit and source",
     "completion": "print the tab completion for bash, zsh or fish",
 }
+_MODULES = {"console": "operator_console"}  # `console` is what a command prints with
 EXIT_USAGE, EXIT_INPUT = 2, 3
 _COMMON = ("--json", "--quiet", "--debug")
-INSTALL_HINT = "on Debian, open3d needs: apt-get install libegl1 libgl1 libx11-6 libusb-1.0-0; all else comes with pip"
 FAULT_HINT = "please report it with the output of the same command and --debug"
 _HINTS = {
     **dict.fromkeys((errno.ENOSPC, errno.EDQUOT), "; make room, or name another place with -o"),
@@ -105,7 +108,7 @@ def _command_first(words: list[str]) -> list[str]:
 
 
 def _module(name: str):  # type: ignore[no-untyped-def]  # a module has no type of its own
-    return importlib.import_module("lhdmap.cli." + name.replace("-", "_"))
+    return importlib.import_module("lhdmap.cli." + _MODULES.get(name, name.replace("-", "_")))
 
 
 def _run(arguments: argparse.Namespace, console: Console) -> int:
@@ -138,7 +141,7 @@ def _told(error: Exception) -> tuple[str, str, int]:
         case MemoryError():
             return "system", f"not enough memory: {error}".rstrip(": "), EXIT_INPUT
         case ImportError():
-            return "installation", f"the installation is not complete: {error}\n{INSTALL_HINT}", EXIT_INPUT
+            return InstallationError.kind, missing_text(error), EXIT_INPUT
     text = f"a fault in lhdmap, not in what you asked for: {type(error).__name__}: {error}\n{FAULT_HINT}"
     return "fault", text, EXIT_INPUT
 

@@ -76,7 +76,7 @@ def _options(arguments: argparse.Namespace, settings: Settings) -> dict[str, Any
 
 def _run_cloud(arguments: argparse.Namespace, console: Console) -> int:
     from lhdmap.errors import UsageError
-    from lhdmap.pile.heap import run_cloud
+    from lhdmap.pile.clouds.heap import run_cloud
     from lhdmap.pile.result import estimate_json
     from lhdmap.runfolder import RunFolderWriter, RunInfo
 

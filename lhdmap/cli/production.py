@@ -47,7 +47,11 @@ def _text(values: dict[str, Any]) -> str:
     stops = [
         f"{one['times']} × {one['phase']} at {one['place'] or '?'}: {one['seconds']:.1f} s" for one in values["stops"]
     ]
-    return "\n".join([*lines, *stops])
+    each = [
+        f"{one['machine']}: {one['cycles']} buckets, {one['tonnes']:.1f} t, waited {one['waits_s']:.1f} s for others"
+        for one in values["machines"]
+    ]
+    return "\n".join([*lines, *(each if len(each) > 1 else []), *stops])
 
 
 def _number(value: float | None, unit: str) -> str:

@@ -3,22 +3,17 @@
 from __future__ import annotations
 
 import argparse
-import contextlib
-import os
-import socket
-import subprocess
-import sys
-from collections.abc import Iterable, Iterator, Mapping
+import dataclasses
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
+from lhdmap.cli.attendants import add_operator, attendant_of
 from lhdmap.cli.console import Console
+from lhdmap.cli.following import free_port, viewer_of
 from lhdmap.cli.options import add_output, add_settings, suggest
-from lhdmap.cli.viewer import started, viewer
 from lhdmap.errors import EvaluationShortfall
 from lhdmap.resources import resource
-
-_HOST = "127.0.0.1"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -34,8 +29,19 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_output(parser, "folder to make (default: SCENARIO_run here)", "RUN")
     add_settings(parser)
     parser.add_argument("--seed", type=int, metavar="N", help="over the scenario's; same seed, same journal to the bit")
+    parser.add_argument(
+        "--machines",
+        type=int,
+        choices=(1, 2, 3),
+        metavar="N",
+        help="over the scenario's: machines of a mission, 1 to 3",
+    )
     parser.add_argument("--view", action="store_true", help="follow the run in Rerun: a window, or a page without one")
+    add_operator(parser)
     parser.add_argument("--no-truth", action="store_true", help="no /ground_truth/odometry in run.mcap")
+    parser.add_argument(
+        "--view-port", type=int, metavar="N", help="with --view: a page at this port, its data at the next"
+    )
     parser.add_argument("--no-recording", action="store_true", help="no recording.rrd: faster, less disk")
 
 
@@ -44,18 +50,26 @@ def run(arguments: argparse.Namespace, console: Console) -> int:
     from lhdmap.config import load_settings
     from lhdmap.errors import UsageError
     from lhdmap.outputs import free_folder
+    from lhdmap.replay.assemble_station import check_attended
     from lhdmap.replay.run import ReplayRequest, replay
     from lhdmap.replay.scenario import find_scenario, load_scenario
 
     if arguments.view and arguments.no_recording:
         raise UsageError("--view shows the recording while it is written; --no-recording was found beside it")
+    if arguments.view_port is not None and not (arguments.view and 1 <= arguments.view_port <= 65_534):
+        raise UsageError(f"--view-port {arguments.view_port}: --view, and a port from 1 to 65534, were wanted")
     if arguments.seed is not None and arguments.seed < 0:
         raise UsageError(f"--seed {arguments.seed}: 0 or more was wanted")
     path = find_scenario(arguments.scenario)
-    scenario = load_scenario(path, **({} if arguments.seed is None else {"seed": arguments.seed}))
+    over = {"seed": arguments.seed, "machines": arguments.machines}
+    scenario = load_scenario(path, **{key: value for key, value in over.items() if value is not None})
     target = arguments.output or Path(f"{path.stem}_run")
     free_folder(target, force=arguments.force, inputs=[path])
-    port = _free_port() if arguments.view else None
+    if arguments.operator != "script":
+        check_attended(scenario)
+    settings = load_settings(arguments.config, arguments.set)
+    page = arguments.view_port
+    port = (page + 1 if page else free_port()) if arguments.view else None
     request = ReplayRequest(
         scenario,
         target,
@@ -66,10 +80,10 @@ def run(arguments: argparse.Namespace, console: Console) -> int:
         force=arguments.force,
         sources=[path],
         progress=progress_of(console),
-        settings=load_settings(arguments.config, arguments.set),
+        settings=settings,
     )
-    with _viewer(port, console):
-        result = replay(request)
+    with viewer_of(port, console, page), attendant_of(arguments, path.stem, settings, console) as attendant:
+        result = replay(dataclasses.replace(request, attendant=attendant))
     values = {"run": str(result.folder), **result.verdict}
     failure = None if result.verdict["ok"] else EvaluationShortfall(f"not ok: {result.verdict['reason']}")
     console.result(values, verdict_text(values), failure=failure)
@@ -92,6 +106,7 @@ def verdict_text(values: Mapping[str, Any]) -> str:
         f"{'lane ' if values['kind'] == 'haulage' else 'walls'}        {len(values['contacts'])} contacts"
         + ("" if near is None else f", never nearer than {near:.2f} m"),
         *_haulage_lines(values),
+        *_crew_lines(values),
         *([f"faults       {len(values['faults'])} injected"] if values["faults"] else []),
         f"journal      {values['journal_sha256'][:16]}…, {values['realtime_factor']:.1f} x real time",
     ]
@@ -106,6 +121,16 @@ def _haulage_lines(values: Mapping[str, Any]) -> list[str]:
         f"loads        {values['cycles']}, {values['tonnes']:.1f} t",
         f"both bodies  off by {values['sum_rms_m']:.3f} m rms, {values['sum_max_m']:.2f} m at most; {used}",
     ]
+
+
+def _crew_lines(values: Mapping[str, Any]) -> list[str]:
+    if "machines" not in values:
+        return []
+    lines = [
+        f"{one['machine']:<12} {one['cycles']} buckets, {one['tonnes']:.1f} t, {one['distance_m']:.0f} m, {one['reason']}"
+        for one in values["machines"]
+    ]
+    return [*lines, f"sections     {len(values['sections_shared'])} times shared by two machines"]
 
 
 def _grizzly_lines(values: Mapping[str, Any]) -> list[str]:
@@ -136,29 +161,3 @@ def progress_of(console: Console) -> Any:
         return console.progress(moments, total=duration_s, label="replay", position=position)
 
     return wrap
-
-
-@contextlib.contextmanager
-def _viewer(port: int | None, console: Console) -> Iterator[None]:
-    """Have a viewer follow the run: a window where there is a display, which stays open afterwards; else a page."""
-    if port is None:
-        yield
-        return
-    data = f"rerun+http://{_HOST}:{port}/proxy"
-    if os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY") or not sys.platform.startswith("linux"):
-        with started(viewer(data), stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) as process:
-            yield
-            console.note("the run has ended; close the window to go on")
-            process.wait()
-        return
-    page = _free_port()
-    options = ("--serve-web", "--bind", _HOST, "--web-viewer-port", str(page), "--port", str(_free_port()))
-    with started(viewer(*options, data), stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL):
-        console.note(f"follow the run at http://{_HOST}:{page}/?url=rerun%2Bhttp://{_HOST}:{port}/proxy")
-        yield
-
-
-def _free_port() -> int:
-    """Return a port of this machine that nobody listens on."""
-    with socket.create_server((_HOST, 0)) as server:
-        return int(server.getsockname()[1])

@@ -191,7 +191,8 @@ def _start(arguments: argparse.Namespace, machine: Rockbreaker) -> tuple[FloatAr
     """Return tip (3,) and orientation at the start, NaN: by Section 3.1."""
     import numpy as np
 
-    from lhdmap.rockbreaker.kinematics import pose_of_theta, theta_of_rho
+    from lhdmap.rockbreaker.cylinders import theta_of_rho
+    from lhdmap.rockbreaker.kinematics import pose_of_theta
 
     if arguments.from_cylinders is not None:
         if arguments.start is not None or arguments.phi_from is not None:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 from lhdmap.cli.console import Console
 from lhdmap.cli.options import add_settings
 from lhdmap.errors import EvaluationShortfall
+from lhdmap.extras import require
 from lhdmap.outputs import OutputFiles, free_files
 
 if TYPE_CHECKING:
@@ -56,6 +57,8 @@ def run(arguments: argparse.Namespace, console: Console) -> int:
     from lhdmap.topology.files import read_topology
 
     if arguments.picture is not None:
+        if arguments.picture.suffix.lower() == ".rrd":
+            require("rerun")
         free_files([arguments.picture], force=arguments.force, inputs=[arguments.map])
     settings = load_settings(arguments.config, arguments.set).movement
     topology = read_topology(arguments.map)

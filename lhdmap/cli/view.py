@@ -19,6 +19,7 @@ from lhdmap.cli.options import add_output, add_topics, topic_overrides
 from lhdmap.cli.viewer import check_recording, started, viewer
 from lhdmap.descriptions import described, kind_of
 from lhdmap.errors import InputError, UsageError
+from lhdmap.extras import require
 from lhdmap.interrupts import before_interrupt
 from lhdmap.names import in_utf8, name_of
 from lhdmap.outputs import OutputFiles, free_files
@@ -60,6 +61,7 @@ def run(arguments: argparse.Namespace, console: Console) -> int:
         raise InputError(f"{arguments.path}: no such file or folder; a map folder, a .rrd file or a log was wanted")
     if not (arguments.web or arguments.screenshot or _has_display()):
         raise UsageError("no display was found (DISPLAY is not set); use --web for a browser, or --screenshot OUT.png")
+    require("rerun")
     new = [path for path in (arguments.output, arguments.screenshot) if path is not None]
     free_files(new, force=arguments.force, inputs=[arguments.path])
     with _temporary_folder() as folder:

@@ -15,6 +15,7 @@ from lhdmap.docking.search import CUSP_M, searched
 from lhdmap.docking.settings import DockingSettings
 from lhdmap.driving.model import DriveModel
 from lhdmap.errors import InputError
+from lhdmap.geometry.articulated import rear_axle
 from lhdmap.messages import FloatArray
 from lhdmap.tracking.equations import equilibrium
 from lhdmap.tracking.reference import Curve
@@ -89,10 +90,7 @@ def _planned(start: FloatArray, moves: FloatArray, shape: Shape) -> DockPlan:
 def _rear(pose: FloatArray, lengths: tuple[float, float]) -> FloatArray:
     """Return x, y, heading of the rear axle and joint angle (4,) of a pose of the front one."""
     x, y, heading, bend = pose.tolist()
-    back = heading - bend
-    x -= lengths[0] * math.cos(heading) + lengths[1] * math.cos(back)
-    y -= lengths[0] * math.sin(heading) + lengths[1] * math.sin(back)
-    return np.array([x, y, back, bend])
+    return np.array([*rear_axle(x, y, heading, bend, *lengths), bend])
 
 
 def least_radius_m(model: DriveModel, share: float = 1.0) -> float:

@@ -13,6 +13,7 @@ from lhdmap.driving.bodies import Bodies
 from lhdmap.driving.kernel import State
 from lhdmap.driving.model import DriveModel
 from lhdmap.driving.motion import Motion
+from lhdmap.geometry.articulated import rear_axle
 from lhdmap.messages import FloatArray
 
 
@@ -30,10 +31,7 @@ class Lead(NamedTuple):
         bend = motion.articulation_rad
         if self.gear > 0:
             return motion.x_m, motion.y_m, motion.heading_rad, bend, motion.articulation_rate_rps
-        c, s = math.cos(motion.heading_rad), math.sin(motion.heading_rad)
-        rear = motion.heading_rad - bend
-        x = motion.x_m - self.trail_m * c - self.lead_m * math.cos(rear)
-        y = motion.y_m - self.trail_m * s - self.lead_m * math.sin(rear)
+        x, y, rear = rear_axle(motion.x_m, motion.y_m, motion.heading_rad, bend, self.trail_m, self.lead_m)
         return x, y, rear + math.pi, -bend, -motion.articulation_rate_rps
 
     def speed_mps(self, motion: Motion) -> float:

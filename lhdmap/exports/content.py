@@ -13,7 +13,7 @@ import numpy as np
 
 from lhdmap.errors import InputError
 from lhdmap.exports.registration import GRID, Transform
-from lhdmap.integration.cloud import Cloud
+from lhdmap.integration.cloud import GridCloud
 from lhdmap.integration.cloud_fields import local_points
 from lhdmap.integration.cloud_io import read_cloud
 from lhdmap.json_files import read_json
@@ -75,7 +75,7 @@ class Content:
         return read_sheets(self.folder.file(FREE_SPACE))
 
     @cached_property
-    def cloud(self) -> Cloud:
+    def cloud(self) -> GridCloud:
         """The cloud; in the grid its points are about an origin of their own, so that float32 keeps their millimetres.
 
         Raises:

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 from lhdmap.exports.content import FREE_SPACE, Content, table_in_map
 from lhdmap.exports.outline import floor_of, walls
+from lhdmap.extras import library
 from lhdmap.topology.geojson import from_geojson
 from lhdmap.topology.model import Point
 
@@ -23,16 +24,14 @@ if TYPE_CHECKING:
 TEXT_M = 0.8
 LAYERS = {"WALLS": 7, "CENTRELINE": 5, "NODES": 3, "ACCESS_POINTS": 1, "WAYPOINTS": 6, "CONTROL_POINTS": 30}
 """Layers and their colours (AutoCAD colour index)."""
+_METRES = 6  # of $INSUNITS
 _AHEAD_M, _GAP_M = 1.2, 0.3
 _ARROW_M = ((-1.0, 0.0), (1.0, 0.0), (0.4, 0.35), (1.0, 0.0), (0.4, -0.35))
 
 
 def write(content: Content, path: Path, at: Callable[[Path], Path]) -> dict[str, Any]:
     """Write the drawing."""
-    from ezdxf import units
-    from ezdxf.filemanagement import new
-
-    drawing = new("R2018", units=units.M)
+    drawing = library("ezdxf.filemanagement").new("R2018", units=_METRES)
     for name, colour in LAYERS.items():
         drawing.layers.add(name, color=colour)
     drawing.blocks.new("ARROW").add_lwpolyline(_ARROW_M)
@@ -92,9 +91,8 @@ def _control_points(space: Modelspace, content: Content) -> None:
 
 def _text(space: Modelspace, layer: str, text: str, at: list[float], *, to_left: bool = False) -> None:
     """Write a text to the right of a place, or to its left."""
-    from ezdxf.enums import TextEntityAlignment
-
-    side = TextEntityAlignment.MIDDLE_RIGHT if to_left else TextEntityAlignment.MIDDLE_LEFT
+    alignment = library("ezdxf.enums").TextEntityAlignment
+    side = alignment.MIDDLE_RIGHT if to_left else alignment.MIDDLE_LEFT
     x, y, z = at
     place = (x - _GAP_M if to_left else x + _GAP_M, y, z)
     space.add_text(text, height=TEXT_M, dxfattribs={"layer": layer}).set_placement(place, align=side)
@@ -102,8 +100,6 @@ def _text(space: Modelspace, layer: str, text: str, at: list[float], *, to_left:
 
 def _show_all(drawing: Drawing, space: Modelspace) -> None:
     """Have the drawing open on what is in it, not on the grid's origin far away."""
-    from ezdxf import bbox
-
-    box = bbox.extents(space, fast=True)
+    box = library("ezdxf.bbox").extents(space, fast=True)
     if box.has_data:
         drawing.set_modelspace_vport(height=1.1 * max(box.size.y, 1.0), center=(box.center.x, box.center.y))

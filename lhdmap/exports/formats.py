@@ -34,6 +34,7 @@ FORMATS = {
     "graphml": Format("graphml", "graph of places, for network tools", (".graphml", ".xml")),
     "laz": Format("cloud", "cloud as LAZ or LAS", (".laz", ".las")),
     "ply": Format("cloud", "cloud as PLY", (".ply",)),
+    "e57": Format("e57", "cloud as ASTM E57 (extra e57)", (".e57",)),
     "tmap2": Format("tmap2", "topological map of LCAS topological_navigation", (".tmap2", ".yaml"), machines=True),
 }
 

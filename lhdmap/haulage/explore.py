@@ -119,6 +119,7 @@ class _Events:
         self._closes, self._opens = Event.CLOSED not in without, Event.OPENED not in without
 
     def of(self, at: Status) -> Iterator[tuple[Event, int]]:
+        """Yield the events that can happen in a status and are not ignored, each with the edge that it is about."""
         for event in self._of[at.state, at.permission]:
             if at.edge == NOWHERE and event in (Event.ASSISTED, Event.DISPATCH):
                 yield from ((event, edge) for edge in self._edges)

@@ -1,7 +1,8 @@
 """Several missions on one layout under section control: `Fleet.update({machine: MissionInput}) -> {machine: MissionOutput}`.
 
-A section is what edges of the same name (`node`) lie in. Each machine asks for the next one while it is in its own; what is
-granted becomes its `permit`, or frees its point. A machine that can only be let home is told to make way.
+A section is what edges of the same name (`Edge.held`: their node, or what it was joined to) lie in. Each machine asks for the next
+one while it is in its own; what is granted becomes its `permit`, or frees its point. A machine that can only be let home is told
+to make way.
 """
 
 from __future__ import annotations
@@ -15,7 +16,7 @@ from lhdmap.haulage.machine import NOWHERE, Errand, Status
 from lhdmap.haulage.mission import MissionTask
 from lhdmap.haulage.mission_io import MissionInput, MissionOutput
 from lhdmap.haulage.settings import HaulageSettings
-from lhdmap.haulage.states import TASKS, State
+from lhdmap.haulage.states import MOVING, TASKS, Permission, State
 from lhdmap.traffic.control import TrafficControl
 from lhdmap.traffic.sections import Haul, Leg, Section, SectionMap
 
@@ -51,15 +52,32 @@ class Fleet:
             outputs[name] = self.tasks[name].update(told._replace(permit=free, point_free=free, make_way=way))
         return outputs
 
+    def member(self, name: str) -> Member:
+        """Return one machine as a task of its own."""
+        return Member(self, name)
+
+    def nodes_of(self, name: str) -> frozenset[str]:
+        """Return the nodes (ids of the map, or names) of the sections that a machine holds."""
+        held = {section for section, by in self.control.held().items() if by == name}
+        nodes = {edge.node for edge in self._layout.edges if edge.held in held}
+        return frozenset(nodes | {one for one, named in self._layout.ids.items() if named in nodes})
+
+    def bound(self, name: str) -> str:
+        """Return where a machine is bound for, whatever it waits for; empty: it is to stand."""
+        task = self.tasks[name]
+        at = task.status
+        moves = at.state in MOVING | {State.QUEUE} and at.permission in (Permission.GO, Permission.WAIT)
+        return task.machine.goal(at) if moves else ""
+
     def _section_at(self, point: str) -> str:
-        return self._layout.edges[self._layout.entering[point][0]].node
+        return self._layout.edges[self._layout.entering[point][0]].held
 
     def _asks(self, name: str, told: MissionInput) -> None:
         """Let a machine give back what is behind it, and ask for what comes next."""
         task = self.tasks[name]
         if task.status.edge == NOWHERE:
             return
-        here, granted = self._layout.edges[task.status.edge].node, self.control.place(name).section
+        here, granted = self._layout.edges[task.status.edge].held, self.control.place(name).section
         if here != granted:
             return  # it has what comes next, and is not there yet
         at, entered_m = self._entered.get(name, ("", 0.0))
@@ -86,13 +104,13 @@ class Fleet:
         task, ahead = self.tasks[name], self._bound(name, told)
         if (ahead.state in TASKS and task.machine.working(ahead)) or task.to_go_m > self._settings.ask_m:
             return ""
-        here = self._layout.edges[ahead.edge].node
+        here = self._layout.edges[ahead.edge].held
         for _ in range(len(self._layout.edges)):
             following = task.machine.next_edge(ahead)
             if following is None:
                 return ""
-            if self._layout.edges[following].node != here:
-                return self._layout.edges[following].node
+            if self._layout.edges[following].held != here:
+                return self._layout.edges[following].held
             ahead = ahead._replace(edge=following)
         return ""
 
@@ -101,9 +119,9 @@ class Fleet:
         bound = self._bound(name, told)
         if bound.edge == NOWHERE:
             return False
-        here, granted = self._layout.edges[bound.edge].node, self.control.place(name).section
+        here, granted = self._layout.edges[bound.edge].held, self.control.place(name).section
         following = self.tasks[name].machine.next_edge(bound)
-        return following is not None and self._layout.edges[following].node in (
+        return following is not None and self._layout.edges[following].held in (
             {here} if here == granted else {here, granted}
         )
 
@@ -113,6 +131,23 @@ class Fleet:
         haul = self.control.haul(name)
         bound = place.leg == Leg.HOME and place.section not in (haul.dump, haul.home)
         return bound and task.status.left > 0 and not task.status.loaded
+
+
+class Member:
+    """One machine of a fleet with what a `MissionTask` offers; its goal stays while it waits: navigation holds by `free`."""
+
+    def __init__(self, fleet: Fleet, name: str) -> None:
+        self._fleet, self._name = fleet, name
+
+    @property
+    def free(self) -> frozenset[str]:
+        """Nodes that the machine may be in."""
+        return self._fleet.nodes_of(self._name)
+
+    def update(self, given: MissionInput) -> MissionOutput:
+        """Return what is asked of this machine now."""
+        out = self._fleet.update({self._name: given})[self._name]
+        return out._replace(goal=self._fleet.bound(self._name) or out.goal)
 
 
 def sections_of_layout(layout: Layout, errands: Mapping[str, Errand]) -> SectionMap:
@@ -132,6 +167,6 @@ def sections_of_layout(layout: Layout, errands: Mapping[str, Errand]) -> Section
                 raise UsageError(f"machine '{name}': no way from {start} to {goal}")
             edges = [layout.edges[layout.entering[start][0]], *(layout.edges[k] for k in route)]
             for edge in edges:
-                lengths[edge.node] = max(lengths.get(edge.node, 0.0), edge.length_m)
-            links |= dict.fromkeys(pairwise(node for node, _ in groupby(edges, key=lambda edge: edge.node)))
+                lengths[edge.held] = max(lengths.get(edge.held, 0.0), edge.length_m)
+            links |= dict.fromkeys(pairwise(name for name, _ in groupby(edges, key=lambda edge: edge.held)))
     return SectionMap(tuple(Section(name, length) for name, length in lengths.items()), tuple(links))

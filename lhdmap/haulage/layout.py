@@ -31,7 +31,8 @@ class Point(NamedTuple):
 class Edge(NamedTuple):
     """A way from a point to another. `line_m` (N, 2+): its path; `gives_way`: its turn crosses the opposing lane.
 
-    `node`: what the map calls the place that it lies in; `reverse_from_m`: from there on in reverse (a dock), inf: never.
+    `node`: what the map calls the place that it lies in; `section`: of traffic, empty: the node is one; `reverse_from_m`: from
+    there on in reverse (a dock), inf: never.
     """
 
     start: str
@@ -44,17 +45,27 @@ class Edge(NamedTuple):
     line_m: FloatArray | None = None
     speed_kmh: float = 0.0
     reverse_from_m: float = np.inf
+    section: str = ""
+
+    @property
+    def held(self) -> str:
+        """What one machine holds at a time to be on it."""
+        return self.section or self.node
 
 
 @dataclass(frozen=True)
 class Layout:
-    """Points and edges; `roles`: what is done in each area (`load`, `dump`, …); `ids`: names of nodes by the map's ids."""
+    """Points and edges; `roles`: what is done in each area (`load`, `dump`, …); `ids`: names of nodes by the map's ids.
+
+    `aprons`: corners (N, 2) of the ground of areas, where they are known.
+    """
 
     name: str
     points: tuple[Point, ...]
     edges: tuple[Edge, ...]
     roles: dict[str, str] = field(default_factory=dict)
     ids: dict[str, str] = field(default_factory=dict)
+    aprons: dict[str, FloatArray] = field(default_factory=dict)
 
     @cached_property
     def point(self) -> dict[str, Point]:

@@ -20,8 +20,11 @@ class Buckets(NamedTuple):
 
 
 class Navigation(NamedTuple):
-    """What navigation says: its state (`idle`, `driving`, `resting`, `backing`, `halted`, `arrived`, `assistance`), goal, why.
+    """What navigation says: its state, its goal, why.
 
+    The states: `idle`, `driving`, `waiting`, `resting`, `backing`, `halted`, `arrived`, `assistance`.
+
+    `waiting`: it stands before a node of the map that it may not enter yet.
     `missed`: it came to its goal, not within tolerance, and does not try again itself.
     """
 

@@ -31,6 +31,7 @@ class _Maker:
         self._areas = {one.id for one in topology.tunnels if one.id in of_work and DEAD_END in one.ends}
 
     def layout(self, name: str) -> Layout:
+        """Return the layout: edges of open connections, points where they meet, what is done in each area."""
         edges = tuple(edge for one in self._map.connections if self._open(one) for edge in self._edges(one))
         docks = {edge.start for edge in edges if edge.kind == State.DOCK}
         names = dict.fromkeys(point for edge in edges for point in (edge.start, edge.end))

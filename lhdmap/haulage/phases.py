@@ -43,6 +43,8 @@ def _drive(at: Status, given: MissionInput, *, first: bool) -> tuple[Phase, str]
     said = given.navigation
     if at.state in MOVING and said.state == "idle":
         return Phase.ROUTE, "navigation has no route yet"
+    if said.state == "waiting":
+        return Phase.TRAFFIC, "no permit for the next section"
     if said.state == "halted":
         return Phase.PLACE, said.reason or "place not known"
     if at.loaded:

@@ -50,6 +50,11 @@ class SiteArea:
     exit: bool = setting(True, doc="Whether a way leads from the queue point back to the mouth, past the places.")
     exit_by: tuple[tuple[float, float], ...] = setting((), unit="m", doc="Waypoints of that way.")
     speed_kmh: float = setting(10.0, unit="km/h", minimum=1.0, maximum=40.0, doc="Speed in it.")
+    apron: tuple[tuple[float, float], ...] = setting(
+        (),
+        unit="m",
+        doc=f"Corners of the ground that bounds it, in order, {_FRAME}; none: 12 m around all ways in it.",
+    )
     places: tuple[SitePlace, ...] = part(tuple, key="place")
 
 
@@ -86,6 +91,9 @@ class Site:
 
     def __post_init__(self) -> None:
         """Check what a key alone cannot; raises ConfigError."""
+        few = next((one for one in self.areas if 0 < len(one.apron) < 3), None)
+        if few is not None:
+            raise ConfigError(f"area '{few.name}': apron has {len(few.apron)} corners: three or more were wanted")
         names = [one.name for one in self.areas] + [place.name for one in self.areas for place in one.places]
         twice = next((name for name in names if names.count(name) > 1), None)
         if twice is not None:

@@ -49,6 +49,7 @@ class _Drawing:
         self._mouths = {one.name: self._mouth(one) for one in site.areas}
 
     def layout(self) -> Layout:
+        """Return the layout: lanes, turns and ways in the areas, and the points between them."""
         edges = (*self._roads(), *(edge for area in self._areas for edge in (*self._turns(area), *self._inside(area))))
         names = dict.fromkeys(name for edge in edges for name in (edge.start, edge.end))
         purposes = {
@@ -56,7 +57,12 @@ class _Drawing:
         }
         purposes |= {f"{area.name} queue": ("queue", area.name) for area in self._areas}
         points = tuple(Point(name, *purposes.get(name, ("", ""))) for name in names)
-        return Layout(self.site.name, points, edges, {area.name: area.role for area in self._areas})
+        aprons = {
+            area.name: np.array([self._in_map(area, corner)[:2] for corner in area.apron])
+            for area in self._areas
+            if area.apron
+        }
+        return Layout(self.site.name, points, edges, {area.name: area.role for area in self._areas}, aprons=aprons)
 
     def _mouth(self, area: SiteArea) -> _Mouth:
         room = self._reach + 1.0

@@ -120,7 +120,12 @@ def heading_at_end(line_m: FloatArray) -> float:
 
 
 def apron_of(layout: Layout, area: str, room_m: float) -> FloatArray:
-    """Return the ground of an area (4, 2): the rectangle around all ways in it, along the last one's heading, and so much more."""
+    """Return the corners (N, 2) of the ground of an area, as the site has them.
+
+    Where it does not say: the rectangle around all ways in it, along the heading at the queue point, and `room_m` more.
+    """
+    if area in layout.aprons:
+        return layout.aprons[area]
     lines = [
         one.line_m for one in layout.edges if one.area == area and one.line_m is not None and one.kind not in LANES
     ]

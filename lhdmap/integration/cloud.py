@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
+from lhdmap.extras import library
 from lhdmap.messages import Float32Array, FloatArray
 
 if TYPE_CHECKING:
@@ -15,7 +16,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, slots=True)
-class Cloud:
+class GridCloud:
     """N points; what is not known of them is None.
 
     Attributes:
@@ -45,13 +46,13 @@ class Cloud:
         points: FloatArray = self.points_m.astype(np.float64) + self.origin_m
         return points
 
-    def with_normals(self, normals: Float32Array, curvature: Float32Array) -> Cloud:
+    def with_normals(self, normals: Float32Array, curvature: Float32Array) -> GridCloud:
         """Return the same cloud with these normals, shape (N, 3), and curvatures, shape (N,)."""
         return replace(self, normals=normals, curvature=curvature)
 
     def to_open3d(self) -> PointCloud:
         """Return an `open3d.geometry.PointCloud` with points and, where they are known, normals; both are copied."""
-        import open3d as o3d
+        o3d = library("open3d")
 
         cloud = o3d.geometry.PointCloud(o3d.utility.Vector3dVector(self.points_m.astype(np.float64)))
         if self.normals is not None:

@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from lhdmap.errors import InputError
-from lhdmap.integration.cloud import Cloud
+from lhdmap.integration.cloud import GridCloud
 from lhdmap.messages import Float32Array, FloatArray
 
 LARGEST_COORDINATE_M = 131072.0  # where float32 steps reach 8 to 16 mm
@@ -29,7 +29,7 @@ PLY_NAMES = FieldNames(("nx", "ny", "nz"))
 PCD_NAMES = FieldNames(("normal_x", "normal_y", "normal_z"))
 
 
-def table_of(cloud: Cloud, names: FieldNames, stamp_types: list[tuple[str, str]]) -> Table:
+def table_of(cloud: GridCloud, names: FieldNames, stamp_types: list[tuple[str, str]]) -> Table:
     """Return the cloud as a structured array with the fields that it has; stamps are left for the caller to fill in."""
     far = any(cloud.origin_m)
     points = cloud.exact_m() if far else cloud.points_m
@@ -51,7 +51,7 @@ def table_of(cloud: Cloud, names: FieldNames, stamp_types: list[tuple[str, str]]
     return table
 
 
-def cloud_of(path: Path, table: Table, stamps_ns: npt.NDArray[np.int64] | None) -> Cloud:
+def cloud_of(path: Path, table: Table, stamps_ns: npt.NDArray[np.int64] | None) -> GridCloud:
     """Return the cloud of a file's table; points that are not finite are left out, unknown fields are passed over.
 
     Raises:
@@ -64,7 +64,7 @@ def cloud_of(path: Path, table: Table, stamps_ns: npt.NDArray[np.int64] | None) 
     points, origin = local_points(path, _columns(table, ("x", "y", "z"), np.float64), exact=exact)
     keep = np.isfinite(points).all(axis=1)
     normal = next((n.normal for n in (PLY_NAMES, PCD_NAMES) if set(n.normal) <= set(names)), None)
-    return Cloud(
+    return GridCloud(
         points_m=points[keep],
         normals=None if normal is None else _columns(table, normal, np.float32)[keep],
         curvature=table["curvature"][keep].astype(np.float32) if "curvature" in names else None,

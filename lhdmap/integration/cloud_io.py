@@ -7,15 +7,15 @@ from pathlib import Path
 
 from lhdmap.errors import InputError, UsageError
 from lhdmap.integration import laz, pcd, ply
-from lhdmap.integration.cloud import Cloud
+from lhdmap.integration.cloud import GridCloud
 
-READERS: dict[str, Callable[[Path], Cloud]] = {
+READERS: dict[str, Callable[[Path], GridCloud]] = {
     ".ply": ply.read_ply,
     ".pcd": pcd.read_pcd,
     ".las": laz.read_laz,
     ".laz": laz.read_laz,
 }
-WRITERS: dict[str, Callable[[Path, Cloud], None]] = {
+WRITERS: dict[str, Callable[[Path, GridCloud], None]] = {
     ".ply": ply.write_ply,
     ".pcd": pcd.write_pcd,
     ".las": laz.write_laz,
@@ -23,7 +23,7 @@ WRITERS: dict[str, Callable[[Path, Cloud], None]] = {
 }
 
 
-def read_cloud(path: Path) -> Cloud:
+def read_cloud(path: Path) -> GridCloud:
     """Return the cloud of a PLY, PCD, LAS or LAZ file; points that are not finite are left out.
 
     Raises:
@@ -38,7 +38,7 @@ def read_cloud(path: Path) -> Cloud:
         raise InputError(f"{path}: {error.strerror or error}") from error
 
 
-def write_cloud(path: Path, cloud: Cloud) -> None:
+def write_cloud(path: Path, cloud: GridCloud) -> None:
     """Write a cloud in the format of the suffix.
 
     Raises:

@@ -12,9 +12,9 @@ import numpy.typing as npt
 from lhdmap.errors import InputError
 from lhdmap.integration.batch import BatchMaker, BatchPoses, BatchRoom, Scans, alike, project_scans, size_of
 from lhdmap.integration.beams import sweep_stamps_ns, table_of
-from lhdmap.integration.cloud import Cloud
+from lhdmap.integration.cloud import GridCloud
 from lhdmap.integration.normals import estimate_normals
-from lhdmap.integration.project import Counts, Limits, SweepPoses, project_cloud
+from lhdmap.integration.project import BeamCounts, Limits, SweepPoses, project_cloud
 from lhdmap.integration.self_filter import Rig, rig_of
 from lhdmap.integration.voxel_grid import VoxelGrid
 from lhdmap.machine import Machine
@@ -65,7 +65,7 @@ class Integrated(NamedTuple):
     """One sweep in `map`: points, shape (N, 3), metres (a view that the next update overwrites), and its counts."""
 
     points_map: FloatArray
-    counts: Counts
+    counts: BeamCounts
 
 
 @dataclass(slots=True)
@@ -118,11 +118,11 @@ class Integrator:
             self._project(messages, np.array(group), poses, room)
         rows = room.starts, np.ascontiguousarray(room.counts[:, 0])
         self.grid.add_sweeps(room.points_map, room.stamps_ns, rows, room.viewpoints_map)
-        self._count(int(np.count_nonzero(finite)), len(messages), Counts(*room.counts.sum(axis=0).tolist()))
+        self._count(int(np.count_nonzero(finite)), len(messages), BeamCounts(*room.counts.sum(axis=0).tolist()))
         found = zip(room.starts.tolist(), room.counts.tolist(), strict=True)
-        return [Integrated(room.points_map[start : start + count[0]], Counts(*count)) for start, count in found]
+        return [Integrated(room.points_map[start : start + count[0]], BeamCounts(*count)) for start, count in found]
 
-    def cloud(self) -> Cloud:
+    def cloud(self) -> GridCloud:
         """Return the map so far with normals and curvature, stray voxels left out."""
         chosen = self.settings
         cloud = self.grid.cloud(chosen.min_hits, chosen.min_neighbour_hits)
@@ -173,7 +173,7 @@ class Integrator:
         low_m, high_m = max(s.range_min_m, float(message.range_min_m)), min(s.range_max_m, float(message.range_max_m))
         return Limits(low_m, high_m, s.stray_m, s.stray_share)
 
-    def _count(self, taken: int, given: int, counts: Counts) -> None:
+    def _count(self, taken: int, given: int, counts: BeamCounts) -> None:
         totals = self.totals
         totals.sweeps += taken
         totals.refused_sweeps += given - taken

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from lhdmap.errors import InputError
-from lhdmap.integration.cloud import Cloud
+from lhdmap.integration.cloud import GridCloud
 from lhdmap.integration.cloud_fields import local_points
 
 if TYPE_CHECKING:
@@ -21,7 +21,7 @@ CHUNK = 1_000_000
 MOST_POINTS_PER_BYTE = 2_000  # equal points pack well
 
 
-def write_laz(path: Path, cloud: Cloud) -> None:
+def write_laz(path: Path, cloud: GridCloud) -> None:
     """Write LAS or, by the suffix, LAZ.
 
     Normals, curvature and the exact stamp (64-bit integer) are extra dimensions under the names of the PLY file; the
@@ -47,7 +47,7 @@ def write_laz(path: Path, cloud: Cloud) -> None:
     las.write(str(path))
 
 
-def read_laz(path: Path) -> Cloud:
+def read_laz(path: Path) -> GridCloud:
     """Return the points of a LAS or LAZ file; what `write_laz` adds comes back, other dimensions are passed over.
 
     Raises:
@@ -104,13 +104,13 @@ def _parts(path: Path, reader: LasReader, room: int) -> list[dict[str, np.ndarra
     return parts
 
 
-def _cloud(path: Path, parts: list[dict[str, np.ndarray]]) -> Cloud:
+def _cloud(path: Path, parts: list[dict[str, np.ndarray]]) -> GridCloud:
     columns = {name: np.concatenate([part[name] for part in parts]) for name in (parts[0] if parts else ())}
     points, origin = local_points(path, columns.get("xyz", np.zeros((0, 3))), exact=True)
     keep = np.isfinite(points).all(axis=1)
     columns = {name: values[keep] for name, values in columns.items()}
     normals = [columns[name] for name in EXTRA[:3] if name in columns]
-    return Cloud(
+    return GridCloud(
         points[keep],
         np.column_stack(normals).astype(np.float32) if len(normals) == 3 else None,
         columns["curvature"].astype(np.float32) if "curvature" in columns else None,
@@ -120,7 +120,7 @@ def _cloud(path: Path, parts: list[dict[str, np.ndarray]]) -> Cloud:
     )
 
 
-def _extra(cloud: Cloud) -> dict[str, np.ndarray]:
+def _extra(cloud: GridCloud) -> dict[str, np.ndarray]:
     extra: dict[str, np.ndarray] = {}
     if cloud.normals is not None:
         extra |= {name: cloud.normals[:, axis] for axis, name in enumerate(("nx", "ny", "nz"))}

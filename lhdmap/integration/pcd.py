@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from lhdmap.errors import InputError
-from lhdmap.integration.cloud import Cloud
+from lhdmap.integration.cloud import GridCloud
 from lhdmap.integration.cloud_fields import PCD_NAMES, Table, binary_table, cloud_of, table_of, text_table
 
 TYPES = {(kind, size): f"<{kind.lower()}{size}" for kind in "IU" for size in (1, 2, 4, 8)} | {
@@ -21,7 +21,7 @@ LARGEST_HEADER = 1 << 16
 LZF_GROWTH = 264  # one pair of LZF bytes stands for 264 bytes at most
 
 
-def write_pcd(path: Path, cloud: Cloud) -> None:
+def write_pcd(path: Path, cloud: GridCloud) -> None:
     """Write a binary PCD: x y z normal_x normal_y normal_z curvature stamp_ns (int64) hits, as far as known."""
     table = table_of(cloud, PCD_NAMES, [("stamp_ns", "<i8")])
     if cloud.stamps_ns is not None:
@@ -45,7 +45,7 @@ def write_pcd(path: Path, cloud: Cloud) -> None:
         file.write(table.tobytes())
 
 
-def read_pcd(path: Path) -> Cloud:
+def read_pcd(path: Path) -> GridCloud:
     """Return the points of a PCD file; unknown fields are passed over.
 
     Raises:

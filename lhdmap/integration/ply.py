@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from lhdmap.errors import InputError
-from lhdmap.integration.cloud import Cloud
+from lhdmap.integration.cloud import GridCloud
 from lhdmap.integration.cloud_fields import PLY_NAMES, Table, binary_table, cloud_of, columns_of, table_of, text_table
 from lhdmap.integration.ply_header import Element, read_header
 
@@ -22,7 +22,7 @@ LARGEST_LIST = 4096
 COUNT = "number of "
 
 
-def write_ply(path: Path, cloud: Cloud, *, frame: str = "map") -> None:
+def write_ply(path: Path, cloud: GridCloud, *, frame: str = "map") -> None:
     """Write a binary PLY with what the cloud has of x y z nx ny nz curvature stamp_ns stamp_rest_ns hits; `frame` it is in.
 
     A cloud with an origin of its own has x y z as double, with that origin added.
@@ -41,7 +41,7 @@ def write_ply(path: Path, cloud: Cloud, *, frame: str = "map") -> None:
         file.write(table.tobytes())
 
 
-def read_ply(path: Path) -> Cloud:
+def read_ply(path: Path) -> GridCloud:
     """Return the vertices of a PLY file (text, little or big endian); faces and unknown properties are passed over.
 
     Raises:

@@ -14,8 +14,9 @@ import numba as nb
 import numpy as np
 import numpy.typing as npt
 
+from lhdmap.geometry.articulated import T_base_rear
 from lhdmap.integration.beams import BeamTable
-from lhdmap.integration.self_filter import Rig, base_to_rear, body_poses, in_boxes
+from lhdmap.integration.self_filter import Rig, body_poses, in_boxes
 from lhdmap.messages import Float32Array, FloatArray
 
 
@@ -58,7 +59,7 @@ class Limits(NamedTuple):
     stray_share: float = 0.0
 
 
-class Counts(NamedTuple):
+class BeamCounts(NamedTuple):
     """What became of a sweep's beams: kept points, no returns, returns from the machine itself, stray returns."""
 
     kept: int
@@ -81,7 +82,7 @@ class _Arc(NamedTuple):
 def sensor_pose(T_map_base: FloatArray, articulation_rad: float, rig: Rig) -> FloatArray:
     """Return T_map_sensor, shape (4, 4)."""
     if rig.on_rear:
-        return T_map_base @ base_to_rear(articulation_rad, rig.L_f_m, rig.L_r_m) @ rig.T_parent_sensor
+        return T_map_base @ T_base_rear(articulation_rad, rig.L_f_m, rig.L_r_m) @ rig.T_parent_sensor
     return T_map_base @ rig.T_parent_sensor
 
 
@@ -125,7 +126,7 @@ def project_scan(
     poses: SweepPoses,
     rig: Rig,
     out: SweepPoints,
-) -> Counts:
+) -> BeamCounts:
     """Project a scan into the map.
 
     Args:
@@ -159,7 +160,7 @@ def project_scan(
         _put(out.points_map, n, arc, i * step, (x, y, 0.0))
         out.stamps_ns[n] = span_ns[0] + round(i * step * (span_ns[1] - span_ns[0]))
         n += 1
-    return Counts(n, no_return, own, strays)
+    return BeamCounts(n, no_return, own, strays)
 
 
 @nb.njit(cache=True, nogil=True)
@@ -183,7 +184,7 @@ def project_cloud(
     poses: SweepPoses,
     rig: Rig,
     out: SweepPoints,
-) -> Counts:
+) -> BeamCounts:
     """Project a 3D scanner's points, shape (N, 3), into the map; `offsets_s` (N,) or empty; else as `project_scan`."""
     arc = _arc(poses, rig)
     out.viewpoint_map[:] = arc.t
@@ -207,4 +208,4 @@ def project_cloud(
         _put(out.points_map, n, arc, share, (x, y, z))
         out.stamps_ns[n] = span_ns[0] + round(share * (span_ns[1] - span_ns[0]))
         n += 1
-    return Counts(n, no_return, own, 0)
+    return BeamCounts(n, no_return, own, 0)

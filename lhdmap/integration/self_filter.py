@@ -9,6 +9,8 @@ import numpy as np
 import numpy.typing as npt
 
 from lhdmap.errors import InputError
+from lhdmap.geometry.articulated import T_base_rear, T_rear_base
+from lhdmap.geometry.boxes import grown
 from lhdmap.machine import Machine
 from lhdmap.messages import BODY_FRAMES, FloatArray, Mount
 
@@ -41,7 +43,7 @@ def rig_of(mount: Mount, machine: Machine, margin_m: float) -> Rig:
     T = np.ascontiguousarray(mount.T_parent_child, dtype=np.float64)
     if T.shape != (4, 4) or not np.allclose(T[:3, :3] @ T[:3, :3].T, np.eye(3), atol=1e-3):
         raise InputError(f"mount of '{mount.child_frame}': a rigid 4 x 4 pose was wanted; check /tf_static")
-    front, rear = (_grown(machine.boxes(frame), margin_m) for frame in BODY_FRAMES)
+    front, rear = (grown(machine.boxes(frame), margin_m) for frame in BODY_FRAMES)
     size = machine.dimensions
     L_f, L_r = size.joint_to_front_axle_m, size.joint_to_rear_axle_m
     # All distances go through the joint, so that the bound holds at any articulation.
@@ -49,39 +51,11 @@ def rig_of(mount: Mount, machine: Machine, margin_m: float) -> Rig:
     return Rig(T, mount.parent_frame == "rear_link", L_f, L_r, front, rear, reach_m)
 
 
-def _grown(boxes: FloatArray, margin_m: float) -> FloatArray:
-    """Return boxes, shape (N, 2, 3), as (N, 6), `margin_m` larger on all sides."""
-    grown = boxes.reshape(-1, 6).astype(np.float64)
-    grown[:, :3] -= margin_m
-    grown[:, 3:] += margin_m
-    return grown
-
-
 def _radius(boxes: FloatArray) -> float:
     """Return the largest distance of any box corner from the origin of the body."""
     if len(boxes) == 0:
         return 0.0
     return float(np.linalg.norm(np.maximum(np.abs(boxes[:, :3]), np.abs(boxes[:, 3:])), axis=1).max())
-
-
-@nb.njit(cache=True, nogil=True)
-def base_to_rear(articulation_rad: float, L_f_m: float, L_r_m: float) -> FloatArray:
-    """Return T_base_rear, shape (4, 4): the pose of `rear_link` in `base_link`, as `kinematics.T_base_rear`."""
-    c, s = np.cos(articulation_rad), np.sin(articulation_rad)
-    T = np.eye(4)
-    T[0, 0], T[0, 1], T[1, 0], T[1, 1] = c, s, -s, c
-    T[0, 3], T[1, 3] = -L_f_m - L_r_m * c, L_r_m * s
-    return T
-
-
-@nb.njit(cache=True, nogil=True)
-def rear_to_base(articulation_rad: float, L_f_m: float, L_r_m: float) -> FloatArray:
-    """Return T_rear_base, shape (4, 4)."""
-    c, s = np.cos(articulation_rad), np.sin(articulation_rad)
-    T = np.eye(4)
-    T[0, 0], T[0, 1], T[1, 0], T[1, 1] = c, -s, s, c
-    T[0, 3], T[1, 3] = L_r_m + L_f_m * c, L_f_m * s
-    return T
 
 
 @nb.njit(cache=True, nogil=True)
@@ -116,5 +90,5 @@ def self_hits(rig: Rig, points_sensor: FloatArray, articulation_rad: float) -> n
 def body_poses(rig: Rig, articulation_rad: float) -> tuple[FloatArray, FloatArray]:
     """Return (T_base_sensor, T_rear_sensor), each of shape (4, 4)."""
     if rig.on_rear:
-        return base_to_rear(articulation_rad, rig.L_f_m, rig.L_r_m) @ rig.T_parent_sensor, rig.T_parent_sensor.copy()
-    return rig.T_parent_sensor.copy(), rear_to_base(articulation_rad, rig.L_f_m, rig.L_r_m) @ rig.T_parent_sensor
+        return T_base_rear(articulation_rad, rig.L_f_m, rig.L_r_m) @ rig.T_parent_sensor, rig.T_parent_sensor.copy()
+    return rig.T_parent_sensor.copy(), T_rear_base(articulation_rad, rig.L_f_m, rig.L_r_m) @ rig.T_parent_sensor

@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from lhdmap.errors import UsageError
-from lhdmap.integration.cloud import Cloud
+from lhdmap.integration.cloud import GridCloud
 from lhdmap.messages import FloatArray
 
 VOXEL = np.dtype(  # 64 bytes: one cache line
@@ -98,7 +98,7 @@ class VoxelGrid:
         self.refused += refused
         return refused
 
-    def cloud(self, min_hits: int = 1, min_neighbour_hits: int = 0) -> Cloud:
+    def cloud(self, min_hits: int = 1, min_neighbour_hits: int = 0) -> GridCloud:
         """Return the centroids with hits, first stamp and viewpoint, in the order of their first hit.
 
         A voxel with fewer than `min_hits` hits is left out unless its 26 neighbours hold `min_neighbour_hits` hits
@@ -107,7 +107,7 @@ class VoxelGrid:
         voxels = self.voxels
         if min_hits > 1 and min_neighbour_hits > 0:
             voxels = voxels[supported(self._table, self._count, min_hits, min_neighbour_hits)]
-        return Cloud(
+        return GridCloud(
             points_m=centroids(voxels, self.size_m),
             stamps_ns=voxels["first_ns"].copy(),
             hits=voxels["hits"].copy(),

@@ -11,9 +11,9 @@ from lhdmap.errors import InputError
 from lhdmap.landmarks.distinct import gaps, reduced_chi2
 from lhdmap.landmarks.keys import Keys, choose_keys
 from lhdmap.landmarks.model import Landmarks, NodeSurface
-from lhdmap.landmarks.profile import Profile, profile_of
+from lhdmap.landmarks.profile import WallProfile, profile_of
 from lhdmap.landmarks.quality import quality_of
-from lhdmap.landmarks.scans import Cloud, NodeScan, along_tunnel, checked, in_node, of_intersection, ordered
+from lhdmap.landmarks.scans import NodeCloud, NodeScan, along_tunnel, checked, in_node, of_intersection, ordered
 from lhdmap.landmarks.settings import LandmarkSettings
 from lhdmap.landmarks.similarity import similarity
 from lhdmap.landmarks.surface import Cells, fused, placed
@@ -43,7 +43,7 @@ def landmarks_of(
         InputError: a scan is in a node without a frame, or its pose or points are not usable.
     """
     by_node = _by_node(scans, frames)
-    parts: list[tuple[str, list[Cloud], Keys]] = []
+    parts: list[tuple[str, list[NodeCloud], Keys]] = []
     matrices: dict[str, Float32Array] = {}
     surfaces: dict[str, NodeSurface] = {}
     for number, (node, own) in enumerate(by_node.items()):
@@ -89,7 +89,9 @@ def node_surface(
     return NodeSurface(cells, quality, profile._replace(gap=gaps(profile, settings)))
 
 
-def _profile(cells: Cells, scans: Sequence[NodeScan], T_map_node: FloatArray, settings: LandmarkSettings) -> Profile:
+def _profile(
+    cells: Cells, scans: Sequence[NodeScan], T_map_node: FloatArray, settings: LandmarkSettings
+) -> WallProfile:
     at_m, way = _way(scans, T_map_node)
     points, counts = cells.points_m.astype(np.float64), cells.counts.astype(np.float64)
     return profile_of(points, counts, way, at_m, settings)
@@ -126,7 +128,7 @@ def _whole(count: int) -> Keys:
 
 
 def _joined(
-    parts: Sequence[tuple[str, list[Cloud], Keys]],
+    parts: Sequence[tuple[str, list[NodeCloud], Keys]],
     matrices: Mapping[str, Float32Array],
     surfaces: Mapping[str, NodeSurface],
 ) -> Landmarks:

@@ -12,7 +12,7 @@ from __future__ import annotations
 import numba as nb
 import numpy as np
 
-from lhdmap.landmarks.profile import Profile
+from lhdmap.landmarks.profile import WallProfile
 from lhdmap.landmarks.settings import LandmarkSettings
 from lhdmap.messages import Float32Array, FloatArray
 
@@ -26,7 +26,7 @@ _LEAST_M = 0.5
 Stretches = list[tuple[float, float]]
 
 
-def gaps(profile: Profile, settings: LandmarkSettings) -> Float32Array:
+def gaps(profile: WallProfile, settings: LandmarkSettings) -> Float32Array:
     """Return for each bin (P,) how much less likely the most similar other place is for the window around it, nats.
 
     inf where there is no other place for the window.
@@ -45,7 +45,7 @@ def gaps(profile: Profile, settings: LandmarkSettings) -> Float32Array:
     return best.astype(np.float32)
 
 
-def reduced_chi2(one: Profile, other: Profile, settings: LandmarkSettings) -> float:
+def reduced_chi2(one: WallProfile, other: WallProfile, settings: LandmarkSettings) -> float:
     """Return the mean of the truncated squared differences of two profiles of one tunnel over their variance; NaN without any."""
     if min(len(one.at_m), len(other.at_m)) < 2:
         return float("nan")
@@ -67,7 +67,7 @@ def not_distinctive(at_m: Float32Array, gap: Float32Array, least: float) -> Stre
     return [one for one in found if one[1] - one[0] >= _LEAST_M]
 
 
-def channels(profile: Profile, step_m: float, noise: float = 1.0) -> tuple[FloatArray, FloatArray]:
+def channels(profile: WallProfile, step_m: float, noise: float = 1.0) -> tuple[FloatArray, FloatArray]:
     """Return values and variances (P, 3): left and right wall, turn of the mid line; NaN where not known.
 
     `noise`: factor of what of the walls' variance is not due to their slope.

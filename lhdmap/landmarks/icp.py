@@ -16,7 +16,7 @@ import numpy as np
 from lhdmap.geometry import se2
 from lhdmap.landmarks.target import REACH_M, IcpModel, Target, bearing, counterpart, distance2, prepare
 from lhdmap.messages import Float32Array, FloatArray
-from lhdmap.scan_matching.matching import solve3
+from lhdmap.scan_matching.equations import solve3
 
 _ROUNDS, _POINT_ROUNDS, _WIDE_ROUNDS, _TRIED = 30, 60, 4, 3  # points slide along a wall slowly
 _NARROWING = 0.85  # of the gate, each round
@@ -25,7 +25,7 @@ _STEADY = 2e-4  # m, and rad times 5: a step below it ends the rounds
 _NOISE_M = 0.012
 
 
-class Fit(NamedTuple):
+class IcpFit(NamedTuple):
     """A cloud placed: `pose` (3,) in the target's frame, `fitness` (m²), `share` in common, `information` (3, 3), target axes.
 
     `fitness` is the mean of the squared distances, truncated at the limit; where too little is in common it is the limit's
@@ -132,8 +132,8 @@ def judge(target, points, pose, model):  # type: ignore[no-untyped-def]
 
 
 @nb.njit(cache=True, nogil=True)
-def align(target: Target, points_m: FloatArray, start: FloatArray, model: IcpModel) -> Fit:
-    """Return the `Fit` of points (N, 2), N > 0, on a target from the pose `start` (3,): T_target_source, m and rad.
+def align(target: Target, points_m: FloatArray, start: FloatArray, model: IcpModel) -> IcpFit:
+    """Return the `IcpFit` of points (N, 2), N > 0, on a target from the pose `start` (3,): T_target_source, m and rad.
 
     It finds what is up to a metre and some degrees away in rough walls.
     """
@@ -142,12 +142,12 @@ def align(target: Target, points_m: FloatArray, start: FloatArray, model: IcpMod
     fitness, share, valid = judge(target, points_m, pose, model)
     H, b = np.zeros((3, 3)), np.zeros(3)
     _equations(target, points_m, 1, pose, _last_gate(model), model.to_line, H, b)
-    return Fit(pose, fitness, share, valid, H / max(fitness, _NOISE_M**2))
+    return IcpFit(pose, fitness, share, valid, H / max(fitness, _NOISE_M**2))
 
 
 @nb.njit(cache=True, nogil=True)
-def best_of(target: Target, points_m: FloatArray, starts: FloatArray, model: IcpModel) -> Fit:
-    """Return the `Fit` with the least fitness from any of the starts (S, 3), S > 0.
+def best_of(target: Target, points_m: FloatArray, starts: FloatArray, model: IcpModel) -> IcpFit:
+    """Return the `IcpFit` with the least fitness from any of the starts (S, 3), S > 0.
 
     From each start a few wide rounds over each second point; the likeliest three are then matched to the end.
     """
@@ -179,7 +179,7 @@ def _roughly(target, points, pose, model):  # type: ignore[no-untyped-def]
     return total / max(n, 1)
 
 
-def fit(target_m: Float32Array, source_m: Float32Array, start: FloatArray, model: IcpModel) -> Fit:
-    """Return the `Fit` of one cloud (N, 2) on another (M, 2); for a pair alone, both as they are stored."""
+def fit(target_m: Float32Array, source_m: Float32Array, start: FloatArray, model: IcpModel) -> IcpFit:
+    """Return the `IcpFit` of one cloud (N, 2) on another (M, 2); for a pair alone, both as they are stored."""
     target = prepare(np.asarray(target_m, dtype=np.float64), model)
     return align(target, np.asarray(source_m, dtype=np.float64), np.asarray(start, dtype=np.float64), model)

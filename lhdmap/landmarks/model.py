@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from lhdmap.errors import InputError
 from lhdmap.landmarks.distinct import Stretches, not_distinctive
-from lhdmap.landmarks.profile import Profile
+from lhdmap.landmarks.profile import WallProfile
 from lhdmap.landmarks.quality import Quality
 from lhdmap.landmarks.settings import LandmarkSettings
 from lhdmap.landmarks.surface import Cells, surface_map
@@ -24,7 +24,7 @@ class NodeSurface(NamedTuple):
 
     cells: Cells
     quality: Quality
-    profile: Profile | None
+    profile: WallProfile | None
 
 
 @dataclass(frozen=True)

@@ -25,7 +25,7 @@ _STEP_M = 0.3
 _PASSES = 3
 
 
-class Profile(NamedTuple):
+class WallProfile(NamedTuple):
     """Walls along a tunnel, P bins: float32 (P,) but for `line_m`, (P, 2).
 
     `at_m`: place along the node's line; `line_m`: the mid line in the node's frame; `heading_rad`: its heading there. `left_m`,
@@ -54,7 +54,7 @@ class Profile(NamedTuple):
 
 def profile_of(
     cells_m: FloatArray, counts: FloatArray, way_m: FloatArray, at_m: FloatArray, settings: LandmarkSettings
-) -> Profile:
+) -> WallProfile:
     """Return the profile of averaged hits (M, 2) along a way (K, 2) that was driven, all in one frame.
 
     Args:
@@ -81,12 +81,12 @@ def profile_of(
     single_left, single_right, left_var, right_var = (np.asarray(column, dtype=np.float32) for column in walls.T)
     gap = np.full(len(at), np.inf, dtype=np.float32)
     single_at, single_line, heading = (np.asarray(column, dtype=np.float32) for column in (at, line, _heading(line)))
-    return Profile(single_at, single_line, heading, single_left, single_right, left_var, right_var, gap)
+    return WallProfile(single_at, single_line, heading, single_left, single_right, left_var, right_var, gap)
 
 
-def _empty() -> Profile:
+def _empty() -> WallProfile:
     none = np.zeros(0, dtype=np.float32)
-    return Profile(none, np.zeros((0, 2), dtype=np.float32), none, none, none, none, none, none)
+    return WallProfile(none, np.zeros((0, 2), dtype=np.float32), none, none, none, none, none, none)
 
 
 def _resampled(line_m: FloatArray, at_m: FloatArray, step_m: float) -> tuple[FloatArray, FloatArray]:
@@ -175,7 +175,7 @@ def _walls(bins, lateral, counts, out):  # type: ignore[no-untyped-def]
                 out[k, 2 + side] = max(wdd / w - mean * mean, 0.0) / n + _FLOOR_M**2
 
 
-def line_pose(profile: Profile, at_m: float) -> FloatArray:
+def line_pose(profile: WallProfile, at_m: float) -> FloatArray:
     """Return the pose (3,) of the mid line at a place along the node, in the node's frame."""
     columns = (profile.line_m[:, 0], profile.line_m[:, 1], profile.heading_rad)
     x, y, heading = (float(np.interp(at_m, profile.at_m, column)) for column in columns)

@@ -29,7 +29,7 @@ class NodeScan(NamedTuple):
     height_m: float = 0.0
 
 
-class Cloud(NamedTuple):
+class NodeCloud(NamedTuple):
     """A landmark's cloud `points_m` (N, 2): in the machine's frame at `T_node_base` (3,), `at_m` along its node."""
 
     at_m: float
@@ -82,7 +82,7 @@ def thinned(points_m: FloatArray, voxel_m: float) -> FloatArray:
     return means
 
 
-def along_tunnel(scans: Sequence[NodeScan], T_map_node: FloatArray, settings: LandmarkSettings) -> list[Cloud]:
+def along_tunnel(scans: Sequence[NodeScan], T_map_node: FloatArray, settings: LandmarkSettings) -> list[NodeCloud]:
     """Return the clouds of a tunnel: of the scan nearest to each multiple of the spacing, if one is within half of it."""
     scans = ordered(scans)
     places = np.array([scan.at_m for scan in scans])
@@ -95,15 +95,15 @@ def along_tunnel(scans: Sequence[NodeScan], T_map_node: FloatArray, settings: La
     return [cloud for cloud in clouds if len(cloud.points_m)]
 
 
-def _cloud(scan: NodeScan, T_map_node: FloatArray, settings: LandmarkSettings) -> Cloud:
+def _cloud(scan: NodeScan, T_map_node: FloatArray, settings: LandmarkSettings) -> NodeCloud:
     points = thinned(near(scan.points_m, settings.range_m, settings.centre_m), settings.voxel_m)
-    return Cloud(scan.at_m, in_node(scan, T_map_node), points)
+    return NodeCloud(scan.at_m, in_node(scan, T_map_node), points)
 
 
-def of_intersection(scans: Sequence[NodeScan], T_map_node: FloatArray, settings: LandmarkSettings) -> Cloud:
+def of_intersection(scans: Sequence[NodeScan], T_map_node: FloatArray, settings: LandmarkSettings) -> NodeCloud:
     """Return the one cloud of an intersection, in the node's frame: all its scans, integrated."""
     parts = [
         se2.transform(in_node(scan, T_map_node), near(scan.points_m, settings.range_m, settings.centre_m))
         for scan in ordered(scans)
     ]
-    return Cloud(0.0, np.zeros(3), thinned(np.concatenate(parts), settings.voxel_m))
+    return NodeCloud(0.0, np.zeros(3), thinned(np.concatenate(parts), settings.voxel_m))

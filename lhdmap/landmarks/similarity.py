@@ -20,7 +20,7 @@ import numpy as np
 
 from lhdmap.geometry import se2
 from lhdmap.landmarks.icp import align, best_of
-from lhdmap.landmarks.scans import Cloud
+from lhdmap.landmarks.scans import NodeCloud
 from lhdmap.landmarks.settings import LandmarkSettings
 from lhdmap.landmarks.target import IcpModel, prepare
 from lhdmap.messages import Float32Array, FloatArray
@@ -37,7 +37,7 @@ def icp_model(settings: LandmarkSettings) -> IcpModel:
 
 
 def similarity(
-    clouds: Sequence[Cloud],
+    clouds: Sequence[NodeCloud],
     settings: LandmarkSettings,
     *,
     threads: int | None = None,

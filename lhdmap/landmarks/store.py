@@ -7,7 +7,7 @@
 | `surface_node` (n,), `surface_offsets` (n + 1,), `surface_points`, `surface_counts`, `surface_cell_m` | fused walls by node |
 | `surface_height_dm` | of each cell, the floor's height in `map`, dm; not in older maps |
 | `surface_quality` (n, 8) | `Quality`, in the order of its fields |
-| `profile_node` (t,), `profile_offsets` (t + 1,), `profile_<field>` | `Profile` of each tunnel, one after the other |
+| `profile_node` (t,), `profile_offsets` (t + 1,), `profile_<field>` | `WallProfile` of each tunnel, one after the other |
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ import numpy.typing as npt
 
 from lhdmap.errors import InputError
 from lhdmap.landmarks.model import Landmarks, NodeSurface
-from lhdmap.landmarks.profile import Profile
+from lhdmap.landmarks.profile import WallProfile
 from lhdmap.landmarks.quality import Quality
 from lhdmap.landmarks.surface import Cells
 
@@ -33,7 +33,7 @@ _OF_LANDMARKS = ("poses_node", "node", "at_m", "threshold", "delta", "radius", "
 _NEEDED = (
     *("points", "offsets", *_OF_LANDMARKS),
     *("surface_node", "surface_offsets", "surface_points", "surface_counts", "surface_cell_m", "surface_quality"),
-    *("profile_node", "profile_offsets", *(f"profile_{name}" for name in Profile._fields)),
+    *("profile_node", "profile_offsets", *(f"profile_{name}" for name in WallProfile._fields)),
 )
 
 
@@ -50,7 +50,7 @@ def write_landmarks(path: Path, landmarks: Landmarks) -> None:
 def _surface_arrays(surfaces: Mapping[str, NodeSurface]) -> dict[str, npt.NDArray[Any]]:
     cells = [surface.cells for surface in surfaces.values()]
     profiles = {node: surface.profile for node, surface in surfaces.items() if surface.profile is not None}
-    empty = Profile(*(np.zeros((0, 2) if name == "line_m" else 0, np.float32) for name in Profile._fields))
+    empty = WallProfile(*(np.zeros((0, 2) if name == "line_m" else 0, np.float32) for name in WallProfile._fields))
     columns = zip(*(empty, *profiles.values()), strict=True)
     return {
         "surface_node": np.array(list(surfaces), dtype=np.str_),
@@ -62,7 +62,7 @@ def _surface_arrays(surfaces: Mapping[str, NodeSurface]) -> dict[str, npt.NDArra
         "surface_quality": np.array([one.quality for one in surfaces.values()]).reshape(-1, len(Quality._fields)),
         "profile_node": np.array(list(profiles), dtype=np.str_),
         "profile_offsets": _offsets([len(one.at_m) for one in profiles.values()]),
-    } | {f"profile_{name}": np.concatenate(column) for name, column in zip(Profile._fields, columns, strict=True)}
+    } | {f"profile_{name}": np.concatenate(column) for name, column in zip(WallProfile._fields, columns, strict=True)}
 
 
 def _height_dm(cells: Cells) -> npt.NDArray[np.int16]:
@@ -118,11 +118,11 @@ def _check(path: Path, arrays: Arrays) -> None:
 
 
 def _surfaces(arrays: Arrays) -> dict[str, NodeSurface]:
-    profiles: dict[str, Profile] = {}
+    profiles: dict[str, WallProfile] = {}
     cuts = arrays["profile_offsets"]
     for number, node in enumerate(arrays["profile_node"]):
         rows = slice(cuts[number], cuts[number + 1])
-        profiles[str(node)] = Profile(*(arrays[f"profile_{name}"][rows] for name in Profile._fields))
+        profiles[str(node)] = WallProfile(*(arrays[f"profile_{name}"][rows] for name in WallProfile._fields))
     surfaces, cuts = {}, arrays["surface_offsets"]
     for number, node in enumerate(arrays["surface_node"]):
         rows = slice(cuts[number], cuts[number + 1])

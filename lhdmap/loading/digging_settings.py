@@ -264,7 +264,7 @@ class ExcavationSettings:
         minimum=0.0,
         maximum=2.0,
         source="autonomous_loading, Table 1: β_max",
-        doc="adaptive: the boom is lifted no higher; scanners that look ahead do not see the roof.",
+        doc="All methods: the boom is lifted no higher; scanners that look ahead do not see the roof.",
     )
     advance_max_m: float = setting(
         2.71, unit="m", minimum=0.1, maximum=10.0, source=_SEARCHED, doc="adaptive: stop d_max."

@@ -12,6 +12,7 @@ from lhdmap.loading.skid import SkidFactor
 class PaperDig:
     """Two states in turn: S_tilt ramps the tilt up, S_push pushes at full engine speed and lifts while the wheels slip.
 
+    The boom is lifted no higher than the roof allows (`excavation.lift_most_rad`), as by all methods, whatever β_max is.
     Eq. (8)'s ramp ends where `R_0 (t - t_tilt) > 1` (erratum: `b` is not defined). The switches of `PaperDigSettings` bring
     back what is printed; evaluation/loading.md has what each of them costs.
     """
@@ -56,6 +57,7 @@ class PaperDig:
             if one.time_read_again:
                 return pedals
         lift = self._lift.update(now_ns, skid)  # as printed, S_push is entered in the same pass, with S_tilt's time
+        lift &= not signals.boom_rad >= self._common.lift_most_rad
         pedals = Pedals(one.pedal, lift=float(lift), full_rpm=True)
         if self._push_ends(signals, in_state_s):
             self._tilting, self._since_ns, self._lift.on = True, now_ns, False

@@ -5,10 +5,11 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 
+from lhdmap.loading.follows import Follows
 from lhdmap.loading.moment import LoadingInput
 from lhdmap.loading.positioning_steps import ALIGN, LOWER
 from lhdmap.loading.pull_back import RACK, SHAKE
-from lhdmap.loading.signals import Signals
+from lhdmap.loading.signals import Pedals, Signals
 from lhdmap.loading.states import State
 from lhdmap.loading.task_settings import LoadingSettings
 
@@ -23,6 +24,7 @@ NEEDS: Mapping[tuple[State, str], tuple[str, ...]] = {
 }
 """Signals that a state's phase cannot do without, beside the motion and a sign of life of all signals."""
 _PRESSURES = ("transmission_bar", "lift_bar", "tilt_bar")
+_WATCHED = ("tacho_mps", *_PRESSURES)
 _AHEAD_NS = 50_000_000
 
 
@@ -30,16 +32,17 @@ class Health:
     """Watches inputs, call by call."""
 
     def __init__(self, settings: LoadingSettings) -> None:
-        self._settings = settings
+        self._settings, self._follows = settings, Follows(settings.follows_s)
         self._last_ns: int | None = None
         self._changed: dict[str, tuple[float, int]] = {}
 
-    def check(self, told: LoadingInput, state: State, phase: str) -> tuple[str, ...]:
-        """Return what is wrong for a state and its phase; empty: nothing."""
+    def check(self, told: LoadingInput, state: State, phase: str, asked: Pedals | None = None) -> tuple[str, ...]:
+        """Return what is wrong for a state and its phase; empty: nothing. `asked`: the pedals since the call before."""
         found = [*self._clock(told.now_ns), *self._sources(told)]
         if told.signals is not None:
             self._watch(told.signals, told.now_ns)
             needs = NEEDS.get((state, phase), ())
+            found += self._follows.update(told.now_ns, told.signals, asked)
             found += self._values(told.signals, needs, told.now_ns)
             if state in (State.CHARGING, State.EXCAVATION):
                 found += self._age("scan odometry", told.signals.scan_ns, told.now_ns, self._settings.scan_age_s)
@@ -77,11 +80,12 @@ class Health:
         return [f"{name} from the future"] if stamp_ns > now_ns + _AHEAD_NS else []
 
     def _watch(self, signals: Signals, now_ns: int) -> None:
-        """Note since when each pressure has had its value."""
-        for name in _PRESSURES:
+        """Note since when the wheels' speed and each pressure have had their value; wheels that stand have none."""
+        for name in _WATCHED:
             value = float(getattr(signals, name))
             before = self._changed.get(name)
-            if before is None or before[0] != value or now_ns < before[1]:
+            stands = name == "tacho_mps" and value == 0.0
+            if before is None or before[0] != value or now_ns < before[1] or stands:
                 self._changed[name] = value, now_ns
 
     def _values(self, signals: Signals, needs: tuple[str, ...], now_ns: int) -> list[str]:

@@ -11,6 +11,7 @@ import numpy.typing as npt
 
 from lhdmap.driving.bodies import Bodies
 from lhdmap.driving.model import DriveModel
+from lhdmap.geometry.articulated import rear_axle
 from lhdmap.messages import FloatArray
 
 _TURN_STEP_RAD, _WAY_STEP_M = math.radians(2.0), 0.4
@@ -55,14 +56,7 @@ class Posture(NamedTuple):
 def rear_of(posture: Posture, model: DriveModel) -> FloatArray:
     """Return the pose (3,) of `rear_link`."""
     x, y, heading = posture.base.tolist()
-    back = heading - posture.bend_rad
-    return np.array(
-        [
-            x - model.front_m * math.cos(heading) - model.rear_m * math.cos(back),
-            y - model.front_m * math.sin(heading) - model.rear_m * math.sin(back),
-            back,
-        ]
-    )
+    return np.array(rear_axle(x, y, heading, posture.bend_rad, model.front_m, model.rear_m))
 
 
 def turned(bend_rad: float, to_rad: float, model: DriveModel) -> float:

@@ -23,6 +23,7 @@ from lhdmap.loading.moment import AUTONOMOUS, OPERATED, LoadingInput, LoadingOut
 from lhdmap.loading.positioning_steps import Positioning
 from lhdmap.loading.pull_back import PullBack, Trail
 from lhdmap.loading.seen_again import face_behind_m
+from lhdmap.loading.signals import Pedals
 from lhdmap.loading.states import ASSISTANCE, MOVING, RESTING, TABLE, Event, Facts, State, event_of
 from lhdmap.loading.task_settings import LoadingSettings
 
@@ -49,6 +50,7 @@ class LoadingTask:
             State.WEIGHING: self._weighing,
         }
         self._notes: list[Note] = []
+        self._asked: Pedals | None = None
 
     @property
     def state(self) -> State:
@@ -64,7 +66,7 @@ class LoadingTask:
             self._notes.append(Note("answer", cause=self._help.refused))
         step = Step("")
         for _ in range(_MOST_EVENTS):
-            wrong = self._health.check(told, memory.state, self._phase())
+            wrong = self._health.check(told, memory.state, self._phase(), self._asked)
             moment = self._moment(told)
             facts = self._facts(told, wrong, answer)
             event = event_of(memory.state, facts)
@@ -80,6 +82,7 @@ class LoadingTask:
             answer = None
         notes, self._notes = tuple(self._notes), []
         moves = memory.state in MOVING and step.event is None
+        self._asked = step.pedals if moves else None
         fills = self._weighing.fills
         return LoadingOutput(
             memory.state,

@@ -73,7 +73,18 @@ class LoadingSettings:
         0.5, unit="s", minimum=0.05, maximum=5.0, doc="The same for the scan odometry while it charges and digs."
     )
     frozen_s: float = setting(
-        2.0, unit="s", minimum=0.1, maximum=60.0, doc="A pressure that is the same to the bit for so long is none."
+        2.0,
+        unit="s",
+        minimum=0.1,
+        maximum=60.0,
+        doc="A pressure, or a wheel speed above 0, that is the same to the bit for so long is none.",
+    )
+    follows_s: float = setting(
+        1.0,
+        unit="s",
+        minimum=0.1,
+        maximum=60.0,
+        doc="A boom or bucket that is commanded for so long, at full pedal, and reads the same to the bit is frozen.",
     )
     valid_s: float = setting(1.0, unit="s", minimum=0.0, maximum=60.0, doc="How long all must hold before it goes on.")
     standing_mps: float = setting(0.03, unit="m/s", minimum=0.001, maximum=0.5, doc="Slower than this is standing.")

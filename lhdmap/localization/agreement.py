@@ -12,7 +12,7 @@ from collections.abc import Callable
 
 from lhdmap.geometry import se2
 from lhdmap.messages import FloatArray
-from lhdmap.proprioception.wheels import Motion
+from lhdmap.proprioception.wheels import WheelMotion
 
 _WINDOW_NS = 500_000_000
 _SLIP, _TURN_RAD_PM = 0.1, math.radians(0.5)
@@ -23,7 +23,7 @@ Apart = tuple[float, float]
 class Agreement:
     """Takes poses as they come; tells by how much (m, rad) they are apart from what else is known."""
 
-    def __init__(self, motion_between: Callable[[int, int], Motion | None]) -> None:
+    def __init__(self, motion_between: Callable[[int, int], WheelMotion | None]) -> None:
         self._motion_between = motion_between
         self._poses: deque[tuple[int, FloatArray]] = deque()
         self._on_map: tuple[FloatArray, FloatArray] | None = None

@@ -17,7 +17,7 @@ import numpy.typing as npt
 from scipy.spatial import KDTree
 
 from lhdmap.geometry import se2
-from lhdmap.localization.stretches import Along, Stretch, stretches
+from lhdmap.localization.stretches import AlongNode, WallStretch, stretches
 from lhdmap.localization.walls import MapWalls
 from lhdmap.messages import FloatArray
 from lhdmap.topology.model import TopologicalMap
@@ -108,7 +108,7 @@ class WorldChanges:
     """Takes what a machine sees, with its place; tells what has changed at any time. Its memory grows with the map alone."""
 
     def __init__(self, topology: TopologicalMap, sheets: list[Sheet], walls: MapWalls) -> None:
-        self._sheets, self._along = sheets, Along(topology)
+        self._sheets, self._along = sheets, AlongNode(topology)
         self._tree = KDTree(walls.cells() * [1.0, 1.0, _HEIGHT])
         self._taken_m, self._new = -math.inf, _NewCells()
         self._apart: list[Seen] = []
@@ -201,5 +201,5 @@ class WorldChanges:
         return out
 
 
-def _change(one: Stretch) -> Change:
+def _change(one: WallStretch) -> Change:
     return Change((CAME, WENT)[one.kind - 1], *one[1:])

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from lhdmap.localization.rows import CANDIDATE, LOST, TRACKING, UNKNOWN, Row
+from lhdmap.localization.rows import CANDIDATE, LOST, TRACKING, UNKNOWN, LocalizationRow
 
 WEAK = "weak"
 _WEAK_ALONG_M, _WEAK_ACROSS_M = 0.1, 0.05
@@ -36,7 +36,7 @@ class Episode(NamedTuple):
     why: str
 
 
-def episodes(rows: Sequence[Row], reasons: Sequence[tuple[int, str]]) -> list[Episode]:
+def episodes(rows: Sequence[LocalizationRow], reasons: Sequence[tuple[int, str]]) -> list[Episode]:
     """Return the stretches in the order of time; `reasons`: when a place was given up, and why."""
     times = [at_ns for at_ns, _ in reasons]
     found = []
@@ -51,9 +51,9 @@ def episodes(rows: Sequence[Row], reasons: Sequence[tuple[int, str]]) -> list[Ep
     return found
 
 
-def _runs(rows: Sequence[Row]) -> Iterator[tuple[str, list[Row]]]:
+def _runs(rows: Sequence[LocalizationRow]) -> Iterator[tuple[str, list[LocalizationRow]]]:
     """Yield rows of one kind that follow each other, those that track well left out; weak ones may have short gaps."""
-    kind, run = "", list[Row]()
+    kind, run = "", list[LocalizationRow]()
     for row in rows:
         now = row.status if row.status != TRACKING else WEAK if _is_weak(row) else ""
         if now == kind or (kind == WEAK and now == "" and row.stamp_ns - run[-1].stamp_ns < _GAP_NS):
@@ -66,11 +66,11 @@ def _runs(rows: Sequence[Row]) -> Iterator[tuple[str, list[Row]]]:
         yield kind, run
 
 
-def _is_weak(row: Row) -> bool:
+def _is_weak(row: LocalizationRow) -> bool:
     return row.std_along_m > _WEAK_ALONG_M or row.std_across_m > _WEAK_ACROSS_M
 
 
-def _weak_for(rows: Sequence[Row]) -> str:
+def _weak_for(rows: Sequence[LocalizationRow]) -> str:
     along, across = max(row.std_along_m for row in rows), max(row.std_across_m for row in rows)
     unmatched = float(np.mean([row.source == "odometry" for row in rows]))
     why = "no scan fitted the walls" if unmatched > _NO_MATCH_SHARE else "the walls say little along the tunnel"

@@ -34,9 +34,9 @@ class Finder:
         self._asked_m = -math.inf
         self.searches: deque[Search] = deque(maxlen=_KEPT)
 
-    def add(self, T_odom_base: FloatArray, points: FloatArray) -> None:
+    def add(self, pose_odom_base: FloatArray, points: FloatArray) -> None:
         """Take the hits (N, 2) of a scan in the machine's frame, at a pose (3,) in `odom`."""
-        self._way.add(T_odom_base, points)
+        self._way.add(pose_odom_base, points)
 
     def forget(self) -> None:
         """Forget the walls so far: they may be of another place."""
@@ -51,7 +51,7 @@ class Finder:
         purpose: str,
         stamp_ns: int,
         travelled_m: float,
-        T_odom_base: FloatArray,
+        pose_odom_base: FloatArray,
         claimed: FloatArray | None,
         came: Callable[[FloatArray], npt.NDArray[np.bool_]] | None = None,
     ) -> None:
@@ -69,16 +69,16 @@ class Finder:
         if came is not None:
             kept = ~came(window.points)
             window = window._replace(points=window.points[kept], counts=window.counts[kept])
-        self._thread.ask(Question(stamp_ns, travelled_m, purpose, window, T_odom_base.copy(), claimed))
+        self._thread.ask(Question(stamp_ns, travelled_m, purpose, window, pose_odom_base.copy(), claimed))
 
-    def answer(self, stamp_ns: int, T_odom_base: FloatArray) -> Search | None:
+    def answer(self, stamp_ns: int, pose_odom_base: FloatArray) -> Search | None:
         """Return the answer that is due, its places carried on to where the machine is now."""
         due = self._thread.answer(stamp_ns)
         if due is None:
             return None
         asked, said = due
         self.searches.append(said)
-        moved = se2.between(asked.T_odom_base, T_odom_base)
+        moved = se2.between(asked.pose_odom_base, pose_odom_base)
         return said._replace(
             candidates=tuple(one._replace(pose=se2.compose(one.pose, moved)) for one in said.candidates),
             claimed=said.claimed and said.claimed._replace(pose=se2.compose(said.claimed.pose, moved)),

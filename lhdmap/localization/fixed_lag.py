@@ -17,7 +17,7 @@ import numpy as np
 
 from lhdmap.geometry import se2
 from lhdmap.localization.place_on_map import Placer
-from lhdmap.localization.rows import Row
+from lhdmap.localization.rows import LocalizationRow
 from lhdmap.messages import FloatArray
 
 _LAG_M, _NODE_M = 15.0, 0.5
@@ -36,7 +36,7 @@ class Belief(NamedTuple):
     P: FloatArray
 
 
-class Placed(NamedTuple):
+class LagPlaced(NamedTuple):
     """The final pose (3,) of a row in `map`, and its covariance (3, 3) in the machine's axes."""
 
     row: int
@@ -44,7 +44,7 @@ class Placed(NamedTuple):
     covariance: FloatArray
 
 
-class Step(NamedTuple):
+class LagStep(NamedTuple):
     """A scan: its row, pose (3,) by odometry, covariance (3, 3) of the step to it, turn by the gyroscope (rad)."""
 
     row: int
@@ -66,14 +66,14 @@ class FixedLag:
         self._solver = gtsam.BatchFixedLagSmoother(self._lag_m)
         self._nodes: list[int] = []  # keys in the window
         self._odometry: dict[int, FloatArray] = {}
-        self._rows: dict[int, list[Step]] = {}  # of each node, with those up to the next one
+        self._rows: dict[int, list[LagStep]] = {}  # of each node, with those up to the next one
         self._estimates: dict[int, FloatArray] = {}
         self._information = np.zeros((3, 3))
         self._travelled_m, self._key = 0.0, -1
         self._covariance, self._turn_rad, self._last = np.zeros((3, 3)), 0.0, np.zeros(3)
         self._left_covariance = np.zeros((3, 3))
 
-    def take(self, step: Step, before: Belief, after: Belief) -> list[Placed]:
+    def take(self, step: LagStep, before: Belief, after: Belief) -> list[LagPlaced]:
         """Take a scan with the tracker's belief before and after its match (alike where there was none); return what is final."""
         self._information = self._information + _told(before, after)
         if self._key < 0:
@@ -98,13 +98,13 @@ class FixedLag:
         pose: FloatArray = se2.compose(self._estimates[self._key], se2.between(self._odometry[self._key], self._last))
         return pose
 
-    def restart(self) -> list[Placed]:
+    def restart(self) -> list[LagPlaced]:
         """Return what is in the window, and forget it."""
         out = [one for node in self._nodes for one in self._placed(node)]
         self._begin()
         return out
 
-    def _add(self, step: Step, told: Belief, way: FloatArray | None) -> list[Placed]:
+    def _add(self, step: LagStep, told: Belief, way: FloatArray | None) -> list[LagPlaced]:
         """Add a node: the first with a prior, the others tied to the one before and to the map."""
         import gtsam
 
@@ -143,7 +143,7 @@ class FixedLag:
         marginals = gtsam.Marginals(self._solver.getFactors(), self._solver.calculateEstimate())
         self._left_covariance = marginals.marginalCovariance(self._nodes[0])
 
-    def _settled(self) -> list[Placed]:
+    def _settled(self) -> list[LagPlaced]:
         """Take over the solution; return the rows of the nodes that left the window."""
         found = self._solver.calculateEstimate()
         inside = list(found.keys())
@@ -157,7 +157,7 @@ class FixedLag:
         self._nodes = inside
         return out
 
-    def _placed(self, node: int) -> list[Placed]:
+    def _placed(self, node: int) -> list[LagPlaced]:
         """Return the rows from a node to the next one, moved as both are."""
         here = se2.compose(self._estimates[node], se2.inverse(self._odometry[node]))
         after = node + 1 if node + 1 in self._estimates else node
@@ -169,11 +169,11 @@ class FixedLag:
             share = min(math.hypot(*(step.odometry - self._odometry[node])[:2]) / whole_m, 1.0) if whole_m else 0.0
             mixed = first + share * (second - first)
             mixed[2] = first[2] + share * float(se2.wrap(second[2] - first[2]))
-            out.append(Placed(step.row, mixed, self._left_covariance + _OF_THE_MAP))
+            out.append(LagPlaced(step.row, mixed, self._left_covariance + _OF_THE_MAP))
         return out
 
 
-def placed_row(row: Row, placed: Placed, placer: Placer) -> Row:
+def placed_row(row: LocalizationRow, placed: LagPlaced, placer: Placer) -> LocalizationRow:
     """Return a row at its final pose."""
     x, y, yaw = placed.pose.tolist()
     place = placer.at(placed.pose, row.z_m, 1.0)

@@ -2,7 +2,7 @@
 
 In a tunnel the place is ρ along its axis: a Kalman filter over ρ and v, Eq. (1), corrected by the wheels' speed with each scan and
 by ICP against landmarks twice a second. In an intersection pose and heading are those of wheels and ICP directly. What the paper
-leaves open, and what does not work as printed (docs/localization.md lists it):
+leaves open, and what does not work as printed (docs/localization_paper.md lists it):
 
 * `dir` is discrete, so no Kalman filter estimates it: it is the heading against the axis.
 * heading and lateral place are no part of the filter: those of the last match, carried on by the wheels' turn or the axis.
@@ -22,7 +22,7 @@ from lhdmap.landmarks.quality import Quality
 from lhdmap.localization.method import Corrected, Wheels
 from lhdmap.localization.paper_nodes import PaperNodes, Seen
 from lhdmap.localization.place_on_map import Placer
-from lhdmap.localization.tracker import Tracker, turned
+from lhdmap.localization.tracker import MapTracker, turned
 from lhdmap.messages import FloatArray
 from lhdmap.topology.model import Tunnel
 
@@ -41,7 +41,7 @@ _LEAST_HITS = 30
 class PaperTracker:
     """`pose` (3,) in `map`; in a tunnel held as ρ (`x[0]`), lateral place and heading; `C` (2, 2) is the covariance of ρ, v."""
 
-    def __init__(self, nodes: PaperNodes, placer: Placer, start: Tracker) -> None:
+    def __init__(self, nodes: PaperNodes, placer: Placer, start: MapTracker) -> None:
         self._nodes, self._placer, self._start = nodes, placer, start
         self.pose, self.height_m = start.pose.copy(), start.height_m
         self.x = np.zeros(2)

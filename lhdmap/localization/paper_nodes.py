@@ -8,7 +8,7 @@ import math
 import numpy as np
 
 from lhdmap.geometry import se2
-from lhdmap.landmarks.icp import Fit, align, best_of
+from lhdmap.landmarks.icp import IcpFit, align, best_of
 from lhdmap.landmarks.model import Landmarks
 from lhdmap.landmarks.scans import near, thinned
 from lhdmap.landmarks.settings import LandmarkSettings
@@ -86,7 +86,7 @@ class PaperNodes:
         fit = align(self._target(k, True), cloud, se2.between(self._frames[node], pose), self._whole)
         return Seen(self._in_map(node, k, fit), float(fit.fitness)) if fit.valid else None
 
-    def _fit(self, k: int, expected: FloatArray, cloud: FloatArray, *, far: bool) -> Fit:
+    def _fit(self, k: int, expected: FloatArray, cloud: FloatArray, *, far: bool) -> IcpFit:
         start = se2.between(self._landmarks.poses_node[k], expected)
         if not far:
             return align(self._target(k, False), cloud, start, self._model)
@@ -94,7 +94,7 @@ class PaperNodes:
         starts = np.column_stack([_SHIFTS_M, np.zeros(len(_SHIFTS_M)), np.full(len(_SHIFTS_M), facing)])
         return best_of(self._target(k, False), cloud, starts, self._model)
 
-    def _in_map(self, node: str, k: int, fit: Fit) -> FloatArray:
+    def _in_map(self, node: str, k: int, fit: IcpFit) -> FloatArray:
         in_node = se2.compose(self._landmarks.poses_node[k], fit.pose)
         pose: FloatArray = se2.compose(self._frames[node], in_node)
         return pose

@@ -19,7 +19,7 @@ _STANDS_MPS = 0.05
 _ONE_DIRECTION_RAD = math.radians(20.0)
 
 
-class Place(NamedTuple):
+class PlaceOnMap(NamedTuple):
     """In node `node` (id) at `rho_m`, `lateral_m`, `heading_rad`: along a tunnel's line, in an intersection x and y in its frame.
 
     `next_point`: the next access or waypoint in the direction of motion, empty where there is none; `next_m` to it:
@@ -62,12 +62,12 @@ class Placer:
         """Return the id of the node that a pose (3,) at a height is in; empty where it is in none."""
         return self._lookup.nodes_at(np.array([[pose[0], pose[1], height_m]]))[0]
 
-    def at(self, pose: FloatArray, height_m: float, speed_mps: float) -> Place:
+    def at(self, pose: FloatArray, height_m: float, speed_mps: float) -> PlaceOnMap:
         """Return the place of a pose (3,) at a height, moving at a signed speed along its heading."""
         node = self.node_at(pose, height_m)
         found = self._topology.nodes.get(node)
         if found is None:
-            return Place("", math.nan, math.nan, math.nan, height_m, "", math.nan)
+            return PlaceOnMap("", math.nan, math.nan, math.nan, height_m, "", math.nan)
         backward = speed_mps < -_STANDS_MPS  # standing, it is taken to face where it goes
         if isinstance(found, Tunnel):
             rho, lateral, heading = self._in_tunnel(found, pose, height_m)
@@ -75,7 +75,7 @@ class Placer:
         else:
             rho, lateral, heading = se2.between(found.T_map_node[[0, 1, 3]], pose).tolist()
             name, far = self._next_across(node, pose, pose[2] + (math.pi if backward else 0.0))
-        return Place(node, rho, lateral, math.remainder(heading, 2.0 * math.pi), height_m, name, far)
+        return PlaceOnMap(node, rho, lateral, math.remainder(heading, 2.0 * math.pi), height_m, name, far)
 
     def along(self, tunnel: Tunnel, pose: FloatArray, height_m: float) -> tuple[float, float]:
         """Return how far along a tunnel's line a pose (3,) is, and how far to its left, whichever node it is in."""

@@ -47,14 +47,14 @@ class RecentWay:
         self._ahead_m = self._travelled_m = 0.0
         self._taken_m, self._block_m = -math.inf, 0.0
 
-    def add(self, T_odom_base: FloatArray, points: FloatArray) -> None:
+    def add(self, pose_odom_base: FloatArray, points: FloatArray) -> None:
         """Take the hits (N, 2) of a scan in the machine's frame, at a pose (3,) in `odom`."""
         forward = 0.0
         if self._pose is not None:
-            step = se2.between(self._pose, T_odom_base)
+            step = se2.between(self._pose, pose_odom_base)
             self._travelled_m += math.hypot(step[0], step[1])
             forward = math.copysign(math.hypot(step[0], step[1]), step[0])
-        self._pose = T_odom_base.copy()
+        self._pose = pose_odom_base.copy()
         self._ahead_m += forward
         if self._travelled_m - self._taken_m < _EVERY_M:
             return
@@ -110,15 +110,15 @@ class RecentWay:
         thinned: FloatArray = points[np.sort(first)]
         return thinned
 
-    def snapshot(self, within_m: float = math.inf) -> Window:
+    def snapshot(self, within_m: float = math.inf) -> RecentWindow:
         """Return what a search needs, of the way within some travel of the machine; it may run beside what goes on here."""
         points, counts = self.cells()
         way = [one for one in self._way if abs(one[0] - self._ahead_m) <= within_m]
         ends = way[0][1], way[-1][1]
-        return Window(points, counts, np.array([pose[:2] for _, pose in way]), ends, way[-1][0] - way[0][0])
+        return RecentWindow(points, counts, np.array([pose[:2] for _, pose in way]), ends, way[-1][0] - way[0][0])
 
 
-class Window(NamedTuple):
+class RecentWindow(NamedTuple):
     """Averaged hits (M, 2) and counts (M,), the way (K, 2) from behind to ahead, the poses at its ends, its length."""
 
     points: FloatArray

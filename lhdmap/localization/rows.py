@@ -10,7 +10,7 @@ import numpy as np
 UNKNOWN, CANDIDATE, TRACKING, LOST = "unknown", "candidate", "tracking", "lost"
 
 
-class Row(NamedTuple):
+class LocalizationRow(NamedTuple):
     """Where the machine is at a front scan; NaN and empty texts where it is not known."""
 
     stamp_ns: int
@@ -35,17 +35,17 @@ class Row(NamedTuple):
 
 
 _NAN = math.nan
-NOWHERE = Row(
+NOWHERE = LocalizationRow(
     0, UNKNOWN, "", _NAN, _NAN, _NAN, _NAN, _NAN, _NAN, _NAN, _NAN, _NAN, _NAN, _NAN, 0.0, "", "", _NAN, _NAN
 )  # fmt: skip
 """A row of which nothing is known."""
 TEXTS = ("status", "node", "source", "next_point")
 
 
-def columns(rows: list[Row]) -> dict[str, Any]:
+def columns(rows: list[LocalizationRow]) -> dict[str, Any]:
     """Return rows as columns of a table."""
     out: dict[str, Any] = {}
-    for name in Row._fields:
+    for name in LocalizationRow._fields:
         values = [getattr(row, name) for row in rows]
         out[name] = values if name in TEXTS else np.array(values, dtype=np.int64 if name == "stamp_ns" else float)
     return out

@@ -16,7 +16,7 @@ import numpy.typing as npt
 from lhdmap.geometry import se2
 from lhdmap.landmarks.settings import LandmarkSettings
 from lhdmap.localization.placing import Costs, LiveProfile, PlaceOnStrips
-from lhdmap.localization.recent_way import Window
+from lhdmap.localization.recent_way import RecentWindow
 from lhdmap.localization.settings import LocalizationSettings
 from lhdmap.localization.strips import Strips
 from lhdmap.localization.walls import MapWalls
@@ -38,7 +38,7 @@ _SAME_M, _SAME_RAD = 1.0, math.radians(10.0)
 FIND, CONFIRM, CHECK = "find", "confirm", "check"
 
 
-class Candidate(NamedTuple):
+class PlaceCandidate(NamedTuple):
     """A place where the machine may be: pose (3,) in `map`, height of the floor, node (id).
 
     `probability`: of it against all others and against not being in the map; `chi2`: reduced, of its walls; `evidence` (nats):
@@ -69,9 +69,9 @@ class Search(NamedTuple):
     travelled_m: float
     window_m: float
     purpose: str
-    candidates: tuple[Candidate, ...]
+    candidates: tuple[PlaceCandidate, ...]
     refused: str
-    claimed: Candidate | None = None
+    claimed: PlaceCandidate | None = None
     denied: str = ""
 
     @property
@@ -86,8 +86,8 @@ class Question(NamedTuple):
     stamp_ns: int
     travelled_m: float
     purpose: str
-    window: Window
-    T_odom_base: FloatArray
+    window: RecentWindow
+    pose_odom_base: FloatArray
     claimed: FloatArray | None
 
 
@@ -110,22 +110,22 @@ class GlobalSearch:
         places = costs.likeliest()
         rivals = [min([0.0, *(other.cost for other in places if other is not one)]) for one in places]
         candidates = [
-            self._candidate(one, rival - one.cost, self._machine(costs.path(one.place), live, asked.T_odom_base))
+            self._candidate(one, rival - one.cost, self._machine(costs.path(one.place), live, asked.pose_odom_base))
             for one, rival in zip(places, rivals, strict=True)
         ]
         refused = self._refused(places[0], candidates[0], asked)
         if not refused:
-            candidates[0] = self._refined(candidates[0], window, asked.T_odom_base)
+            candidates[0] = self._refined(candidates[0], window, asked.pose_odom_base)
         said = said._replace(candidates=tuple(candidates), refused=refused)
         return said if asked.claimed is None else self._judged(said, costs, asked.claimed, asked, live)
 
     def _judged(self, said: Search, costs: Costs, claimed: FloatArray, asked: Question, live: LiveProfile) -> Search:
         """Add what is said of a place (4,) that is claimed."""
         best, own = said.candidates[0], None
-        T_map_odom = se2.compose(claimed[:3], se2.inverse(asked.T_odom_base))
+        pose_map_odom = se2.compose(claimed[:3], se2.inverse(asked.pose_odom_base))
         ahead = live.line[-1] - live.line[-2]
         line = np.array([*live.line[-1], math.atan2(ahead[1], ahead[0])])
-        place = costs.at(se2.compose(T_map_odom, line), claimed[3])
+        place = costs.at(se2.compose(pose_map_odom, line), claimed[3])
         denied = ""
         if place is not None:
             own = self._candidate(place, min(-best.evidence, 0.0) - place.cost, claimed[:3])
@@ -136,19 +136,19 @@ class GlobalSearch:
             denied = f"it is at {best.pose[0]:.1f}, {best.pose[1]:.1f}"
         return said._replace(claimed=own, denied=denied)
 
-    def _machine(self, path: npt.NDArray[np.int64], live: LiveProfile, T_odom_base: FloatArray) -> FloatArray:
+    def _machine(self, path: npt.NDArray[np.int64], live: LiveProfile, pose_odom_base: FloatArray) -> FloatArray:
         """Return the machine's pose (3,) in `map`: the mid line about it is laid onto that of the path (J,), rigidly."""
-        apart = np.hypot(*(live.line - T_odom_base[:2]).T)
+        apart = np.hypot(*(live.line - pose_odom_base[:2]).T)
         near = (path >= 0) & (apart <= max(_LAID_M, float(apart[path >= 0].min()) + _LAID_M))
-        T_map_odom = _laid(live.line[near], self._strips.poses[path[near], :2])
-        pose: FloatArray = se2.compose(T_map_odom, T_odom_base)
+        pose_map_odom = _laid(live.line[near], self._strips.poses[path[near], :2])
+        pose: FloatArray = se2.compose(pose_map_odom, pose_odom_base)
         return pose
 
-    def _candidate(self, place: PlaceOnStrips, gap: float, pose: FloatArray) -> Candidate:
+    def _candidate(self, place: PlaceOnStrips, gap: float, pose: FloatArray) -> PlaceCandidate:
         height, node = float(self._strips.heights_m[place.place]), self._strips.node_at(place.place)
-        return Candidate(pose, height, node, place.probability, place.chi2, -place.cost, gap, math.nan)
+        return PlaceCandidate(pose, height, node, place.probability, place.chi2, -place.cost, gap, math.nan)
 
-    def _refused(self, place: PlaceOnStrips, best: Candidate, asked: Question) -> str:
+    def _refused(self, place: PlaceOnStrips, best: PlaceCandidate, asked: Question) -> str:
         """Return why the best place is not believed; one that was found by the whole rule is confirmed by the gap alone."""
         window_m = asked.window.length_m
         if window_m < self._settings.search_m:
@@ -160,9 +160,9 @@ class GlobalSearch:
             return f"the next place is less likely by {told:.0f} of {self._settings.gap:.0f} nats"
         return ""
 
-    def _refined(self, found: Candidate, window: Window, T_odom_base: FloatArray) -> Candidate:
+    def _refined(self, found: PlaceCandidate, window: RecentWindow, pose_odom_base: FloatArray) -> PlaceCandidate:
         """Match the walls about the machine as one scan, from several starts around a place."""
-        local = se2.transform(se2.inverse(T_odom_base), window.points)
+        local = se2.transform(se2.inverse(pose_odom_base), window.points)
         near = local[np.hypot(local[:, 0], local[:, 1]) < self._settings.range_m]
         walls, origin = self._walls.around(np.array([*found.pose[:2], found.height_m]))
         shift = np.array([origin[0], origin[1], 0.0])

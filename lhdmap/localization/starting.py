@@ -26,7 +26,7 @@ _KAPPA = 10.0  # hits that are neighbours share the map's errors
 _SAME_M, _SAME_RAD = 1.5, math.radians(30.0)
 
 
-class Start(NamedTuple):
+class BestStart(NamedTuple):
     """The best pose (3,) and floor height; `support`: share of hits that agree, `rival`: that of the best other place."""
 
     pose: FloatArray
@@ -73,7 +73,7 @@ def poses_along(pose: FloatArray, height_m: float) -> FloatArray:
     return np.concatenate(poses)
 
 
-def best_start(walls: MapWalls, starts: FloatArray, points: FloatArray) -> Start:
+def best_start(walls: MapWalls, starts: FloatArray, points: FloatArray) -> BestStart:
     """Return the start of several (K, 4) from which hits (N, 2) in the machine's frame fit the walls best."""
     few, many = (points[:: max(len(points) // most, 1)] for most in (_FEW_HITS, _HITS))
     found = [(*_matched(walls, one, few, _STD), float(one[3])) for one in starts]
@@ -81,7 +81,7 @@ def best_start(walls: MapWalls, starts: FloatArray, points: FloatArray) -> Start
     finer = [_finer(walls, one, many) for one in found[:_FINER]]
     pose, support, height = max(finer, key=lambda one: one[1])
     others = [one[1] for one in (*finer, *found[_FINER:]) if _apart(one[0], pose)]
-    return Start(pose, height, support, max(others, default=0.0))
+    return BestStart(pose, height, support, max(others, default=0.0))
 
 
 _Place = tuple[FloatArray, float, float]  # pose (3,), support, height of the floor

@@ -24,7 +24,7 @@ _LEAST_M, _GAP_BINS = 1.0, 4
 _SIDES = ("left", "right")
 
 
-class Stretch(NamedTuple):
+class WallStretch(NamedTuple):
     """As `changes.Change`, its kind as a number: 1 came, 2 went."""
 
     kind: int
@@ -65,7 +65,7 @@ class _Bin:
         return bool(enough and self.counts[kind] >= _MOST_SHARE * self.counts.sum())
 
 
-class Along:
+class AlongNode:
     """Bins along the lines of the tunnels, left and right, and around the middles of the intersections."""
 
     def __init__(self, topology: TopologicalMap) -> None:
@@ -112,7 +112,7 @@ class Along:
         return out
 
 
-def stretches(along: Along) -> list[Stretch]:
+def stretches(along: AlongNode) -> list[WallStretch]:
     """Return the changed stretches: bins of one node, side and kind that follow each other, a metre and more."""
     found = []
     for kind in (1, 2):
@@ -129,7 +129,7 @@ def stretches(along: Along) -> list[Stretch]:
     return found
 
 
-def _stretch(along: Along, kind: int, node: str, side: int, group: npt.NDArray[np.int64]) -> Stretch:
+def _stretch(along: AlongNode, kind: int, node: str, side: int, group: npt.NDArray[np.int64]) -> WallStretch:
     own = [along.bins[node, side, number] for number in group.tolist()]
     count = sum(one.counts[kind] for one in own)
     middle = sum((one.at[kind] for one in own), np.zeros(3)) / count
@@ -137,7 +137,7 @@ def _stretch(along: Along, kind: int, node: str, side: int, group: npt.NDArray[n
     start, end = (group[0] * _BIN_M, (group[-1] + 1) * _BIN_M) if in_tunnel else (math.nan, math.nan)
     places = np.array([one.at[kind] / one.counts[kind] for one in own])
     wide = float(np.linalg.norm(np.ptp(places[:, :2], axis=0)))
-    return Stretch(
+    return WallStretch(
         kind,
         node,
         _SIDES[side] if in_tunnel else "",

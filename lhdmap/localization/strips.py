@@ -19,7 +19,7 @@ from scipy.ndimage import median_filter
 from lhdmap.geometry import se2
 from lhdmap.landmarks.distinct import channels
 from lhdmap.landmarks.model import Landmarks
-from lhdmap.landmarks.profile import Profile, profile_of
+from lhdmap.landmarks.profile import WallProfile, profile_of
 from lhdmap.landmarks.settings import LandmarkSettings
 from lhdmap.messages import Float32Array, FloatArray
 from lhdmap.topology.driven import arc_m
@@ -211,7 +211,7 @@ def _extended(way: FloatArray, at: FloatArray, beyond_m: float) -> tuple[FloatAr
     return np.vstack([ends[0], way, ends[1]]), np.concatenate([[at[0] - beyond_m], at, [at[-1] + beyond_m]])
 
 
-def _between(profile: Profile, first: FloatArray, last: FloatArray) -> slice:
+def _between(profile: WallProfile, first: FloatArray, last: FloatArray) -> slice:
     """Return the bins from the one nearest to a point (2,) up to the one before another."""
     if not len(profile.at_m):
         return slice(0, 0)
@@ -219,7 +219,7 @@ def _between(profile: Profile, first: FloatArray, last: FloatArray) -> slice:
     return slice(near[0], max(near[1], near[0]))
 
 
-def _strip(node: str, profile: Profile, rows: slice, settings: LandmarkSettings, noise: float) -> Strip:
+def _strip(node: str, profile: WallProfile, rows: slice, settings: LandmarkSettings, noise: float) -> Strip:
     values, variances = channels(profile, settings.profile_m, noise)
     evidence = _evidence(values, variances, settings)
     poses = np.column_stack([profile.line_m.astype(float), profile.heading_rad.astype(float)])[rows]

@@ -38,7 +38,7 @@ _LEAST_STD = np.array([1e-3, 1e-3, 1e-5])
 _PER_METRE = np.array([0.004, 0.003, math.radians(0.03)])  # of the odometry's step at least, per square root of a metre
 
 
-class Tracker:
+class MapTracker:
     """`pose` (3,) in `map`, `height_m` of the floor there.
 
     The map is wrong by a little everywhere, and by something else a metre on: that goes into the filter with the way, and stands

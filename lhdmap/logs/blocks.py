@@ -25,7 +25,7 @@ _JITTER_NS = 50_000_000  # by which blocks of a recorder with several threads ma
 Entry = tuple[int, int, int, int]
 
 
-class Block(NamedTuple):
+class ChunkBlock(NamedTuple):
     """A stretch of whole records: where its bytes are, its size when decompressed, the log times that it claims."""
 
     offset: int
@@ -44,10 +44,10 @@ class Loaded(NamedTuple):
     entries: list[Entry]
 
 
-Load = Callable[[Block], Loaded]
+Load = Callable[[ChunkBlock], Loaded]
 
 
-def in_time_order(blocks: Sequence[Block], load: Load) -> Iterator[tuple[int, int, bytes]]:
+def in_time_order(blocks: Sequence[ChunkBlock], load: Load) -> Iterator[tuple[int, int, bytes]]:
     """Yield (log time, channel id, message bytes) in log-time order; equal times in the order of the file."""
     waiting = sorted(blocks, key=lambda block: block.start_ns)
     cache = _Cache(load)
@@ -58,7 +58,7 @@ def in_time_order(blocks: Sequence[Block], load: Load) -> Iterator[tuple[int, in
         at += count
 
 
-def _group(blocks: Sequence[Block], at: int) -> int:
+def _group(blocks: Sequence[ChunkBlock], at: int) -> int:
     """Return how many blocks from `at` on overlap in time, each with those before it."""
     end, count = blocks[at].end_ns, 1
     while at + count < len(blocks) and blocks[at + count].start_ns < end:
@@ -67,14 +67,14 @@ def _group(blocks: Sequence[Block], at: int) -> int:
     return count
 
 
-def _one(block: Block, load: Load) -> Iterator[tuple[int, int, bytes]]:
+def _one(block: ChunkBlock, load: Load) -> Iterator[tuple[int, int, bytes]]:
     data, entries = load(block)
     view = memoryview(data)
     for time_ns, channel, start, end in _sorted(entries):
         yield time_ns, channel, view[start:end]  # type: ignore[misc]
 
 
-def _merged(blocks: Sequence[Block], cache: _Cache) -> Iterator[tuple[int, int, bytes]]:
+def _merged(blocks: Sequence[ChunkBlock], cache: _Cache) -> Iterator[tuple[int, int, bytes]]:
     """Merge blocks that overlap: each is opened when the time that it claims as its start is reached."""
     heap: list[tuple[int, int, int, Iterator[Entry], Entry]] = []
     opened = 0
@@ -108,7 +108,7 @@ def _sorted(entries: list[Entry]) -> list[Entry]:
     return entries if ordered != entries and clock_was_set_back(*_times_of(entries)) else ordered
 
 
-def in_file_order(blocks: Sequence[Block], load: Load) -> Iterator[tuple[int, int, bytes]]:
+def in_file_order(blocks: Sequence[ChunkBlock], load: Load) -> Iterator[tuple[int, int, bytes]]:
     """Yield (log time, channel id, message bytes) as they stand in the file."""
     for block in blocks:
         data, entries = load(block)
@@ -117,7 +117,7 @@ def in_file_order(blocks: Sequence[Block], load: Load) -> Iterator[tuple[int, in
             yield time_ns, channel, view[start:end]  # type: ignore[misc]
 
 
-def set_back(blocks: Sequence[Block], load: Load) -> bool:
+def set_back(blocks: Sequence[ChunkBlock], load: Load) -> bool:
     """Return whether a clock that was set back explains why blocks, in the order of the file, run back in time.
 
     They are read through only where they do.
@@ -143,10 +143,10 @@ class _Cache:
 
     def __init__(self, load: Load) -> None:
         self._load = load
-        self._held: OrderedDict[Block, Loaded] = OrderedDict()
+        self._held: OrderedDict[ChunkBlock, Loaded] = OrderedDict()
         self._bytes = 0
 
-    def get(self, block: Block) -> Loaded:
+    def get(self, block: ChunkBlock) -> Loaded:
         """Return the content of `block`, loading it where it is not held."""
         loaded = self._held.get(block)
         if loaded is None:

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import BinaryIO, NamedTuple, Protocol
 
 from lhdmap.logs.base import Channel
-from lhdmap.logs.blocks import Block, Entry, Loaded, in_file_order, in_time_order, set_back
+from lhdmap.logs.blocks import ChunkBlock, Entry, Loaded, in_file_order, in_time_order, set_back
 from lhdmap.logs.compression import decompress
 from lhdmap.logs.findings import Findings
 
@@ -43,7 +43,7 @@ class BlockFile(ABC):
     """A `Container` that is a sequence of blocks; what opens one sets what it found in the file."""
 
     _file: BinaryIO
-    _blocks: list[Block]
+    _blocks: list[ChunkBlock]
     _channels: dict[int, Channel]
     _contents: Contents | None
     _damage: Findings
@@ -63,7 +63,7 @@ class BlockFile(ABC):
         self.contents()
         keep = frozenset(wanted)
 
-        def load(block: Block) -> Loaded:
+        def load(block: ChunkBlock) -> Loaded:
             data, entries = self._load(block)
             return Loaded(data, [entry for entry in entries if entry[1] in keep])
 
@@ -75,7 +75,7 @@ class BlockFile(ABC):
         """Close the file."""
         self._file.close()
 
-    def _load(self, block: Block) -> Loaded:
+    def _load(self, block: ChunkBlock) -> Loaded:
         """Return the content of a block; what is wrong with it is noted as damage."""
         self._file.seek(block.offset)
         data, problem = decompress(self._file.read(block.length), block.compression, block.size)
@@ -96,14 +96,14 @@ OpenContainer = Callable[[Path, Findings], Container]
 
 
 def survey(
-    blocks: list[Block], load: Callable[[Block], Loaded], channels: dict[int, Channel]
-) -> tuple[list[Block], Contents]:
+    blocks: list[ChunkBlock], load: Callable[[ChunkBlock], Loaded], channels: dict[int, Channel]
+) -> tuple[list[ChunkBlock], Contents]:
     """Read through all blocks: return them with their true first and last log time, and the contents.
 
     `load` fills `channels` on the way. Blocks without a message are left out.
     """
     counts: dict[int, int] = {}
-    checked: list[Block] = []
+    checked: list[ChunkBlock] = []
     for block in blocks:
         entries = load(block).entries
         for entry in entries:

@@ -20,7 +20,7 @@ _MAX_STRING = 1 << 20
 _SECOND_NS = 1_000_000_000
 
 
-class Layout:
+class FieldLayout:
     """A run of numbers of one message, all aligned to `align` bytes, in both byte orders."""
 
     def __init__(self, codes: str, align: int) -> None:
@@ -28,8 +28,8 @@ class Layout:
         self.size, self.align = self.little.size, align
 
 
-UINT8, UINT32, FLOAT64 = Layout("B", 1), Layout("I", 4), Layout("d", 8)
-_HEADER_ROS1, _HEADER_ROS2 = Layout("IIII", 4), Layout("iII", 4)  # up to the length of the frame's name
+UINT8, UINT32, FLOAT64 = FieldLayout("B", 1), FieldLayout("I", 4), FieldLayout("d", 8)
+_HEADER_ROS1, _HEADER_ROS2 = FieldLayout("IIII", 4), FieldLayout("iII", 4)  # up to the length of the frame's name
 
 
 class Cursor:
@@ -43,7 +43,7 @@ class Cursor:
         self._data = memoryview(data) if self._ros1 else memoryview(data)[4:]
         self._pos, self._end = 0, len(self._data)
 
-    def numbers(self, layout: Layout) -> tuple[float, ...]:
+    def numbers(self, layout: FieldLayout) -> tuple[float, ...]:
         """Return the numbers of `layout`."""
         align = min(self._align, layout.align)
         start = self._pos + -self._pos % align

@@ -13,7 +13,7 @@ import numpy as np
 
 from lhdmap.errors import InputError
 from lhdmap.geometry import se3
-from lhdmap.logs.cursor import FLOAT64, Cursor, Layout
+from lhdmap.logs.cursor import FLOAT64, Cursor, FieldLayout
 from lhdmap.logs.pointcloud import point_cloud
 from lhdmap.messages import (
     Command,
@@ -33,11 +33,13 @@ from lhdmap.roles import OLD_TRANSFORMS, ROLES, TEXT, TRANSFORMS, messages_of
 
 Decoder = Callable[[Cursor], tuple[Message, ...]]
 
-_SCAN_NUMBERS = Layout("7f", 4)
-_VECTOR = Layout("3d", 8)
-_IMU = Layout("37d", 8)  # quaternion, angular velocity, acceleration, each with a covariance of nine numbers behind it
-_POSE = Layout("7d", 8)
-_COMMAND = Layout("4d2B", 8)
+_SCAN_NUMBERS = FieldLayout("7f", 4)
+_VECTOR = FieldLayout("3d", 8)
+_IMU = FieldLayout(
+    "37d", 8
+)  # quaternion, angular velocity, acceleration, each with a covariance of nine numbers behind it
+_POSE = FieldLayout("7d", 8)
+_COMMAND = FieldLayout("4d2B", 8)
 _MAX_METRES = 1e9
 
 

@@ -7,18 +7,18 @@ from pathlib import Path
 
 from lhdmap.descriptions import described, kind_of
 from lhdmap.errors import InputError
-from lhdmap.logs.bag_log import BagFile
+from lhdmap.logs.bag.folder import BagFolder
+from lhdmap.logs.bag.log import BagFile
 from lhdmap.logs.base import LogReader
-from lhdmap.logs.breezy_log import BreezyLog
-from lhdmap.logs.carmen_log import CarmenLog
 from lhdmap.logs.compression import ZSTD_MAGIC
 from lhdmap.logs.decoded import DecodedLog
-from lhdmap.logs.folder_log import BagFolder
-from lhdmap.logs.mcap_log import McapFile
+from lhdmap.logs.mcap.log import McapFile
 from lhdmap.logs.packed import SUFFIXES as PACKED
 from lhdmap.logs.packed import PackedFile
-from lhdmap.logs.sqlite_log import MAGIC as SQLITE_MAGIC
-from lhdmap.logs.sqlite_log import SqliteFile
+from lhdmap.logs.sqlite.log import MAGIC as SQLITE_MAGIC
+from lhdmap.logs.sqlite.log import SqliteFile
+from lhdmap.logs.text.breezy import BreezyLog
+from lhdmap.logs.text.carmen import CarmenLog
 
 Opener = Callable[[Path], LogReader]
 

@@ -18,13 +18,13 @@ import lz4.frame
 import zstandard
 
 from lhdmap.errors import InputError
-from lhdmap.logs.bag_log import BagFile
+from lhdmap.logs.bag.log import BagFile
 from lhdmap.logs.compression import ZSTD_MAGIC
 from lhdmap.logs.container import Container, Contents, OpenContainer
 from lhdmap.logs.findings import Findings
-from lhdmap.logs.mcap_log import McapFile
-from lhdmap.logs.sqlite_log import MAGIC as SQLITE_MAGIC
-from lhdmap.logs.sqlite_log import SqliteFile
+from lhdmap.logs.mcap.log import McapFile
+from lhdmap.logs.sqlite.log import MAGIC as SQLITE_MAGIC
+from lhdmap.logs.sqlite.log import SqliteFile
 
 SUFFIXES = (".zstd", ".zst", ".gz", ".bz2", ".xz", ".lz4")
 _CONTAINERS: dict[bytes, OpenContainer] = {b"\x89MCAP": McapFile, b"#ROSBAG": BagFile, SQLITE_MAGIC: SqliteFile}

@@ -9,10 +9,10 @@ import numpy.typing as npt
 
 from lhdmap.errors import InputError
 from lhdmap.logs.cloud_times import CloudTimes
-from lhdmap.logs.cursor import UINT8, Cursor, Layout
+from lhdmap.logs.cursor import UINT8, Cursor, FieldLayout
 from lhdmap.messages import Message, PointCloud
 
-_FIELD = Layout("IB", 4)
+_FIELD = FieldLayout("IB", 4)
 _KINDS = {1: "i1", 2: "u1", 3: "i2", 4: "u2", 5: "i4", 6: "u4", 7: "f4", 8: "f8"}
 _TIME_FIELDS = ("t", "time", "time_offset", "offset_time", "timestamp", "time_stamp", "timeStamp", "ts")
 

@@ -49,6 +49,11 @@ def definition(type_name: str) -> str:
     return str(text)
 
 
+def field_definitions(type_name: str) -> Sequence[tuple[str, Any]]:
+    """Return the fields of a type, each a name and what rosbags' type store says of it."""
+    return tuple(_STORE.fielddefs[type_name][1])
+
+
 def serialized(message: Message | Sequence[Mount]) -> tuple[str, bytes]:
     """Return the ROS 2 type name and the CDR bytes of a message; several mounts make one TFMessage.
 

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from lhdmap.logs.finding import Finding, Severity
+from lhdmap.logs.doctor.finding import LogFinding, Severity
 from lhdmap.logs.scan_repair import ScanRepair, Stream, stream_of
 from lhdmap.messages import LaserScan
 
@@ -23,7 +23,7 @@ class Kinds(NamedTuple):
     """What is done to the scans of a topic, and what is to be said of it."""
 
     repair: ScanRepair
-    findings: list[Finding]
+    findings: list[LogFinding]
 
 
 def kinds_of(topic: str, scans: list[LaserScan], stated_end_rad: float | None) -> Kinds:
@@ -36,7 +36,7 @@ def kinds_of(topic: str, scans: list[LaserScan], stated_end_rad: float | None) -
     return Kinds(repair, [*units, *_limits(topic, first), *angles, *shared])
 
 
-def _lengths(topic: str, scans: list[LaserScan], first: LaserScan) -> tuple[float, float, list[Finding]]:
+def _lengths(topic: str, scans: list[LaserScan], first: LaserScan) -> tuple[float, float, list[LogFinding]]:
     """Return the factors of ranges and of limits to metres."""
     ranges = np.concatenate([scan.ranges_m for scan in scans])
     ranges = ranges[np.isfinite(ranges) & (ranges > 0.0)]
@@ -49,43 +49,43 @@ def _lengths(topic: str, scans: list[LaserScan], first: LaserScan) -> tuple[floa
     text = f"ranges are of {median:.0f} on the median: millimetres, not metres"
     limit_scale = _MILLI if limit_m > _LIMIT_M else 1.0
     advice = "they are converted" if limit_scale == 1.0 else "they and their limits are converted"
-    return _MILLI, limit_scale, [Finding(Severity.PROBLEM, topic, text, advice)]
+    return _MILLI, limit_scale, [LogFinding(Severity.PROBLEM, topic, text, advice)]
 
 
-def _limits(topic: str, first: LaserScan) -> list[Finding]:
+def _limits(topic: str, first: LaserScan) -> list[LogFinding]:
     low, high = first.range_min_m, first.range_max_m
     if math.isnan(low) or math.isnan(high):
         text = f"range limits that are no numbers ({low:g} to {high:g} m)"
-        return [Finding(Severity.REMARK, topic, text, "taken as no limit")]
+        return [LogFinding(Severity.REMARK, topic, text, "taken as no limit")]
     if low == 0.0 and high == 0.0:
-        return [Finding(Severity.REMARK, topic, "both range limits are 0", "taken as no limit")]
+        return [LogFinding(Severity.REMARK, topic, "both range limits are 0", "taken as no limit")]
     if high <= max(low, 0.0):
         text = f"the range limits are impossible ({low:g} to {high:g} m)"
-        return [Finding(Severity.FATAL, topic, text, "no beam is valid: set the driver's limits")]
+        return [LogFinding(Severity.FATAL, topic, text, "no beam is valid: set the driver's limits")]
     return []
 
 
-def _angles(topic: str, first: LaserScan, stated_end_rad: float | None) -> tuple[bool, bool, list[Finding]]:
+def _angles(topic: str, first: LaserScan, stated_end_rad: float | None) -> tuple[bool, bool, list[LogFinding]]:
     """Return whether all angles, or the start alone, are degrees."""
     beams, increment = len(first.ranges_m), first.angle_increment_rad
     if beams > 1 and increment == 0.0:
         text, advice = "the angle increment is zero", "the scanner's driver is misconfigured: all beams coincide"
-        return False, False, [Finding(Severity.FATAL, topic, text, advice)]
+        return False, False, [LogFinding(Severity.FATAL, topic, text, advice)]
     span = abs(increment) * max(beams - 1, 0)
     if span <= _FULL_TURN_RAD and abs(first.angle_min_rad) <= _FULL_TURN_RAD:
         return False, False, []
     if span <= _FULL_TURN_RAD:
         text = f"the start angle is {first.angle_min_rad:.4g} rad: degrees are meant"
-        return False, True, [Finding(Severity.PROBLEM, topic, text, "it is converted")]
+        return False, True, [LogFinding(Severity.PROBLEM, topic, text, "it is converted")]
     stated = "" if stated_end_rad is None else f" from {first.angle_min_rad:.4g} to {stated_end_rad:.4g}"
     if math.radians(span) <= _FULL_TURN_RAD:
         text = f"angles{stated} with steps of {increment:.4g}: degrees, not radians"
-        return True, False, [Finding(Severity.PROBLEM, topic, text, "they are converted")]
+        return True, False, [LogFinding(Severity.PROBLEM, topic, text, "they are converted")]
     text = f"the field of view is {math.degrees(span):.0f} deg: {beams} beams of {math.degrees(increment):.3g} deg"
-    return False, False, [Finding(Severity.FATAL, topic, text, "360 at most was wanted: set the driver's increment")]
+    return False, False, [LogFinding(Severity.FATAL, topic, text, "360 at most was wanted: set the driver's increment")]
 
 
-def _streams(topic: str, scans: list[LaserScan]) -> tuple[frozenset[Stream] | None, list[Finding]]:
+def _streams(topic: str, scans: list[LaserScan]) -> tuple[frozenset[Stream] | None, list[LogFinding]]:
     """Return which scanners to use where several take turns on one topic; None for all."""
     at: dict[Stream, list[int]] = {}
     for index, scan in enumerate(scans):
@@ -100,7 +100,7 @@ def _streams(topic: str, scans: list[LaserScan]) -> tuple[frozenset[Stream] | No
     names = ", ".join(_named(group[0], scans[listed[0]]) for group, listed in zip(groups, places, strict=True))
     text = f"{len(groups)} scanners share the topic ({names})"
     advice = f"only {_named(groups[best][0], scans[places[best][0]])} is used: record each on its own topic"
-    return frozenset(groups[best]), [Finding(Severity.PROBLEM, topic, text, advice)]
+    return frozenset(groups[best]), [LogFinding(Severity.PROBLEM, topic, text, advice)]
 
 
 def _groups(streams: list[Stream]) -> list[list[Stream]]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import heapq
 import math
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import ExitStack
 from operator import itemgetter
 from pathlib import Path
@@ -16,7 +16,8 @@ import numpy.typing as npt
 
 from lhdmap.errors import InputError, UsageError
 from lhdmap.logs.base import LogReader, TopicInfo
-from lhdmap.logs.finding import Severity
+from lhdmap.logs.clock import ClockStep
+from lhdmap.logs.doctor.finding import Severity
 from lhdmap.logs.formats import open_log
 from lhdmap.logs.inventory import Inventory, take_inventory
 from lhdmap.logs.kinds import of_one_type
@@ -36,7 +37,8 @@ class LogSource:
     times are covered, `survey` what was found in a quick look: sensors that say nothing have lost their roles.
     `warnings` and `damage` fill while reading. `force`: a log that the survey calls unusable is used nevertheless. `survey`: of
     the same log, where it was opened before: it is not looked through again. `needs_scanner`: a log without one is refused.
-    `window_ns`: only what was logged from the first to before the second time.
+    `window_ns`: only what was logged from the first to before the second time. `growing`: opens a log that is still being
+    written, of which only the beginning can be looked through.
     """
 
     def __init__(
@@ -48,6 +50,7 @@ class LogSource:
         survey: Survey | None = None,
         needs_scanner: bool = True,
         window_ns: tuple[int, int] | None = None,
+        growing: Callable[[Path], LogReader] | None = None,
     ) -> None:
         listed = [paths] if isinstance(paths, (str, Path)) else list(paths)
         if not listed:
@@ -59,6 +62,7 @@ class LogSource:
         self._needs_scanner = needs_scanner
         self._known = survey
         self._window_ns = window_ns
+        self._growing = growing
         self.survey = Survey()
         self._readers: list[LogReader] = []
         self._stack = ExitStack()
@@ -66,7 +70,7 @@ class LogSource:
     def __enter__(self) -> Self:
         """Open all files and find out the roles of their topics; raises InputError where that fails."""
         with ExitStack() as stack:
-            self._readers = [stack.enter_context(open_log(path)) for path in self.paths]
+            self._readers = [stack.enter_context((self._growing or open_log)(path)) for path in self.paths]
             self.roles = self._assigned()
             if self._needs_scanner and "front" not in self.roles and "points" not in self.roles:
                 raise InputError(f"{self._names()}: {missing_scanner(self.topics(), self.roles.get('rear'))}")
@@ -90,7 +94,8 @@ class LogSource:
 
     def _look_through(self) -> None:
         """Take the survey and act on it."""
-        self.survey = survey = self._known or take_survey(self._readers, self.roles)
+        begun = self._growing is not None
+        self.survey = survey = self._known or take_survey(self._readers, self.roles, begun=begun)
         if survey.fatal and not self._force:
             first = survey.fatal[0]
             where = f"{first.topic}: " if first.topic else ""
@@ -115,6 +120,11 @@ class LogSource:
         lines += [f"{self.paths[0]}: {line}" for line in self.survey.frames.remarks]
         lines += [f"{reader.path}: {line}" for reader in self._readers for line in reader.remarks]
         return lines + (self._typed()[1] if len(self._readers) > 1 else [])
+
+    @property
+    def clock_steps(self) -> list[ClockStep]:
+        """Where clocks were set while the log was recorded, as far as it was read."""
+        return [step for reader in self._readers for step in reader.clock_steps]
 
     @property
     def start_ns(self) -> int | None:

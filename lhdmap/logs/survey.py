@@ -10,12 +10,12 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 from lhdmap.logs.base import LogReader
-from lhdmap.logs.finding import Finding, Severity
+from lhdmap.logs.doctor.finding import LogFinding, Severity
+from lhdmap.logs.doctor.scans import fatal_findings
+from lhdmap.logs.doctor.values import ValueWatch
 from lhdmap.logs.frames import FrameTree
-from lhdmap.logs.scan_health import fatal_findings
 from lhdmap.logs.scan_kinds import kinds_of
 from lhdmap.logs.scan_repair import AS_IT_IS, ScanRepair
-from lhdmap.logs.value_health import ValueWatch
 from lhdmap.messages import LaserScan, Message, Mount
 from lhdmap.roles import ROLES, TRANSFORMS, judged_as
 
@@ -33,10 +33,10 @@ class Survey:
     frames: FrameTree = field(default_factory=FrameTree)
     repairs: dict[str, ScanRepair] = field(default_factory=dict)
     left_out: dict[str, str] = field(default_factory=dict)
-    findings: list[Finding] = field(default_factory=list)
+    findings: list[LogFinding] = field(default_factory=list)
 
     @property
-    def fatal(self) -> list[Finding]:
+    def fatal(self) -> list[LogFinding]:
         """What makes the log unusable."""
         return [finding for finding in self.findings if finding.severity is Severity.FATAL]
 
@@ -46,14 +46,17 @@ class Survey:
         return repair.applied(message) if repair is not None and isinstance(message, LaserScan) else message
 
 
-def take_survey(readers: Sequence[LogReader], roles: Mapping[str, str]) -> Survey:
-    """Look through the files of a log; `roles`: the topic of each."""
+def take_survey(readers: Sequence[LogReader], roles: Mapping[str, str], *, begun: bool = False) -> Survey:
+    """Look through the files of a log; `roles`: the topic of each.
+
+    `begun`: only the beginning is there: that a value has not changed yet says nothing.
+    """
     survey = Survey()
     scans, values = _sampled(readers, roles, survey.frames)
     needed = roles.get("front", roles.get("points"))
     for topic, listed in scans.items():
         _judge_scans(survey, topic, listed, next((reader for reader in readers if topic in reader.topics()), None))
-    for role, watch in values.items():
+    for role, watch in () if begun else values.items():
         _judge_values(survey, role, watch)
     for index, finding in enumerate(survey.findings):
         if finding.severity is Severity.FATAL and finding.topic != needed:
@@ -106,4 +109,4 @@ def _judge_values(survey: Survey, role: str, watch: ValueWatch) -> None:
     what = "it never moves" if role == "wheel_odometry" else f"its value never changes ({watch.last_text})"
     survey.left_out[role] = what
     text = f"{what}: not used as {role.replace('_', ' ')}"
-    survey.findings.append(Finding(Severity.PROBLEM, watch.topic, text, "is the sensor connected?"))
+    survey.findings.append(LogFinding(Severity.PROBLEM, watch.topic, text, "is the sensor connected?"))

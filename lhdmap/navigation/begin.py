@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -55,6 +55,12 @@ def route_from(planner: RoutePlanner, point: str, errand: Errand, reach: Reach) 
         return planner.route(point, errand.goal, replace(asked, avoid=avoid))
 
     return with_room(topology, ask, errand.closed, *reach)
+
+
+def passed_by(topology: TopologicalMap, nodes: Iterable[str], begins: Iterable[Begin], goal: str) -> list[str]:
+    """Return which nodes (ids) a route is to keep out of: all in which it neither begins nor ends."""
+    ends = {topology.points[one.point].node for one in begins} | {getattr(topology.called(goal), "node", "")}
+    return [node for node in nodes if node not in ends]
 
 
 def begins_at(topology: TopologicalMap, place: FloatArray, goal: str) -> list[Begin]:

@@ -3,13 +3,14 @@
 planning -> driving -> resting (a change of gear) -> driving … -> arrived
                | stuck: backing, and another try, at most twice; then the way is closed, and another route is planned
                | place not known: halted, on from there once it is known again
+             | the next node may not be entered yet: waiting before it, on once it may
                | no other route, place not known for long, overrun: assistance, until the station says to go on
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from typing import Any
 
 import numpy as np
@@ -22,13 +23,15 @@ from lhdmap.guidance.directive import WAY, Directive, moved
 from lhdmap.messages import FloatArray
 from lhdmap.movement.routes import RoutePlanner
 from lhdmap.navigation.along import Located, along_m, on_map, part_of
-from lhdmap.navigation.begin import Begin, Errand, Reach, begins_at, best_begin, route_from
+from lhdmap.navigation.begin import Begin, Errand, Reach, begins_at, best_begin, passed_by, route_from
 from lhdmap.navigation.goals import Approach, overrun, reached
+from lhdmap.navigation.hold import ROOM_M, hold_of
 from lhdmap.navigation.leg import Leg, legs_of
 from lhdmap.navigation.settings import NavigationSettings
 
 IDLE, DRIVING, RESTING, BACKING, ARRIVED, ASSISTANCE = "idle", "driving", "resting", "backing", "arrived", "assistance"
-HALTED = "halted"
+HALTED, WAITING = "halted", "waiting"
+_HELD_M = 1.0  # a machine that stands so near its hold waits for it
 _STUCK_RESET_M = 8.0
 
 
@@ -53,6 +56,10 @@ class NavigationControl:
         self.leg = 0
         self.may_move = True  # whether the machine is armed: one that is not does not move, and is not stuck
         self.closed: tuple[str, ...] = ()
+        self.avoid: tuple[
+            str, ...
+        ] = ()  # nodes (ids) that routes touch only where they begin or end: others come there
+        self.free: Collection[str] | None = None  # nodes (ids) that may be entered; None: all
         self._target = 0
         self._since_ns = 0
         self._tries = 0
@@ -88,7 +95,9 @@ class NavigationControl:
         if not begins:
             self._ask("no route: there is no point of the map near")
             return
-        errand = Errand(self.goal, float(located.pose_map[2]), self.closed)
+        errand = Errand(
+            self.goal, float(located.pose_map[2]), (*passed_by(topology, self.avoid, begins, self.goal), *self.closed)
+        )
         body = Reach(self._nose_m, self._tail_m, settings.room_m)
         begin, route = best_begin(begins, lambda point: route_from(self._planner, point, errand, body))
         if not route.feasible:
@@ -127,7 +136,7 @@ class NavigationControl:
     @property
     def left_m(self) -> float:
         """Way to the end of the last leg; infinite where there is none."""
-        if self.state not in (DRIVING, RESTING, BACKING, HALTED) or not self.legs:
+        if self.state not in (DRIVING, WAITING, RESTING, BACKING, HALTED) or not self.legs:
             return math.inf
         rest_m = sum(leg.stop_m - float(leg.path[0, WAY]) for leg in self.legs[self.leg + 1 :])
         return self.legs[self.leg].stop_m - self._at_m + rest_m
@@ -150,12 +159,23 @@ class NavigationControl:
         if standing and abs(left_m) < self._settings.arrived_m:
             self._stopped(now_ns, leg)
             return None
+        hold = hold_of(self._planner.topology, leg, self._at_m, self.free, self._reach_m(leg.gear))
+        if hold.stop_m < leg.stop_m and standing and self._at_m > hold.stop_m - _HELD_M:
+            self._since_ns = now_ns
+            self._goes(WAITING, "the next node is not free", node=hold.node)
+            return None
+        if self.state == WAITING:
+            self._goes(DRIVING, "the next node is free")
         if not standing or self._since_ns == 0 or not self.may_move:
             self._since_ns = now_ns
         if (now_ns - self._since_ns) * 1e-9 > self._patience_s():
             self._stuck(leg, left_m, located)
             return None
-        return part_of(now_ns, leg.gear, path, leg.stop_m, self._at_m)
+        return part_of(now_ns, leg.gear, path, min(leg.stop_m, hold.stop_m), self._at_m)
+
+    def _reach_m(self, gear: int) -> float:
+        """Return how far the machine reaches before its leading axle, and the room kept before a node that is not free."""
+        return (self._nose_m if gear > 0 else self._tail_m - self._model.wheelbase_m) + ROOM_M
 
     def _pass_targets(self, leg: Leg, motion: Motion, located: Located) -> None:
         """Say which targets are reached, one after the other, before the machine is there."""

@@ -4,10 +4,13 @@ from __future__ import annotations
 
 _SHARE_OF_PERIOD = 0.3  # a scan sooner than this part of the period came in a bunch
 _BUNCHED_SHARE = 0.08  # share of such scans beyond which the stamps are those of delivery, not of measurement
-_FORGET = 0.01
-_PULL = 0.1
-_LONGEST_PERIODS = 18.0
-_LEARN_SCANS = 30
+_FORGET = 0.01  # what one scan counts for in the period and in the share: a memory of a hundred scans
+_PULL = 0.1  # of what the steady clock is off that each scan takes back: a delay of one message moves it by a tenth
+_LONGEST_PERIODS = (
+    18.0  # beyond it a log has a gap, which is no period, and the steady clock follows the stamps at once
+)
+_LEARN_SCANS = 30  # until then any time between scans teaches the period, and stamps are believed
+_STEADY_PERIODS = (0.5, 3.0)  # limits of one step of the steady clock, so that it never stands still nor leaps
 _LEAST_S = 1e-6  # stamps nearer than this (made rising by a nanosecond) tell no time: a period has passed
 
 
@@ -58,7 +61,10 @@ class ScanClock:
         if abs(ahead_s) > _LONGEST_PERIODS * self._period_s:
             step_s = max(now_s - self._smooth_s, self._period_s)
         else:
-            step_s = min(max(self._period_s + _PULL * ahead_s, 0.5 * self._period_s), 3.0 * self._period_s)
+            step_s = min(
+                max(self._period_s + _PULL * ahead_s, _STEADY_PERIODS[0] * self._period_s),
+                _STEADY_PERIODS[1] * self._period_s,
+            )
         step_s = max(step_s, 0.0)
         self._smooth_s += step_s
         return step_s

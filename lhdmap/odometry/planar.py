@@ -9,29 +9,29 @@ from typing import NamedTuple
 import numpy as np
 
 from lhdmap.messages import FloatArray, LaserScan
-from lhdmap.odometry.anchored import AnchoredMatcher
+from lhdmap.odometry.anchored.matcher import AnchoredMatcher
+from lhdmap.odometry.anchored.rear_view import NO_POINTS, NOTHING_BEHIND, Behind, RearView, behind
 from lhdmap.odometry.clock import ScanClock
-from lhdmap.odometry.flow_matcher import FlowMatcher
-from lhdmap.odometry.gyro_turn import GyroTurn
-from lhdmap.odometry.motion import Motion
-from lhdmap.odometry.rear_view import NO_POINTS, NOTHING_BEHIND, Behind, RearView, behind
+from lhdmap.odometry.motion import PlanarMotion
+from lhdmap.odometry.range_flow.matcher import FlowMatcher
+from lhdmap.odometry.rate import AdaptiveRate
 from lhdmap.odometry.settings import AnchorSettings, OdometrySettings, RangeFlowSettings, SearchSettings
 from lhdmap.odometry.step_covariance import StepErrors
 from lhdmap.odometry.steps import Matched, OdometryStep, WheelStep
 from lhdmap.odometry.trust_settings import TrustSettings
-from lhdmap.odometry.wheel_model import WheelModel
+from lhdmap.odometry.wheels.gyro import GyroTurn
+from lhdmap.odometry.wheels.model import WheelModel
 from lhdmap.scan_matching.information import body_information, inflated, marginal_information
 from lhdmap.scan_matching.scan_points import NO_BOXES, half_sweep_ns, planar_points
 from lhdmap.scan_matching.slant import NO_RISE
 from lhdmap.scan_matching.step_error import NO_ERROR
 
-_FIRST_SCANS = 10
-_SLOWEST_REAR_MPS = 0.1
+_SLOWEST_REAR_MPS = 0.1  # below it the rear scanner sees what it saw before
 _MOSTLY_NOISE = 0.5  # of what a scan tells: then the walls tell nothing of one direction
 _WALLS_ALONE = 0.6  # support below which a crowd may be what the scan is held by
 
 
-class View(NamedTuple):
+class ScanView(NamedTuple):
     """What else is known of a scan's surroundings.
 
     `height_m` of `base_link` in `odom`; `boxes_m` (K, 6): own bodies; `rear`: tells what the rear scanner sees at the same
@@ -59,7 +59,7 @@ class _Judged(NamedTuple):
     covariance: FloatArray
 
 
-_PLAIN = View()
+_PLAIN = ScanView()  # of a scan of which nothing else is known
 Placement = FloatArray | Callable[[], FloatArray]
 
 
@@ -80,7 +80,7 @@ class PlanarOdometry:
         trust: TrustSettings | None = None,
     ) -> None:
         self._settings = settings or OdometrySettings()
-        self._motion = Motion(self._settings, velocity)
+        self._motion = PlanarMotion(self._settings, velocity)
         self.wheels, self.gyro = WheelModel(self._settings, self._motion), GyroTurn(self._motion)
         self._matcher: AnchoredMatcher | FlowMatcher
         if self._settings.method == "range_flow":
@@ -101,7 +101,7 @@ class PlanarOdometry:
         self.points = np.zeros((0, 3))  # hits of the last processed scan, level base frame, heights in odom
 
     def update(
-        self, scan: LaserScan, T_level_sensor: Placement, wheels: WheelStep | None = None, view: View = _PLAIN
+        self, scan: LaserScan, T_level_sensor: Placement, wheels: WheelStep | None = None, view: ScanView = _PLAIN
     ) -> OdometryStep:
         """Process one scan; `T_level_sensor` (4, 4): mount and attitude, or what tells it where the scan is processed."""
         dt_s = self._clock.step(scan.stamp_ns)
@@ -135,7 +135,7 @@ class PlanarOdometry:
         information = marginal_information(body_information(matched.information, heading_rad))
         return _Judged(information, self._weak(information), body_information(self._motion.P[:3, :3], heading_rad))
 
-    def _behind(self, view: View, floor_m: float) -> Behind:
+    def _behind(self, view: ScanView, floor_m: float) -> Behind:
         """Return the rear scanner's hits; at rest they add nothing."""
         velocity = self._motion.velocity
         rear = view.rear() if view.rear is not None and abs(velocity[0]) >= _SLOWEST_REAR_MPS else None
@@ -219,25 +219,3 @@ def _planar_mount(T_level_sensor: FloatArray) -> FloatArray:
     return np.array(
         [T_level_sensor[0, 3], T_level_sensor[1, 3], math.atan2(T_level_sensor[1, 0], T_level_sensor[0, 0])]
     )
-
-
-class AdaptiveRate:
-    """Decides which scans are processed: those after enough travel, turn or time; the first ones always."""
-
-    def __init__(self, settings: OdometrySettings) -> None:
-        self._settings = settings
-        self._travel_m = self._turn_rad = self._wait_s = 0.0
-        self._processed = 0
-
-    def due(self, dt_s: float, velocity: FloatArray) -> bool:
-        """Return whether the scan that comes `dt_s` after the one before is to be processed at this velocity (3,)."""
-        s = self._settings
-        self._travel_m += float(np.hypot(velocity[0], velocity[1])) * dt_s
-        self._turn_rad += abs(float(velocity[2])) * dt_s
-        self._wait_s += dt_s
-        moved = self._travel_m >= s.step_m or self._turn_rad >= math.radians(s.step_deg) or self._wait_s >= s.step_s
-        if not moved and self._processed >= _FIRST_SCANS:
-            return False
-        self._travel_m = self._turn_rad = self._wait_s = 0.0
-        self._processed += 1
-        return True

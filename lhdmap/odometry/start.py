@@ -13,14 +13,15 @@ import numpy as np
 
 from lhdmap.geometry import se2
 from lhdmap.messages import FloatArray, LaserScan
-from lhdmap.odometry.planar import Placement, PlanarOdometry, View
+from lhdmap.odometry.planar import Placement, PlanarOdometry, ScanView
 from lhdmap.odometry.steps import OdometryStep, WheelStep
 
 _SPAN_SCANS = 6  # the starting speed is the mean over so many scans
-_LONGEST_SPAN_S = 1.0
+_LONGEST_SPAN_S = 1.0  # over more the speed of a machine changes
 _WEAK_SHARE = 0.2  # of scans from which the walls are smooth: other speeds are tried, too
 _NO_RESIDUAL_M = 1e-6  # of scans without noise
-_SPEEDS_MPS = (0.0, 2.0, -2.0, 4.0, 6.0)
+_SPEEDS_MPS = (0.0, 2.0, -2.0, 4.0, 6.0)  # tried: what loaders drive, mostly forward
+_FEWEST_SCANS = 3  # two tell one step, which noise may be
 _DRY_SCANS = 25  # of a run where walls hold; smooth ones want all there are
 
 
@@ -30,7 +31,7 @@ class ScanInput(NamedTuple):
     scan: LaserScan
     T_level_sensor: Placement
     wheels: WheelStep | None = None
-    view: View = View()
+    view: ScanView = ScanView()
 
 
 Maker = Callable[[FloatArray | None], PlanarOdometry]  # takes a starting velocity, None: unknown
@@ -38,7 +39,7 @@ Maker = Callable[[FloatArray | None], PlanarOdometry]  # takes a starting veloci
 
 def starting_velocity(make: Maker, inputs: Sequence[ScanInput]) -> FloatArray | None:
     """Return forward, lateral and turning speed (3,) at the first scan, or None where the scans do not show it."""
-    if len(inputs) < 3:
+    if len(inputs) < _FEWEST_SCANS:
         return None
     all_inputs, inputs = inputs, inputs[:_DRY_SCANS]
     steps = _run(make(None), inputs)
@@ -92,7 +93,7 @@ def _between(processed: Sequence[OdometryStep]) -> FloatArray | None:
     dt_s = (processed[-1].time_ns - processed[0].time_ns) * 1e-9 if len(processed) > 1 else 0.0
     if not 0.0 < dt_s < _LONGEST_SPAN_S:
         return None
-    step = se2.between(processed[0].T_odom_base, processed[-1].T_odom_base)
+    step = se2.between(processed[0].pose_odom_base, processed[-1].pose_odom_base)
     middle = 0.5 * step[2]
     c, s = np.cos(middle), np.sin(middle)
     return np.array([c * step[0] + s * step[1], -s * step[0] + c * step[1], step[2]]) / dt_s

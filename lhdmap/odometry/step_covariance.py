@@ -13,21 +13,23 @@ from lhdmap.messages import FloatArray
 from lhdmap.odometry.steps import Matched
 from lhdmap.odometry.trust_settings import TrustSettings
 from lhdmap.scan_matching.information import body_information
-from lhdmap.scan_matching.matching import line_weight, slanted
 from lhdmap.scan_matching.step_error import StepError
+from lhdmap.scan_matching.surface_map import CELLS, CENTRE_X, CENTRE_Y, NORMAL_X, NORMAL_Y, SCATTER, SERVED
+from lhdmap.scan_matching.wall_lines import line_weight, slanted
 
 # Variance of the cells along a line, in squares of a cell: a Gaussian of two cells' deviation, cut off at three.
 _SPREAD_CELLS2 = 2.2
 _MOST_NOISE = 2.0  # share of noise: lines of few cells make it larger than all that the scan tells
+# Lever of a scan's hits: how far away the walls are whose noise turns it. The settings were measured at the usual one; beyond
+# the limits none was.
 _USUAL_LEVER_M, _LEAST_LEVER_M, _LONGEST_LEVER_M = 5.0, 3.0, 50.0
-_LEVER_POWER = 1.5
+_LEVER_POWER = 1.5  # with which the walk falls as the lever grows: fitted, as the settings of `TrustSettings`
 _OF_PAIRS = 0.24  # share of noise where scans are compared in pairs: each link of the chain adds its error
-_SECOND = 2
-_NOTHING = np.zeros((3, 3))
+_SECOND = 2  # scan of a drive: it is placed against one scan alone
+_NOTHING = np.zeros((3, 3))  # covariance of a scan that adds none
 _LITTLE = np.diag([1e-3, 1e-3, 1e-3])  # information of no scan
-_SWAY = np.diag(
-    [0.0, 0.0035**2, 0.0]
-)  # of a tilted scanner: noise of the roll shifts what it sees of the walls sideways
+# Of a tilted scanner: noise of the roll shifts what it sees of the walls sideways.
+_SWAY = np.diag([0.0, 0.0035**2, 0.0])
 
 
 class StepErrors:
@@ -114,15 +116,15 @@ def direction_noise(pose, hits, lines, fine_m, model):  # type: ignore[no-untype
     c, s = math.cos(pose[2]), math.sin(pose[2])
     points, total, row = hits.points, np.zeros((3, 3)), np.zeros(3)
     for i in range(points.shape[0]):
-        if lines[i, 6] == 0.0:
+        if lines[i, SERVED] == 0.0:
             continue
         rx, ry = c * points[i, 0] - s * points[i, 1], s * points[i, 0] + c * points[i, 1]
-        nx, ny = lines[i, 2], lines[i, 3]
+        nx, ny = lines[i, NORMAL_X], lines[i, NORMAL_Y]
         towards = nx * rx + ny * ry
-        d = nx * (pose[0] + rx - lines[i, 0]) + ny * (pose[1] + ry - lines[i, 1])
+        d = nx * (pose[0] + rx - lines[i, CENTRE_X]) + ny * (pose[1] + ry - lines[i, CENTRE_Y])
         d += slanted(hits, i, lines[i], c, s, nx, ny)
         _, w = line_weight(lines[i], d * d, towards * towards / (rx * rx + ry * ry + 1e-12), fine_m, model)
-        angle2 = lines[i, 4] / (lines[i, 5] * _SPREAD_CELLS2 * lines[i, 6] ** 2)
+        angle2 = lines[i, SCATTER] / (lines[i, CELLS] * _SPREAD_CELLS2 * lines[i, SERVED] ** 2)
         row[0], row[1], row[2] = -ny, nx, ny * ry + nx * rx
         for a in range(3):
             for b in range(3):

@@ -28,7 +28,7 @@ class Matched(NamedTuple):
     """What a matcher says of one scan.
 
     `information` (3, 3) of the scan alone in `odom` axes, residual, share of hits that agree, whether the scan could not be
-    placed (the pose is then the prediction), whether it was placed where the motion did not foretell it, now or a moment ago, and
+    placed (the pose is then the prediction), whether it was placed where the motion did not predict it, now or a moment ago, and
     whether just now. `noise` (3, 3): what of the information comes from noise of the walls' directions; `layered`: the scanner
     tilts; `alone`: no other scanner sees its walls again.
     """
@@ -47,9 +47,9 @@ class Matched(NamedTuple):
 class OdometryStep(NamedTuple):
     """Outcome of one scan.
 
-    `T_odom_base`: planar pose (3,) at `time_ns`, the middle of the sweep: there an error of the speed that undid the sweep does
+    `pose_odom_base`: planar pose (3,) at `time_ns`, the middle of the sweep: there an error of the speed that undid the sweep does
     not move the scan as a whole; `covariance`: (3, 3) of that pose against the local map, in body axes (m, rad), a weak
-    direction as wide as it is; `error`: what the step from the processed scan before adds to the error of the way, none where the
+    direction as wide as it is; `error`: what the step from the processed scan before adds to the error of the path, none where the
     scan was not processed; `information`: (3,) along, across (1/m²), heading (1/rad²) of this scan, the others unknown;
     `degenerate`: a direction was not observed; `substitute`: what stood in for it (`wheels`, `motion` or empty);
     `processed`: False where the adaptive rate only predicted; `lost`: the scan did not fit the map; `wheels`: what became of the
@@ -58,7 +58,7 @@ class OdometryStep(NamedTuple):
 
     stamp_ns: int
     time_ns: int
-    T_odom_base: FloatArray
+    pose_odom_base: FloatArray
     covariance: FloatArray
     velocity: FloatArray
     information: FloatArray

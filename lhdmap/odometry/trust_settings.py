@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 from lhdmap.settings import setting
 
+# Of all of them: fitted together.
 _SOURCE = "measured: simulated drives of all wall classes (docs/odometry.md)"
 
 

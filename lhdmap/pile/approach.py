@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from lhdmap.messages import FloatArray
-from lhdmap.pile.result import Approach, PileEstimate, PileReport, Snapshot
+from lhdmap.pile.result import PileApproach, PileEstimate, PileReport, Snapshot
 from lhdmap.pile.settings import PileSettings
 
 _MOST_HISTORY = 400
@@ -75,7 +75,7 @@ class Approaches:
         """
         piles = self._all(around_m)
         chosen = max(reversed(piles), key=_rank, default=self._ahead(around_m))  # of equals the last one
-        ends = [Approach(one.decision, one.last) for one in piles if one.decision and one.last]
+        ends = [PileApproach(one.decision, one.last) for one in piles if one.decision and one.last]
         return replace(chosen, piles=tuple(ends))
 
     def _all(self, around_m: FloatArray) -> list[PileReport]:

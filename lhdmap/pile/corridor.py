@@ -18,7 +18,7 @@ _LOW_M, _HIGH_M = -1.5, 4.0  # heights over the machine's floor that walls are l
 _FEWEST = 4
 
 
-class Corridor(NamedTuple):
+class DriftCorridor(NamedTuple):
     """Walls by distance ahead, local frame (x forward, y left); arrays (K,): NaN where a wall was not seen.
 
     `x_m` middles of the bins, `centre_m`, `left_m`, `right_m` y of middle line and walls.
@@ -46,14 +46,14 @@ class Corridor(NamedTuple):
         return _within(points, self.x_m, self.centre_m, self.half_at(self.x_m) - gap_m)
 
 
-def trace(points: FloatArray, reach_m: float) -> Corridor:
+def trace(points: FloatArray, reach_m: float) -> DriftCorridor:
     """Follow the walls through points (N, 3+), local frame, up to `reach_m` ahead."""
     count = max(int((reach_m - _FIRST_M) / BIN_M), 1)
     out = np.full((count, 3), math.nan)
     y, starts = _in_bins(points, count)
     _follow(y, starts, out)
     middles: FloatArray = _FIRST_M + (np.arange(count, dtype=np.float64) + 0.5) * BIN_M
-    return Corridor(middles, out[:, 0], out[:, 1], out[:, 2])
+    return DriftCorridor(middles, out[:, 0], out[:, 1], out[:, 2])
 
 
 @nb.njit(cache=True, nogil=True)

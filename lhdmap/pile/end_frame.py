@@ -8,8 +8,7 @@ from typing import NamedTuple
 import numba as nb
 import numpy as np
 
-from lhdmap.messages import FloatArray
-from lhdmap.pile.corridor import BIN_M, Corridor
+from lhdmap.pile.corridor import BIN_M, DriftCorridor
 from lhdmap.pile.order import quantile
 
 _WALLS_M = 7.0  # length of wall before the face that its heading is taken from
@@ -21,29 +20,6 @@ _NEAREST_BINS = 8
 _FLOOR_HITS = 12
 _AWAY_M = 1.4  # from the toe
 _ROCK_M = 0.5  # above the path: its grade goes on for up to 25 m, and may change
-
-
-class Frame2(NamedTuple):
-    """A frame turned about the upright axis: origin (3,), heading (rad), in the map."""
-
-    origin_m: FloatArray
-    heading_rad: float
-
-    def local(self, hits: FloatArray) -> FloatArray:
-        """Return rows x, y, z, travelled of hits (N, 4) of the map in this frame."""
-        c, s = math.cos(self.heading_rad), math.sin(self.heading_rad)
-        d = hits[:, :3] - self.origin_m
-        return np.column_stack([c * d[:, 0] + s * d[:, 1], -s * d[:, 0] + c * d[:, 1], d[:, 2], hits[:, 3]])
-
-    def map(self, points: FloatArray) -> FloatArray:
-        """Return points (..., 3) of this frame in the map."""
-        c, s = math.cos(self.heading_rad), math.sin(self.heading_rad)
-        x, y = points[..., 0], points[..., 1]
-        return np.stack([c * x - s * y, s * x + c * y, points[..., 2]], axis=-1) + self.origin_m
-
-    def turned(self, at: FloatArray, turn_rad: float) -> Frame2:
-        """Return the frame with its origin at a point (3,) of this one, turned left."""
-        return Frame2(self.map(at), self.heading_rad + turn_rad)
 
 
 @nb.njit(cache=True, nogil=True)
@@ -69,7 +45,7 @@ class End(NamedTuple):
     half_m: float
 
 
-def _mouth(corridor: Corridor, at_x_m: float, slope: float) -> tuple[float, float] | None:
+def _mouth(corridor: DriftCorridor, at_x_m: float, slope: float) -> tuple[float, float] | None:
     """Return y of both walls of the drift some metres before x, carried on along the end's slope; None: hardly seen.
 
     A drift runs at any angle to the machine and bends: its width is what can be carried over, its walls' y is not.
@@ -84,7 +60,7 @@ def _mouth(corridor: Corridor, at_x_m: float, slope: float) -> tuple[float, floa
     return middle + half, middle - half
 
 
-def end_of(corridor: Corridor, face_x_m: float) -> End | None:
+def end_of(corridor: DriftCorridor, face_x_m: float) -> End | None:
     """Return the end before a face at x, from the walls of the last metres; None where they were not seen."""
     last = (corridor.x_m < face_x_m - 0.8) & (corridor.x_m > face_x_m - _WALLS_M)
     lines, weights = [], []

@@ -26,14 +26,14 @@ _TUKEY = 4.7
 _MOST_POINTS = 1500
 
 
-class Registration(NamedTuple):
+class FaceRegistration(NamedTuple):
     """How far poses may be wrong along the approach: scale (m/m) and pitch, mounting tilt included (rad); standard deviations."""
 
     scale: float
     pitch_rad: float
 
 
-class Face(NamedTuple):
+class PileFace(NamedTuple):
     """x = a + b y + c z in the end frame; `covariance` (4, 4) of a, b, c and the drift; `spread_m` of the residuals."""
 
     a: float
@@ -78,12 +78,12 @@ def find(points: FloatArray, rng: np.random.Generator, known: FloatArray | None 
     return model if math.isfinite(model[0]) else None
 
 
-def fit(points: FloatArray, start: FloatArray, registration: Registration) -> Face:
+def fit(points: FloatArray, start: FloatArray, registration: FaceRegistration) -> PileFace:
     """Refine a face by Tukey-weighted regression with one weight for each (y, z) cell; points rows x, y, z, travelled."""
     thin = np.ascontiguousarray(points[:: 1 + len(points) // _MOST_POINTS])
     model, H, spread, blocks = _regression(thin, start, registration.scale**2, registration.pitch_rad**2)
     a, b, c, drift = (float(value) for value in model)
-    return Face(a, b, c, drift, np.linalg.inv(H), spread, blocks)
+    return PileFace(a, b, c, drift, np.linalg.inv(H), spread, blocks)
 
 
 @nb.njit(cache=True, nogil=True)

@@ -10,24 +10,13 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
+from lhdmap.pile.bounds import BOUNDS, StatusBounds
 from lhdmap.pile.result import STATUSES
 
 _MODEL_STD_DEG = 1.5  # rubble over the height that is seen
 _ROCK_M, _RUBBLE_M = 0.026, 0.033  # grain of bare rock and of rubble, measured in simulated scenes
 _STEEP = ("hang_up", "wall")
 FLOOR_DEG = 8.0  # flatter is floor that rises
-
-
-class Bounds(NamedTuple):
-    """Bounds of the steepness in degrees between too shallow, loadable, steep, upright and overhanging."""
-
-    shallow_deg: float = 28.0
-    steep_deg: float = 60.0
-    upright_deg: float = 81.0
-    overhang_deg: float = 98.0
-
-
-BOUNDS = Bounds()  # measured in simulated scenes
 
 
 class Shares(NamedTuple):
@@ -40,7 +29,7 @@ class Shares(NamedTuple):
     overhang: float
 
 
-def shares(steepness_deg: float, std_deg: float, bounds: Bounds = BOUNDS) -> Shares:
+def shares(steepness_deg: float, std_deg: float, bounds: StatusBounds = BOUNDS) -> Shares:
     """Return the share of each range; rubble over the height that is seen adds to the standard deviation."""
     a, b, c, d = (_below(bound, steepness_deg, std_deg) for bound in bounds)
     return Shares(a, b - a, c - b, d - c, 1.0 - d)
@@ -51,7 +40,7 @@ def _below(bound_deg: float, steepness_deg: float, std_deg: float) -> float:
     return 0.5 * math.erfc((steepness_deg - bound_deg) / (std * math.sqrt(2.0)))
 
 
-class Evidence(NamedTuple):
+class StatusEvidence(NamedTuple):
     """What the status follows from.
 
     Inclination and deviation (deg, sign of Table 6), grain (m): how unlike neighbouring decimetres are, share of the width that
@@ -68,7 +57,7 @@ class Evidence(NamedTuple):
     fit_std_deg: float = 0.0
 
 
-def probabilities(evidence: Evidence) -> dict[str, float]:
+def probabilities(evidence: StatusEvidence) -> dict[str, float]:
     """Return the probability of each status."""
     angle = -evidence.inclination_deg
     part = shares(angle, evidence.std_deg)

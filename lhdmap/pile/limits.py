@@ -9,7 +9,7 @@ import numba as nb
 import numpy as np
 
 from lhdmap.messages import FloatArray
-from lhdmap.pile.face import Face
+from lhdmap.pile.face import PileFace
 from lhdmap.pile.order import cell_numbers, grouped, quantile, select, spread_about
 
 _WALL_CELL_M = 0.1
@@ -25,7 +25,7 @@ _BUMPS = 2.0  # independent bumps in these heights: rock is alike over half a me
 _WALL_SLACK_M = 0.45  # a wall at the face stands no farther from the line of the wall before
 
 
-class Limits(NamedTuple):
+class FaceLimits(NamedTuple):
     """Left and right wall at the face, y in the end frame (m), with standard deviations.
 
     Either the walls reach the face, or the drift opens into a stope and its mouth counts: `mouth_chance` is the probability of
@@ -53,14 +53,14 @@ class Limits(NamedTuple):
         return width, math.sqrt(self.left_std_m**2 + self.right_std_m**2 + doubt)
 
 
-def limits_of(points: FloatArray, face: Face, floor_m: float, half_m: float) -> Limits:
+def limits_of(points: FloatArray, face: PileFace, floor_m: float, half_m: float) -> FaceLimits:
     """Return the walls in the last metre before the face, from hits (N, 4) in the end frame; where the drift opens, its mouth."""
-    return Limits(*_limits(points, (face.a, face.b, face.c), floor_m, half_m))
+    return FaceLimits(*_limits(points, (face.a, face.b, face.c), floor_m, half_m))
 
 
 @nb.njit(cache=True, nogil=True)
 def _limits(points, face, floor, half):  # type: ignore[no-untyped-def]
-    """Return the fields of `Limits`."""
+    """Return the fields of `FaceLimits`."""
     a, b, c = face
     # rubble of a shallow face reaches far along the drift: off it by a distance along the normal
     off = max(0.15, 0.2 * math.sqrt(1.0 + c**2))

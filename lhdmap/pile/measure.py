@@ -7,11 +7,11 @@ import math
 import numpy as np
 
 from lhdmap.messages import FloatArray
-from lhdmap.pile.face import Face
-from lhdmap.pile.judge import Evidence, probabilities
+from lhdmap.pile.face import PileFace
+from lhdmap.pile.judge import StatusEvidence, probabilities
 from lhdmap.pile.relief import Relief, boulders, grain_m, hits_on, patches, relief
 from lhdmap.pile.result import AttackPoint, PileEstimate
-from lhdmap.pile.surface import HIGH_M, LOW_M, Scene
+from lhdmap.pile.surface import HIGH_M, LOW_M, PileScene
 
 _CLEAR = 0.75  # probability of a pile above which a face that was seen badly counts as one
 _UNSEEN, _SEEN_LEAST_M = 1.4, 0.3  # slope of the heights that were not seen, in roughnesses over the height that was
@@ -25,7 +25,7 @@ WORTH = 0.5  # probability of a pile below which nobody should drive into it
 _MACHINE_HALF_M = 1.3
 
 
-def measure(scene: Scene) -> PileEstimate:
+def measure(scene: PileScene) -> PileEstimate:
     """Return the estimate of a scene, in the map."""
     scene, seen = _beside_rocks(scene)
     face, limits = scene.face, scene.limits
@@ -34,7 +34,7 @@ def measure(scene: Scene) -> PileEstimate:
     std_deg = math.hypot(face.inclination_std_deg, _DEFINITION_DEG, _unseen_deg(face, scene.floor_m, on[:, 2]))
     covered, beyond = _closure(scene)
     share = probabilities(
-        Evidence(
+        StatusEvidence(
             face.inclination_deg,
             std_deg,
             grain_m(seen, scene.floor_m + LOW_M, scene.floor_m + HIGH_M),
@@ -73,7 +73,7 @@ def measure(scene: Scene) -> PileEstimate:
     )
 
 
-def _beside_rocks(scene: Scene) -> tuple[Scene, Relief]:
+def _beside_rocks(scene: PileScene) -> tuple[PileScene, Relief]:
     """Return the scene with the face of the rubble alone: boulders stand out of it and are no part of its slope."""
     seen = relief(scene)
     rocks = patches(scene, seen, _SUSPECT_M)
@@ -89,7 +89,7 @@ def _heights(above_m: FloatArray) -> tuple[float, float]:
     return float(low), float(high)
 
 
-def _unseen_deg(face: Face, floor_m: float, z: FloatArray) -> float:
+def _unseen_deg(face: PileFace, floor_m: float, z: FloatArray) -> float:
     """Return how much the slope of the defined heights may differ from that of those (N,) that were seen, from the roughness."""
     low, high = floor_m + LOW_M, floor_m + HIGH_M
     missing = max(1.0 - float(np.ptp(np.clip(z, low, high))) / (high - low), 0.0)
@@ -107,13 +107,13 @@ def _as_rock_lies(inclination_deg: float, std_deg: float) -> tuple[float, float]
     return _PILE_DEG + share * (inclination_deg - _PILE_DEG), std_deg * math.sqrt(share)
 
 
-def _toe(scene: Scene, y: FloatArray) -> FloatArray:
+def _toe(scene: PileScene, y: FloatArray) -> FloatArray:
     """Return the toe at y (K,), where the face meets the floor, end frame, shape (K, 3)."""
     z = np.full_like(y, scene.floor_m)
     return np.column_stack([scene.face.x_at(y, z), y, z])
 
 
-def _closure(scene: Scene) -> tuple[float, float]:
+def _closure(scene: PileScene) -> tuple[float, float]:
     """Return the share of the width on which the face was seen, and the share on which hits lie well beyond it."""
     points, face, limits = scene.points, scene.face, scene.limits
     count = max(int((limits.right_m - limits.left_m) / -0.2), 1)
@@ -126,7 +126,7 @@ def _closure(scene: Scene) -> tuple[float, float]:
     return float(on.mean()), float(past.mean())
 
 
-def _volume(scene: Scene, seen: Relief) -> tuple[float, float]:
+def _volume(scene: PileScene, seen: Relief) -> tuple[float, float]:
     """Return the ore between floor and face as far up as it was seen (m³), with its standard deviation."""
     face, width = scene.face, scene.limits.left_m - scene.limits.right_m
     rows = np.isfinite(seen.proud_m).mean(axis=1) > 0.3
@@ -140,7 +140,7 @@ def _volume(scene: Scene, seen: Relief) -> tuple[float, float]:
     return volume, volume * relative
 
 
-def attack_point(scene: Scene, seen: Relief) -> AttackPoint | None:
+def attack_point(scene: PileScene, seen: Relief) -> AttackPoint | None:
     """Return where the bucket meets rock on both sides: the middle, drawn to where the face stands out, clear of walls."""
     limits = scene.limits
     left, right = limits.left_m - _MACHINE_HALF_M - 0.2, limits.right_m + _MACHINE_HALF_M + 0.2

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 from lhdmap.geometry import se2
 from lhdmap.messages import FloatArray
-from lhdmap.pile.result import Approach, AttackPoint, PileEstimate, PileReport, Snapshot
+from lhdmap.pile.result import AttackPoint, PileApproach, PileEstimate, PileReport, Snapshot
 
 
 def moved_report(report: PileReport, motion_at: Callable[[int], FloatArray]) -> PileReport:
@@ -25,8 +25,8 @@ def moved_report(report: PileReport, motion_at: Callable[[int], FloatArray]) -> 
     return replace(report, history=history, decision=decision, last=last, around_m=around, piles=piles)
 
 
-def _moved_approach(pile: Approach, T_to_from: FloatArray) -> Approach:
-    return Approach(_moved_snapshot(pile.decision, T_to_from), _moved_snapshot(pile.last, T_to_from))
+def _moved_approach(pile: PileApproach, T_to_from: FloatArray) -> PileApproach:
+    return PileApproach(_moved_snapshot(pile.decision, T_to_from), _moved_snapshot(pile.last, T_to_from))
 
 
 def _moved_snapshot(snapshot: Snapshot, T_to_from: FloatArray) -> Snapshot:

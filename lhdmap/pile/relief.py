@@ -12,7 +12,7 @@ from scipy import ndimage
 
 from lhdmap.messages import FloatArray
 from lhdmap.pile.result import Boulder
-from lhdmap.pile.surface import Mask, Scene
+from lhdmap.pile.surface import Mask, PileScene
 
 CELL_M = 0.1
 PROUD_M = 0.28  # findings: a boulder protrudes by more, over more than _PATCH_M2
@@ -39,7 +39,7 @@ class Relief(NamedTuple):
     z_m: FloatArray
 
 
-def relief(scene: Scene) -> Relief:
+def relief(scene: PileScene) -> Relief:
     """Return the relief of all that was seen near the face between the walls."""
     points, face, limits = scene.points, scene.face, scene.limits
     off = face.x_at(points[:, 1], points[:, 2]) - points[:, 0]
@@ -56,11 +56,11 @@ def relief(scene: Scene) -> Relief:
     return Relief(mean, depth_std, y, z)
 
 
-def _shape(scene: Scene) -> tuple[int, int]:
+def _shape(scene: PileScene) -> tuple[int, int]:
     return int(3.0 / CELL_M), max(int((scene.limits.left_m - scene.limits.right_m) / CELL_M), 1)
 
 
-def _cells(scene: Scene, points: FloatArray) -> npt.NDArray[np.int64]:
+def _cells(scene: PileScene, points: FloatArray) -> npt.NDArray[np.int64]:
     """Return the number of the relief's cell of each point (N, 4)."""
     rows, columns = _shape(scene)
     iy = np.clip(((points[:, 1] - scene.limits.right_m) / CELL_M).astype(np.int64), 0, columns - 1)
@@ -68,7 +68,7 @@ def _cells(scene: Scene, points: FloatArray) -> npt.NDArray[np.int64]:
     return iz * columns + iy
 
 
-def hits_on(scene: Scene, seen: Relief, rocks: Sequence[Patch]) -> Mask:
+def hits_on(scene: PileScene, seen: Relief, rocks: Sequence[Patch]) -> Mask:
     """Return which hits of the scene (N,) lie in the cells of rocks."""
     cells = np.zeros(seen.proud_m.shape, np.bool_)
     for rock in rocks:
@@ -101,7 +101,7 @@ class Patch(NamedTuple):
     foot: Mask
 
 
-def patches(scene: Scene, seen: Relief, proud_m: float = PROUD_M) -> list[Patch]:
+def patches(scene: PileScene, seen: Relief, proud_m: float = PROUD_M) -> list[Patch]:
     """Return the connected patches that stand out of the face by more than rubble does.
 
     Walls, floor and roof stand out of the face, too, where they meet it. One looks along them: hits of many depths share a
@@ -115,7 +115,7 @@ def patches(scene: Scene, seen: Relief, proud_m: float = PROUD_M) -> list[Patch]
     return [one for one in found if _is_rock(scene, seen, one)]
 
 
-def boulders(scene: Scene, seen: Relief) -> tuple[Boulder, ...]:
+def boulders(scene: PileScene, seen: Relief) -> tuple[Boulder, ...]:
     """Return the rocks that stand out of the face."""
     return tuple(_boulder(scene, seen, one) for one in patches(scene, seen))
 
@@ -125,7 +125,7 @@ def _patch(cells: Mask, standing: Mask) -> Patch:
     return Patch(cells, ndimage.binary_dilation(cells, iterations=2) & standing)
 
 
-def _is_rock(scene: Scene, seen: Relief, patch: Patch) -> bool:
+def _is_rock(scene: PileScene, seen: Relief, patch: Patch) -> bool:
     """Return whether a patch is neither too small nor the drift's own surface."""
     limits = scene.limits
     if patch.cells.sum() * CELL_M**2 * math.hypot(1.0, scene.face.c) < _PATCH_M2:
@@ -139,7 +139,7 @@ def _is_rock(scene: Scene, seen: Relief, patch: Patch) -> bool:
     return _SMALLEST_M <= extent <= _LARGEST * (limits.left_m - limits.right_m)
 
 
-def _boulder(scene: Scene, seen: Relief, patch: Patch) -> Boulder:
+def _boulder(scene: PileScene, seen: Relief, patch: Patch) -> Boulder:
     """Return the ball that fills a patch, about half of it in the face.
 
     Looked at from the front, one sees a half disc above its middle, and below it what the face, rising from under it, leaves of

@@ -79,7 +79,7 @@ class Snapshot(NamedTuple):
     estimate: PileEstimate
 
 
-class Approach(NamedTuple):
+class PileApproach(NamedTuple):
     """What was decided of one pile, and the last estimate of it."""
 
     decision: Snapshot
@@ -101,7 +101,7 @@ class PileReport:
     method: str = "surface"
     around_m: FloatArray = field(default_factory=lambda: np.zeros((0, 3)))
     warnings: tuple[str, ...] = ()
-    piles: tuple[Approach, ...] = ()
+    piles: tuple[PileApproach, ...] = ()
     reason: str = ""
 
     @property
@@ -137,7 +137,7 @@ class PileReport:
         return table
 
 
-def _approach_json(pile: Approach) -> dict[str, Any]:
+def _approach_json(pile: PileApproach) -> dict[str, Any]:
     """Return what was decided in one approach as JSON values: the last estimate, and when and how far away it was decided."""
     return {
         **estimate_json(_of_a_pile(pile.last.estimate)),

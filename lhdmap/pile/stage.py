@@ -9,14 +9,14 @@ from typing import NamedTuple
 
 import numpy as np
 
+from lhdmap.geometry.frame import UprightFrame
 from lhdmap.messages import FloatArray
 from lhdmap.pile.approach import Approaches
-from lhdmap.pile.end_frame import Frame2
-from lhdmap.pile.face import Registration
+from lhdmap.pile.face import FaceRegistration
 from lhdmap.pile.measure import measure
 from lhdmap.pile.result import PileEstimate, PileReport, Snapshot
 from lhdmap.pile.settings import PileSettings
-from lhdmap.pile.surface import Scene, View, look
+from lhdmap.pile.surface import PileScene, PileView, look
 from lhdmap.pile.tilt import TiltCheck
 from lhdmap.pile.window import HitWindow
 
@@ -41,14 +41,14 @@ class ScanHits(NamedTuple):
 class PileStage:
     """`update` with each scan; `report` at any time. The cost of an update does not grow with the drive."""
 
-    def __init__(self, settings: PileSettings, registration: Registration | None = None) -> None:
+    def __init__(self, settings: PileSettings, registration: FaceRegistration | None = None) -> None:
         self._settings = settings
-        self._registration = registration or Registration(settings.scale_std, math.radians(settings.pitch_std_deg))
+        self._registration = registration or FaceRegistration(settings.scale_std, math.radians(settings.pitch_std_deg))
         self._window = HitWindow(settings.reach_m)
         self._travelled_m = 0.0
         self._position: FloatArray | None = None
         self._estimated_m = -math.inf
-        self._scene: Scene | None = None
+        self._scene: PileScene | None = None
         self._tilt = TiltCheck(self._registration.pitch_rad)
         self._path: deque[tuple[float, float]] = deque()
         self._idle = False
@@ -92,19 +92,19 @@ class PileStage:
             return np.zeros((0, 3))
         across = pile.left_limit_m - pile.right_limit_m
         heading = math.atan2(-float(across[0]), float(across[1]))
-        start = Frame2(pile.center_m, heading).map(np.array([-_AROUND_M, 0.0, 0.0]))
+        start = UprightFrame(pile.center_m, heading).map(np.array([-_AROUND_M, 0.0, 0.0]))
         hits = self._window.hits(np.array([*start, heading]), self._travelled_m)
         hits = hits[hits[:, 0] < 2.0 * _AROUND_M][:, :3]
-        return Frame2(start, heading).map(hits[:: max(1, len(hits) // _MOST_AROUND)])
+        return UprightFrame(start, heading).map(hits[:: max(1, len(hits) // _MOST_AROUND)])
 
     def _estimate(self, scan: ScanHits) -> Snapshot:
-        base = Frame2(scan.T_map_base[:3], float(scan.T_map_base[3]))
+        base = UprightFrame(scan.T_map_base[:3], float(scan.T_map_base[3]))
         hits = self._window.hits(scan.T_map_base, self._travelled_m)
         rng = np.random.default_rng(len(hits))
         self._tilt.update(hits, self._travelled_m)
         tilt = self._tilt.tilt()
         registration = self._registration._replace(pitch_rad=tilt.std_rad)
-        view = View(base, self._grade(), registration, self._scene, self._travelled_m, tilt)
+        view = PileView(base, self._grade(), registration, self._scene, self._travelled_m, tilt)
         scene = look(hits, view, self._settings.reach_m, rng)
         if scene is None or scene.face.inclination_std_deg > _BLURRED_DEG:
             self._scene, self._idle = None, True

@@ -14,11 +14,12 @@ import numba as nb
 import numpy as np
 import numpy.typing as npt
 
+from lhdmap.geometry.frame import UprightFrame
 from lhdmap.messages import FloatArray
-from lhdmap.pile.corridor import Corridor, trace
-from lhdmap.pile.end_frame import Frame2, end_of, floor_before, turned_near
-from lhdmap.pile.face import STEEPEST, Face, Registration, find, fit
-from lhdmap.pile.limits import Limits, limits_of
+from lhdmap.pile.corridor import DriftCorridor, trace
+from lhdmap.pile.end_frame import end_of, floor_before, turned_near
+from lhdmap.pile.face import STEEPEST, FaceRegistration, PileFace, find, fit
+from lhdmap.pile.limits import FaceLimits, limits_of
 from lhdmap.pile.order import quantile
 from lhdmap.pile.tilt import Tilt
 
@@ -33,19 +34,19 @@ _FEWEST_HITS = 40
 _FEWEST_BLOCKS = 6
 
 
-class Scene(NamedTuple):
+class PileScene(NamedTuple):
     """What was found: `frame` at the face's foot, all hits in it (N, 4), the face, those on it (mask), floor, limits."""
 
-    frame: Frame2
+    frame: UprightFrame
     points: FloatArray
-    face: Face
+    face: PileFace
     on_face: Mask
     floor_m: float
     floor_seen: bool
-    limits: Limits
-    registration: Registration = Registration(0.0, 0.0)
+    limits: FaceLimits
+    registration: FaceRegistration = FaceRegistration(0.0, 0.0)
 
-    def without(self, rocks: Mask) -> Scene:
+    def without(self, rocks: Mask) -> PileScene:
         """Return the scene with the face fitted anew, without the hits (N,) on rocks that stand out of it."""
         left = self.on_face & ~rocks
         if left.sum() < _FEWEST_HITS:
@@ -53,24 +54,23 @@ class Scene(NamedTuple):
         face = fit(self.points[left], np.array([self.face.a, self.face.b, self.face.c]), self.registration)
         return self._replace(face=face) if face.c > STEEPEST and face.blocks >= _FEWEST_BLOCKS else self
 
-    def face_in(self, base: Frame2) -> FloatArray:
+    def face_in(self, base: UprightFrame) -> FloatArray:
         """Return a, b, c of the face in another frame."""
         y = np.array([-1.0, 1.0, 0.0])
         z = self.floor_m + np.array([0.5, 0.5, 1.5])
-        corners = self.frame.map(np.column_stack([self.face.x_at(y, z), y, z]))
-        local = base.local(np.column_stack([corners, np.zeros(3)]))
+        local = base.local(self.frame.map(np.column_stack([self.face.x_at(y, z), y, z])))
         A = np.column_stack([np.ones(3), local[:, 1], local[:, 2]])
         found: FloatArray = np.linalg.solve(A, local[:, 0]).astype(np.float64)
         return found
 
 
-class View(NamedTuple):
+class PileView(NamedTuple):
     """From where one looks: the machine's frame, the grade of its path (m/m, rising ahead), how far poses may be wrong."""
 
-    base: Frame2
+    base: UprightFrame
     grade: float
-    registration: Registration
-    known: Scene | None = None
+    registration: FaceRegistration
+    known: PileScene | None = None
     travelled_m: float = 0.0
     tilt: Tilt = Tilt(0.0, 0.0)
 
@@ -79,7 +79,7 @@ class View(NamedTuple):
         return _ahead(hits, self.tilt.angle_rad, self.travelled_m)
 
 
-def look(hits: FloatArray, view: View, reach_m: float, rng: np.random.Generator) -> Scene | None:
+def look(hits: FloatArray, view: PileView, reach_m: float, rng: np.random.Generator) -> PileScene | None:
     """Return what closes the drift ahead, or None; hits rows x, y, z (machine's frame, m), travelled (m)."""
     base, local = view.base, view.ahead(hits)
     corridor = trace(local, reach_m)
@@ -96,7 +96,7 @@ def look(hits: FloatArray, view: View, reach_m: float, rng: np.random.Generator)
     return scene
 
 
-def _measured(view: View, local: FloatArray, corridor: Corridor, seed: FloatArray) -> Scene | None:
+def _measured(view: PileView, local: FloatArray, corridor: DriftCorridor, seed: FloatArray) -> PileScene | None:
     """Return the scene of a face x = a + b y + c z in the machine's frame, with the end's frame and its limits."""
     base = view.base
     face_x = _crossing(seed, corridor)
@@ -110,7 +110,7 @@ def _measured(view: View, local: FloatArray, corridor: Corridor, seed: FloatArra
     return _refined(base.turned(foot, end.turn_rad), near, model, end.half_m, floor, view.registration)
 
 
-def _crossing(seed: FloatArray, corridor: Corridor) -> float:
+def _crossing(seed: FloatArray, corridor: DriftCorridor) -> float:
     """Return x where the corridor's middle meets the face, at the height of the machine's floor."""
     x = float(seed[0])
     for _ in range(3):
@@ -133,8 +133,13 @@ class _Floor(NamedTuple):
 
 
 def _refined(
-    frame: Frame2, points: FloatArray, model: FloatArray, half_m: float, path: _Floor, registration: Registration
-) -> Scene | None:
+    frame: UprightFrame,
+    points: FloatArray,
+    model: FloatArray,
+    half_m: float,
+    path: _Floor,
+    registration: FaceRegistration,
+) -> PileScene | None:
     """Fit the face in the end frame, with the floor and the walls that the fit itself shows."""
     left, right = half_m, -half_m
     scene = None
@@ -149,7 +154,7 @@ def _refined(
         model = np.array([face.a, face.b, face.c])
         limits = limits_of(points, face, floor, half_m)
         left, right = limits.left_m, limits.right_m
-        scene = Scene(frame, points, face, used, floor, seen, limits, registration)
+        scene = PileScene(frame, points, face, used, floor, seen, limits, registration)
     return scene if scene is not None and scene.face.blocks >= _FEWEST_BLOCKS else None
 
 

@@ -1,6 +1,6 @@
 """An object in a process of its own, so that a second core does its work: threads of one process share Python's lock.
 
-`Here` and `Beside` are used alike, and what comes out is the same: `tell` in order, `ask` when an answer is wanted.
+`Here` and `ProcessBeside` are used alike, and what comes out is the same: `tell` in order, `ask` when an answer is wanted.
 """
 
 from __future__ import annotations
@@ -68,7 +68,7 @@ class Here(Generic[T]):
         self._served.close()
 
 
-class Beside(Generic[T]):
+class ProcessBeside(Generic[T]):
     """The object in a new process, which sees nothing of this one but the arguments; all of them are pickled.
 
     An error of a call that was only told, and the death of the process, come out of the next `ask`; calls in between are

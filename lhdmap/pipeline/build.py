@@ -23,15 +23,19 @@ from lhdmap.messages import Message
 from lhdmap.movement.costs import connection_times
 from lhdmap.outputs import free_folder
 from lhdmap.pile.result import PileReport
-from lhdmap.pipeline.beside import Beside, HelperDied, Here
+from lhdmap.pipeline.beside import HelperDied, Here, ProcessBeside
 from lhdmap.pipeline.cost import CompileClock, Spent, cost, peak_memory_mib
+from lhdmap.pipeline.driven import odometry_of, ways_of
 from lhdmap.pipeline.given import GROUND_TRUTH, given_rows
+from lhdmap.pipeline.inputs import ROLES_READ, Inputs
 from lhdmap.pipeline.inspection import Inspection, Inspector, PileBeside
 from lhdmap.pipeline.interruption import Interruption
+from lhdmap.pipeline.live_view import LiveView
 from lhdmap.pipeline.mapping import MappingPipeline
 from lhdmap.pipeline.mounts import machine_of
-from lhdmap.pipeline.outcome import ROLES_READ, Inputs, Outcome, odometry_of, ways_of
+from lhdmap.pipeline.outcome import MapOutcome
 from lhdmap.pipeline.refusal import require_a_map
+from lhdmap.pipeline.stream import Stream
 from lhdmap.provenance import file_entry, source_entry
 from lhdmap.report.page import fill_in_cost
 from lhdmap.report.recording import Thinning
@@ -56,7 +60,8 @@ class BuildRequest:
     `helper`: whether a second process may look for the pile, record and report; what comes out is the same.
     `edits`: TOML file with a user's changes of the topology.
     `force`: replace a map folder that is there, and try a log that the survey calls unusable. `recorded_as`: names of logs in
-    `map.json`, where they are moved later. `window_ns`: only what was logged between these times.
+    `map.json`, where they are moved later. `window_ns`: only what was logged between these times. `stream`: the log is still
+    being written; it must be complete when the messages end.
     """
 
     logs: Sequence[Path]
@@ -71,6 +76,7 @@ class BuildRequest:
     edits: Path | None = None
     recorded_as: Mapping[Path, Path] = field(default_factory=dict)
     window_ns: tuple[int, int] | None = None
+    stream: Stream | None = None
 
     @property
     def inputs(self) -> Inputs:
@@ -109,22 +115,28 @@ def build_map(request: BuildRequest) -> BuildResult:
     given = given_rows(request.poses, request.logs, request.topics) if request.poses else None
     with (
         compiling,
-        LogSource(list(request.logs), request.topics, force=request.force, window_ns=request.window_ns) as source,
+        _source(request) as source,
         MapFolderWriter(request.target, force=request.force, inputs=request.logs) as folder,
     ):
-        hashes, pool = _hash_in_background(request.logs)
+        pool = ThreadPoolExecutor(max_workers=1, thread_name_prefix="hash")
+        hashes = {} if request.stream else _hash_in_background(pool, request.logs)
         interruption = Interruption()
         with pool, _inspector(request, source, folder.path) as inspector, interruption.comes_first():
             primary: Literal["front", "points"] = "front" if "front" in source.roles else "points"
+            view = LiveView(inspector) if request.stream and request.stream.live_port is not None else None
             pipeline = MappingPipeline(
                 request.settings,
                 machine_of(source, request.machine),
                 _sweep_sink(inspector, request.settings.recording.scan_interval_s),
                 primary,
                 pile=PileBeside(inspector),
+                on_step=None if view is None else view.take,
             )
+            if view is not None:
+                view.pipeline = pipeline
             with pipeline:
-                _run(pipeline, source, request.progress, interruption)
+                _run(pipeline, source, request, interruption)
+            hashes = hashes or _hash_in_background(pool, request.logs)
             as_recorded = partial(source.recorded_ns, primary)
             # An interruption of what follows must not lose it.
             folder.write_odometry(_stamped(odometry_of(pipeline), as_recorded))
@@ -134,7 +146,8 @@ def build_map(request: BuildRequest) -> BuildResult:
                 require_a_map(source.paths[0], pipeline.records, ways.rows)
             final = _stamped(ways.final, as_recorded)
             folder.write_trajectory(final)
-            outcome = Outcome(inputs, source, pipeline, ways)
+            outcome = MapOutcome(inputs, source, pipeline, ways)
+            outcome.warnings = renamed(outcome.warnings, request.recorded_as)
             beside = _write(folder, request, source, outcome, inspector)
         known = {path: _entry(request, path, future) for path, future in hashes.items()}
         own = Spent(peak_memory_mib(), compiling.seconds)
@@ -153,11 +166,20 @@ def _stamped(rows: _Stamped, stamps_of: Callable[[Any], Any]) -> _Stamped:
     return rows._replace(stamp_ns=stamps_of(rows.stamp_ns))
 
 
-def _run(pipeline: MappingPipeline, source: LogSource, progress: Progress | None, interruption: Interruption) -> None:
+def _source(request: BuildRequest) -> LogSource:
+    growing = None if request.stream is None else request.stream.opened
+    return LogSource(
+        list(request.logs), request.topics, force=request.force, window_ns=request.window_ns, growing=growing
+    )
+
+
+def _run(pipeline: MappingPipeline, source: LogSource, request: BuildRequest, interruption: Interruption) -> None:
     """Send all messages through the stages, until Ctrl-C: the stages then finish with what they have."""
     messages: Iterable[tuple[str, Message]] = source.messages([role for role in ROLES_READ if role in source.roles])
-    if progress is not None:
-        messages = progress(messages, source.duration_s)
+    if request.progress is not None:
+        messages = request.progress(messages, source.duration_s)
+    if request.stream is not None:
+        messages = request.stream.through(source, messages, pipeline)
     with interruption:
         for role, message in messages:
             pipeline.update(role, message)
@@ -172,7 +194,7 @@ def _run(pipeline: MappingPipeline, source: LogSource, progress: Progress | None
 
 
 def _write(
-    folder: MapFolderWriter, request: BuildRequest, source: LogSource, outcome: Outcome, inspector: Inspector
+    folder: MapFolderWriter, request: BuildRequest, source: LogSource, outcome: MapOutcome, inspector: Inspector
 ) -> Spent:
     """Write the rest of the map but `map.json`; return what a process beside this one needed."""
     shown = outcome.report(), outcome.pipeline.machine or Machine(bodies={})
@@ -198,17 +220,19 @@ def _write(
         with _inspection(Here, request, source, folder.path) as here:
             here.ask(Inspection.write, *shown)
         return Spent()
-    return spent if isinstance(inspector, Beside) else Spent()
+    return spent if isinstance(inspector, ProcessBeside) else Spent()
 
 
 def _inspector(request: BuildRequest, source: LogSource, folder: Path) -> Inspector:
     """Return where the inspection happens: beside this process where that is wanted and pays."""
-    beside = request.helper and source.duration_s >= _BESIDE_FROM_S and _cores() > 1
-    return _inspection(Beside if beside else Here, request, source, folder)
+    pays = source.duration_s >= _BESIDE_FROM_S or request.stream is not None
+    beside = request.helper and pays and _cores() > 1
+    return _inspection(ProcessBeside if beside else Here, request, source, folder)
 
 
 def _inspection(make: Callable[..., Inspector], request: BuildRequest, source: LogSource, folder: Path) -> Inspector:
-    return make(Inspection, folder, request.target.name, source.start_ns or 0, request.settings)
+    port = None if request.stream is None else request.stream.live_port
+    return make(Inspection, folder, request.target.name, source.start_ns or 0, request.settings, port)
 
 
 def _cores() -> int:
@@ -226,13 +250,20 @@ def _sweep_sink(inspector: Inspector, interval_s: float) -> Callable[[str, int, 
     return take
 
 
-def _hash_in_background(logs: Sequence[Path]) -> tuple[dict[Path, Future[dict[str, Any]]], ThreadPoolExecutor]:
-    pool = ThreadPoolExecutor(max_workers=1, thread_name_prefix="hash")
-    return {path: pool.submit(source_entry, path) for path in logs}, pool
+def _hash_in_background(pool: ThreadPoolExecutor, logs: Sequence[Path]) -> dict[Path, Future[dict[str, Any]]]:
+    return {path: pool.submit(source_entry, path) for path in logs}
 
 
 def _entry(request: BuildRequest, path: Path, entry: Future[dict[str, Any]]) -> dict[str, Any]:
     return entry.result() | {"path": str(request.recorded_as.get(path, path))}
+
+
+def renamed(texts: Iterable[str], names: Mapping[Path, Path]) -> list[str]:
+    """Return texts with the names that logs will have once they are moved."""
+    texts = list(texts)
+    for old, new in names.items():
+        texts = [text.replace(str(old), str(new)) for text in texts]
+    return texts
 
 
 def options_of(request: BuildRequest) -> dict[str, Any]:

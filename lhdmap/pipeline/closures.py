@@ -7,14 +7,14 @@ from collections.abc import Sequence
 import numpy as np
 
 from lhdmap.geometry import se2
-from lhdmap.pipeline.track import Rows, resample
+from lhdmap.pipeline.track import TrackRows, resample
 from lhdmap.report.data import ClosureRow
 from lhdmap.smoothing.evidence import Evidence
 
 _PLANAR = [0, 1, 5]  # of a pose: x, y, heading
 
 
-def closure_rows(evidence: Sequence[Evidence], rows: Rows) -> list[ClosureRow]:
+def closure_rows(evidence: Sequence[Evidence], rows: TrackRows) -> list[ClosureRow]:
     """Return places that were taken for ones seen before, where they are on the final path `rows`; those believed first.
 
     What a closure measured is set against the final poses; NaN where nothing was measured.

@@ -31,7 +31,7 @@ _FOREVER_NS, _MARGIN_NS = 1 << 62, 1_000_000_000  # other sensors may begin befo
 _GRID = SearchGrid(0.15, 0.05)
 
 
-class Drive(NamedTuple):
+class LogDrive(NamedTuple):
     """Logs of one drive in the order of time; `window_ns`: what of them is of it, None: all."""
 
     logs: tuple[Path, ...]
@@ -46,7 +46,7 @@ class _Log(NamedTuple):
     has_front: bool
 
 
-def drives_of(logs: Sequence[Path], topics: Mapping[str, str]) -> list[Drive]:
+def drives_of(logs: Sequence[Path], topics: Mapping[str, str]) -> list[LogDrive]:
     """Return the drives in logs, in the order of the logs as they were given; raises InputError where one cannot be read."""
     with ExitStack() as stack:
         readers = [stack.enter_context(open_log(path)) for path in logs]
@@ -55,7 +55,7 @@ def drives_of(logs: Sequence[Path], topics: Mapping[str, str]) -> list[Drive]:
             "front"
         )
         if front is None:
-            return [Drive(tuple(logs))]  # of a 3D scanner, or nothing that can be used: the build tells
+            return [LogDrive(tuple(logs))]  # of a 3D scanner, or nothing that can be used: the build tells
         opened = [_log(path, reader, front) for path, reader in zip(logs, readers, strict=True)]
         recordings = _recordings(opened)
         found = [drive for recording in recordings for drive in _parted(recording, front)]
@@ -85,18 +85,18 @@ def _recordings(opened: Sequence[_Log]) -> list[list[_Log]]:
     return found
 
 
-def _parted(recording: list[_Log], front: str) -> list[Drive]:
+def _parted(recording: list[_Log], front: str) -> list[LogDrive]:
     """Return the drives of logs that follow each other: parted at pauses after which the scan is another."""
     paths = tuple(one.path for one in recording)
     pauses = list(_moved_in(recording, front))
     if not pauses:
-        return [Drive(paths)]
+        return [LogDrive(paths)]
     drives = []
     begins, ends = [0, *(after - _MARGIN_NS for _, after in pauses)], [*(before + _MARGIN_NS for before, _ in pauses)]
     for first, until in zip(begins, [*ends, _FOREVER_NS], strict=True):
         own = tuple(one.path for one in recording if one.start_ns < until and one.end_ns >= first)
         whole = all(first <= one.start_ns and one.end_ns < until for one in recording if one.path in own)
-        drives.append(Drive(own, None if whole else (first, until)))
+        drives.append(LogDrive(own, None if whole else (first, until)))
     return drives
 
 

@@ -6,10 +6,9 @@ import math
 from collections import Counter, deque
 from functools import partial
 
-import numpy as np
-
 from lhdmap.config import Settings
 from lhdmap.geometry import se3
+from lhdmap.geometry.boxes import grown
 from lhdmap.machine import Machine
 from lhdmap.messages import (
     FloatArray,
@@ -22,12 +21,12 @@ from lhdmap.messages import (
     Tachometer,
     WheelPose,
 )
-from lhdmap.odometry.cloud_motion import CloudPrior
-from lhdmap.odometry.planar import View
-from lhdmap.odometry.rear_view import RearView
+from lhdmap.odometry.anchored.rear_view import RearView
+from lhdmap.odometry.cloud.motion import CloudPrior
+from lhdmap.odometry.planar import ScanView
 from lhdmap.odometry.start import ScanInput
 from lhdmap.odometry.steps import WheelStep
-from lhdmap.pipeline.mounts import Mounts, level_sensor
+from lhdmap.pipeline.mounts import SensorMounts, level_sensor
 from lhdmap.pipeline.rear import AT_ONCE_NS, RearScans
 from lhdmap.pipeline.sweep_times import SweepTimes
 from lhdmap.proprioception.attitude import AttitudeFilter
@@ -47,7 +46,7 @@ class FrontEnd:
     def __init__(self, settings: Settings, machine: Machine | None) -> None:
         self._settings, self._gyro_settings = settings.attitude, settings.gyro
         self.machine = machine or DEFAULT_MACHINE
-        self.mounts = Mounts(machine)
+        self.mounts = SensorMounts(machine)
         self.attitude, self.gyro = AttitudeFilter(settings.attitude), Gyro(settings.gyro, settings.attitude.lag_s)
         self.wheels = WheelOdometry(settings.wheels, self.machine)
         self.rear = RearScans(self.mounts, self.wheels, self.machine)
@@ -87,7 +86,7 @@ class FrontEnd:
         rear = partial(self.behind_at, time_ns) if self.has_inclinometer else None
         rise = rise_of(self.mounts.of(scan.frame_id, "front").T_parent_child)
         turn_rad = self.gyro.turn_between(before_ns, time_ns) if self.gyro.there else None
-        view = View(height_m, self.boxes, rear, rise, self.has_inclinometer, turn_rad)
+        view = ScanView(height_m, self.boxes, rear, rise, self.has_inclinometer, turn_rad)
         return ScanInput(scan, partial(self.placement, scan, time_ns), self._wheel_step(before_ns, time_ns), view)
 
     def placement(self, scan: LaserScan, time_ns: int) -> FloatArray:
@@ -173,7 +172,4 @@ def own_boxes(machine: Machine | None, margin_m: float) -> FloatArray:
     """Return the boxes of the front body with a margin, shape (K, 6), for scans of the front scanner."""
     if machine is None:
         return NO_BOXES
-    boxes = machine.boxes("base_link").reshape(-1, 6).copy()
-    boxes[:, :3] -= margin_m
-    boxes[:, 3:] += margin_m
-    return np.asarray(boxes, dtype=float)
+    return grown(machine.boxes("base_link"), margin_m)

@@ -12,14 +12,14 @@ from lhdmap.evaluation.ordering import file_in_order
 from lhdmap.geometry import se3
 from lhdmap.logs.source import LogSource
 from lhdmap.messages import GroundTruth
-from lhdmap.pipeline.track import Rows
+from lhdmap.pipeline.track import TrackRows
 from lhdmap.trajectory import Trajectory, read_tum
 
 GROUND_TRUTH = "ground-truth"
 _FARTHEST_M = 50_000.0  # the cloud is of 32-bit floats
 
 
-def given_rows(poses: str, logs: Sequence[Path], topics: Mapping[str, str]) -> Rows:
+def given_rows(poses: str, logs: Sequence[Path], topics: Mapping[str, str]) -> TrackRows:
     """Return the poses of `base_link` in `map` by rising time.
 
     Raises:
@@ -37,7 +37,7 @@ def given_rows(poses: str, logs: Sequence[Path], topics: Mapping[str, str]) -> R
     once = np.concatenate([[True], np.diff(stamps) > 0])
     rpy = se3.rpy_from_quaternions(trajectory.quaternions_xyzw[order][once])
     rpy[:, 2] = np.unwrap(rpy[:, 2])
-    return Rows(stamps[once], np.column_stack([trajectory.positions_m[order][once], rpy]))
+    return TrackRows(stamps[once], np.column_stack([trajectory.positions_m[order][once], rpy]))
 
 
 def _of_file(path: Path) -> Trajectory:

@@ -5,14 +5,14 @@ from __future__ import annotations
 import numpy as np
 
 from lhdmap.pipeline.mapping import MappingPipeline
-from lhdmap.pipeline.track import Rows
+from lhdmap.pipeline.track import TrackRows
 from lhdmap.smoothing.heading import GyroNoise, Path, fused_heading, moves_of
 from lhdmap.smoothing.smoother import Correction
 
 _PLANAR = [0, 1, 5]  # of a pose: x, y, heading
 
 
-def gyro_correction(pipeline: MappingPipeline, rows: Rows) -> Correction | None:
+def gyro_correction(pipeline: MappingPipeline, rows: TrackRows) -> Correction | None:
     """Return how the gyroscope moves the path `rows`, None where there is none or the scans contradict it (a warning says so)."""
     if not len(pipeline.turns) or len(rows.times_ns) < 2:
         return None

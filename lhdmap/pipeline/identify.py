@@ -15,17 +15,17 @@ from lhdmap.geometry import se3
 from lhdmap.logs.source import LogSource
 from lhdmap.machine import Machine
 from lhdmap.messages import FloatArray, LaserScan, Message, Mount
-from lhdmap.pile.face import Registration
-from lhdmap.pile.heap import measure_cloud
-from lhdmap.pile.result import Approach, PileReport, Snapshot
+from lhdmap.pile.clouds.heap import measure_cloud
+from lhdmap.pile.face import FaceRegistration
+from lhdmap.pile.result import PileApproach, PileReport, Snapshot
 from lhdmap.pipeline.front_end import own_boxes
 from lhdmap.pipeline.given import given_rows
 from lhdmap.pipeline.mapping import MappingPipeline, feed
-from lhdmap.pipeline.mounts import Mounts, level_sensor, machine_of
+from lhdmap.pipeline.mounts import SensorMounts, level_sensor, machine_of
 from lhdmap.pipeline.pile import NO_INCLINOMETER, PileWatch, PlacedScan
 from lhdmap.pipeline.said import said_once
 from lhdmap.pipeline.sweep_times import SweepTimes
-from lhdmap.pipeline.track import FinalTrack, Rows
+from lhdmap.pipeline.track import FinalTrack, TrackRows
 from lhdmap.roles import PILE, read_by
 from lhdmap.scan_matching.scan_points import half_sweep_ns
 
@@ -34,7 +34,7 @@ _LEVEL = (
     "--poses gives them"
 )
 _HALF_STEP_NS = 25_000_000
-_GIVEN_POSES = Registration(scale=2e-4, pitch_rad=math.radians(0.15))  # the mounting's tilt is still the log's
+_GIVEN_POSES = FaceRegistration(scale=2e-4, pitch_rad=math.radians(0.15))  # the mounting's tilt is still the log's
 
 
 def identify(
@@ -87,7 +87,7 @@ def _in_cloud(source: LogSource, settings: Settings, machine: Machine | None) ->
     estimate = measure_cloud(pipeline.sweeps.cloud().points_m.astype(np.float64), "z").estimate
     last = Snapshot(pipeline.track.last_ns or 0, math.nan, estimate)
     decision = last if estimate.found and estimate.status not in (None, "none") else None
-    piles = () if decision is None else (Approach(decision, last),)
+    piles = () if decision is None else (PileApproach(decision, last),)
     return PileReport(decision, last, (last,), "cloud", piles=piles)
 
 
@@ -97,7 +97,7 @@ def _warned(report: PileReport, told: Sequence[str]) -> PileReport:
 
 
 def identify_along(
-    rows: Rows,
+    rows: TrackRows,
     logs: Sequence[Path],
     settings: Settings,
     machine: Machine | None,
@@ -112,7 +112,7 @@ def identify_along(
 
 
 def placed_along(
-    rows: Rows,
+    rows: TrackRows,
     logs: Sequence[Path],
     settings: Settings,
     machine: Machine | None,
@@ -120,7 +120,7 @@ def placed_along(
     window_ns: tuple[int, int] | None = None,
 ) -> Iterator[PlacedScan]:
     """Yield the front scans with where they were taken, on poses that are known; scans without a pose are left out."""
-    track, mounts, sweep_times = FinalTrack(rows), Mounts(machine), SweepTimes()
+    track, mounts, sweep_times = FinalTrack(rows), SensorMounts(machine), SweepTimes()
     boxes = own_boxes(machine, settings.integration.body_margin_m)
     with LogSource(list(logs), topics, window_ns=window_ns) as source:
         for _, message in source.messages([role for role in ("tf_static", "front") if role in source.roles]):

@@ -16,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 
 from lhdmap.errors import InputError
-from lhdmap.integration.cloud import Cloud
+from lhdmap.integration.cloud import GridCloud
 from lhdmap.landmarks.model import Landmarks
 from lhdmap.machine import Machine
 from lhdmap.names import name_of
@@ -25,10 +25,10 @@ from lhdmap.pile.moved import moved_report
 from lhdmap.pile.result import PileReport
 from lhdmap.pipeline.build import BuildRequest, BuildResult, build_map
 from lhdmap.pipeline.cost import CompileClock
-from lhdmap.pipeline.drives import Drive, drives_of
+from lhdmap.pipeline.drives import LogDrive, drives_of
 from lhdmap.pipeline.join_files import Joined, write_joined
+from lhdmap.pipeline.known_map import KnownMap
 from lhdmap.pipeline.landmarks import landmarks_for, with_stretches
-from lhdmap.pipeline.localize import KnownMap
 from lhdmap.pipeline.overlap import overlap_of
 from lhdmap.pipeline.path import motion_at
 from lhdmap.pipeline.taught import TaughtMap, path_of, scratch
@@ -52,11 +52,11 @@ _HARDLY = "{}: only {} of {} places of the drive are held by the walls of the ot
 class _Part(NamedTuple):
     """A drive in the map's frame: its map (times moved where needed), what came of its run, how often its walls were tied."""
 
-    drive: Drive
+    drive: LogDrive
     taught: TaughtMap
     built: BuildResult
     path: Trajectory
-    cloud: Cloud
+    cloud: GridCloud
     pile: PileReport | None
     tied: int = 0
 
@@ -71,7 +71,7 @@ def build_drives(request: BuildRequest) -> BuildResult:
     started = time.monotonic()
     free_folder(request.target, force=request.force, inputs=request.logs)
     edits = request.inputs.edits  # a mistake in them is told before the logs are read
-    drives = [Drive(tuple(request.logs))] if request.poses else drives_of(request.logs, request.topics)
+    drives = [LogDrive(tuple(request.logs))] if request.poses else drives_of(request.logs, request.topics)
     if len(drives) == 1:
         return build_map(request)
     with CompileClock() as compiling, scratch() as folder:
@@ -101,7 +101,7 @@ def _as_one(request: BuildRequest, apart: _ApartError) -> BuildResult:
     return result
 
 
-def _alone(request: BuildRequest, drive: Drive, folder: Path) -> _Part:
+def _alone(request: BuildRequest, drive: LogDrive, folder: Path) -> _Part:
     """Build the map of one drive."""
     own = replace(request, logs=drive.logs, target=folder, window_ns=drive.window_ns, edits=None, force=request.force)
     built = build_map(own)

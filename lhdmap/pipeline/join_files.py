@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from lhdmap.config import settings_toml
-from lhdmap.integration.cloud import Cloud
+from lhdmap.integration.cloud import GridCloud
 from lhdmap.integration.cloud_io import write_cloud
 from lhdmap.landmarks.model import Landmarks
 from lhdmap.landmarks.store import write_landmarks
@@ -50,7 +50,7 @@ class Joined(NamedTuple):
     views: Sequence[View]
     topology: Topology
     landmarks: Landmarks
-    cloud: Cloud
+    cloud: GridCloud
     pile: PileReport | None
     tied: Sequence[int]
 

@@ -1,6 +1,6 @@
 """`Localizer`: messages in, where the machine is on a map out; the same object for a log and for a running machine.
 
-messages -> MappingPipeline (odometry alone) -> steps -> Tracker against the map's walls
+messages -> MappingPipeline (odometry alone) -> steps -> MapTracker against the map's walls
 -> Finder: searches in a thread of their own where the place is not known, or lost, and checks of the one that is tracked
 """
 
@@ -10,9 +10,8 @@ import math
 import time
 from collections import deque
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
-from pathlib import Path
 from types import TracebackType
 from typing import NamedTuple, Self
 
@@ -20,99 +19,65 @@ import numpy as np
 
 from lhdmap.config import Settings
 from lhdmap.geometry import se2
-from lhdmap.landmarks.model import Landmarks
-from lhdmap.landmarks.store import read_landmarks
 from lhdmap.localization.changes import WorldChanges
 from lhdmap.localization.finder import Finder
-from lhdmap.localization.fixed_lag import Belief, FixedLag, Step, placed_row
-from lhdmap.localization.method import Tracks, Wheels
+from lhdmap.localization.fixed_lag import Belief, FixedLag, LagStep, placed_row
+from lhdmap.localization.method import Tracks
 from lhdmap.localization.paper import PaperTracker
 from lhdmap.localization.paper_nodes import PaperNodes
 from lhdmap.localization.place_on_map import Placer
-from lhdmap.localization.rows import CANDIDATE, LOST, NOWHERE, TRACKING, UNKNOWN, Row
-from lhdmap.localization.search import CHECK, CONFIRM, FIND, Candidate, GlobalSearch, Search
-from lhdmap.localization.starting import Start, best_start, poses_along
-from lhdmap.localization.strips import strips_of
-from lhdmap.localization.tracker import Tracker
+from lhdmap.localization.rows import CANDIDATE, LOST, NOWHERE, TRACKING, UNKNOWN, LocalizationRow
+from lhdmap.localization.search import CHECK, CONFIRM, FIND, PlaceCandidate, Search
+from lhdmap.localization.starting import BestStart, best_start
+from lhdmap.localization.tracker import MapTracker
 from lhdmap.localization.walls import MapWalls
 from lhdmap.machine import Machine
-from lhdmap.mapfolder import MapFolder
 from lhdmap.messages import FloatArray, Message
 from lhdmap.odometry.planar import PlanarOdometry
-from lhdmap.odometry.rear_view import behind
 from lhdmap.odometry.steps import OdometryStep
+from lhdmap.pipeline.known_map import KnownMap
+from lhdmap.pipeline.localizer_inputs import FromOdometry
+from lhdmap.pipeline.localizer_says import Fix, Where, row_of
+from lhdmap.pipeline.look_near import NearLook
 from lhdmap.pipeline.mapping import MappingPipeline
 from lhdmap.pipeline.pile import PileSink
-from lhdmap.topology.files import read_topology
-from lhdmap.topology.model import TopologicalMap
-from lhdmap.topology.sheet import Sheet, read_sheets
 
 _HITS_ABOVE_M = 1.0  # hits are flat: where they are shown over the floor
 _LEAST_LEFT = 0.25  # of the hits must be of walls that the map has, or nothing corrects the place
 _DENIALS = 2  # checks in a row
-_GUESSED = np.array([0.5, 0.1, 0.1])  # m/s, m/s, rad/s: a step that neither walls nor wheels told
 _HELD = 1.0 / 0.02**2  # 1/m²: less along the machine, and walls hardly hold it
-_LOOK_NS, _NEAR_M, _SAME_M, _CLEARLY, _LEAST_HITS = 400_000_000, 5.0, 0.3, 0.05, 40
+# Deviations (m, m, rad) of a place that a search, or a look near by, has found.
+_SEARCHED_STD = np.array([0.1, 0.1, math.radians(1.0)])
+_FOUND_NEAR_STD = np.array([0.15, 0.15, math.radians(1.0)])
 _LEAST_SUPPORT = 0.35  # where a node's own scans tell of none
-
-
-class KnownMap(NamedTuple):
-    """What of a map localization needs."""
-
-    topology: TopologicalMap
-    landmarks: Landmarks
-    sheets: list[Sheet]
-
-    @classmethod
-    def read(cls, path: Path) -> Self:
-        """Read it from a map folder; raises InputError where something is missing."""
-        folder = MapFolder.open(path)
-        sheets = read_sheets(folder.file("free_space.npz"))
-        return cls(read_topology(path), read_landmarks(folder.file("landmarks.npz")), sheets)
-
-    def search(self, walls: MapWalls, settings: Settings) -> GlobalSearch:
-        """Return what searches it, with walls of its own: it works in a thread of its own."""
-        strips = strips_of(self.topology, self.landmarks, settings.landmarks)
-        return GlobalSearch(strips, walls.apart(), settings.localization, settings.landmarks)
-
-
-class Where(NamedTuple):
-    """Where the machine is now: status, pose (x, y, z, yaw) in `map`, covariance (3, 3) of x, y, yaw; None where not known."""
-
-    status: str
-    pose: FloatArray | None
-    covariance: FloatArray | None
-
-
-class Fix(NamedTuple):
-    """The place at the newest scan in both frames (3,), covariance (3, 3) of x, y, heading in `map`, the floor's height."""
-
-    stamp_ns: int
-    status: str
-    pose_map: FloatArray
-    pose_odom: FloatArray
-    covariance: FloatArray
-    height_m: float
 
 
 Listener = Callable[[int, OdometryStep, PlanarOdometry], None]
 """Told of each front scan: stamp, step, odometry."""
 
 
-@dataclass(slots=True)
-class _Trial:
-    """A place under trial: since where on the way."""
+class LocalizerOptions(NamedTuple):
+    """How a `Localizer` runs.
 
-    since_m: float
+    `live`: a running machine, where nothing waits for a search; of a log each is waited for, so that the rows are the same each
+    time. With `smoother` a row's pose is that of the fixed-lag smoother once the machine is some metres farther. `listener` is
+    told of each front scan. `pile`: what looks for piles on the way, if anything does.
+    """
+
+    live: bool = False
+    smoother: bool = False
+    listener: Listener | None = None
+    pile: PileSink | None = None
+
+
+_AS_OF_A_LOG = LocalizerOptions()
 
 
 class Localizer:
     """Takes messages by role in time order; `rows` is what it said of each front scan, `where` the newest.
 
     `start` (4,): x, y, yaw (rad) and height about where the machine begins, or several (K, 4) of which the first scan chooses;
-    None: it is searched for. `live`: a running machine, where nothing waits for a search; of a log each is waited for, so that
-    the rows are the same each time. With `smoother` a row's pose is that of the fixed-lag smoother once the machine is some metres
-    farther. `pile`: what looks for piles on the way, if anything does. A context manager.
+    None: it is searched for. A context manager.
     """
 
     def __init__(
@@ -121,37 +86,32 @@ class Localizer:
         settings: Settings,
         machine: Machine | None = None,
         start: FloatArray | None = None,
-        listener: Listener | None = None,
-        *,
-        live: bool = False,
-        smoother: bool = False,
-        pile: PileSink | None = None,
+        options: LocalizerOptions = _AS_OF_A_LOG,
     ) -> None:
-        self._lag = FixedLag() if smoother else None
-        if pile is None:  # what lies beyond the map does not count: no loop is closed, no pile looked for
+        self._lag, self._listener = FixedLag() if options.smoother else None, options.listener
+        if options.pile is None:  # what lies beyond the map does not count: no loop is closed, no pile looked for
             settings = replace(settings, pile=replace(settings.pile, method="off"))
-        self._settings, self._floor_m = settings.localization, settings.odometry.min_height_m
-        self.pipeline = MappingPipeline(settings, machine, cloud=False, pile=pile, on_step=self.take)
+        self._settings = settings.localization
+        self.pipeline = MappingPipeline(settings, machine, cloud=False, pile=options.pile, on_step=self.take)
+        self._odometry = FromOdometry(self.pipeline, self._settings, settings.odometry.min_height_m)
         self._walls, self._placer = MapWalls(known.topology, known.landmarks), Placer(known.topology)
         search = known.search(self._walls, settings)
         self.world = WorldChanges(known.topology, known.sheets, self._walls)
-        self._finder = Finder(search, self._settings, settings.landmarks, waits=not live)
+        self._finder = Finder(search, self._settings, settings.landmarks, waits=not options.live)
         paper = self._settings.method == "paper"
         self._paper = PaperNodes(known.topology, known.landmarks, settings.landmarks) if paper else None
         self._tracker: Tracks | None = None if start is None else self._started(start)
         self._turnable = start is not None  # a waypoint's heading is its node's: the machine may face the other way
         self._starts = None if start is None or start.ndim == 1 else start
         self._status = UNKNOWN if start is None else TRACKING
-        self._trial: _Trial | None = None
+        self._trial_m: float | None = None  # since where on the path a place is under trial
         self._denials = 0
         self._supports: deque[float] = deque(maxlen=self._settings.support_scans)
         self._before: FloatArray | None = None
-        self._lost_m, self._look_ns = 0.0, 0
-        self._near: tuple[FloatArray, FloatArray] | None = None
-        self._listener = listener
+        self._near = NearLook(self._walls)
         self._time_ns = 0
         self.digs = False  # what is seen is known to differ from the map then: a place is not given up for that
-        self.start: Start | None = None  # which of several it was
+        self.start: BestStart | None = None  # which of several it was
         self._travelled_m = 0.0
         self._probability = 0.0 if start is None else 1.0
         self._information = 0.0
@@ -159,7 +119,7 @@ class Localizer:
         self.first_fix: tuple[float, float] | None = None  # seconds, metres
         self._began_ns: int | None = None
         self._stamp_ns = 0
-        self.rows: list[Row] = []
+        self.rows: list[LocalizationRow] = []
         self.reasons: list[tuple[int, str]] = []  # when a place was given up, and why
         self.newest: tuple[int, FloatArray] | None = (
             None  # stamp and hits (N, 3) in `map` of the newest scan with a place
@@ -221,7 +181,7 @@ class Localizer:
 
     def _tracks(self, pose: FloatArray, std: FloatArray, height_m: float) -> Tracks:
         """Return what tracks by the method of the settings from a pose (3,) with these deviations (3,)."""
-        tracker = Tracker(self._walls, self._settings, pose, np.diag(std**2), height_m)
+        tracker = MapTracker(self._walls, self._settings, pose, np.diag(std**2), height_m)
         return tracker if self._paper is None else PaperTracker(self._paper, self._placer, tracker)
 
     def take(self, stamp_ns: int, step: OdometryStep, odometry: PlanarOdometry) -> None:
@@ -230,18 +190,18 @@ class Localizer:
         self._stamp_ns = stamp_ns
         self._began_ns = stamp_ns if self._began_ns is None else self._began_ns
         if self._before is not None:
-            moved = se2.between(self._before, step.T_odom_base)
+            moved = se2.between(self._before, step.pose_odom_base)
             self._travelled_m += math.hypot(moved[0], moved[1])
             if self._tracker is not None:
-                self._tracker.predict(moved, *self._carried(step))
+                self._tracker.predict(moved, *self._odometry.motion(step, self._time_ns))
         self._time_ns = step.time_ns
-        self._before = step.T_odom_base.copy()
+        self._before = step.pose_odom_base.copy()
         predicted = self._belief()
         source, points = "", np.zeros((0, 2))
         if step.processed:
-            points, front = self._hits(step, odometry)
+            points, front = self._odometry.hits(step, odometry, well_held=self._information > _HELD)
             told, told_front = self._of_the_map(points, front)
-            self._finder.add(step.T_odom_base, told)
+            self._finder.add(step.pose_odom_base, told)
             source = self._correct(told, told_front) if len(told) > _LEAST_LEFT * len(points) else "odometry"
             self._judge()
             self._look_near(stamp_ns, told)
@@ -252,7 +212,7 @@ class Localizer:
             self._row(stamp_ns, step, source, 1e3 * (time.perf_counter() - began - self._finder.waited_s + waited_s))
         )
         if self._lag is not None:
-            said = Step(len(self.rows) - 1, step.T_odom_base, step.error.covariance, odometry.gyro.turn_rad)
+            said = LagStep(len(self.rows) - 1, step.pose_odom_base, step.error.covariance, odometry.gyro.turn_rad)
             self._smooth(self._lag, said, predicted)
         self._set_against_the_map(stamp_ns, points)  # the place has not waited for it
         if self._listener is not None:
@@ -261,7 +221,7 @@ class Localizer:
     def _belief(self) -> Belief | None:
         return None if self._tracker is None else Belief(self._tracker.pose.copy(), self._tracker.P.copy())
 
-    def _smooth(self, lag: FixedLag, step: Step, predicted: Belief | None) -> None:
+    def _smooth(self, lag: FixedLag, step: LagStep, predicted: Belief | None) -> None:
         """Hand a scan to the smoother; rewrite the rows that are final."""
         believed = self._belief()
         if believed is None or predicted is None or self._status != TRACKING:
@@ -288,36 +248,6 @@ class Localizer:
             return points, front
         kept = ~self.world.stands_in(self._tracker.pose, self._tracker.height_m, points)
         return points[kept], int(kept[:front].sum())
-
-    def _carried(self, step: OdometryStep) -> tuple[FloatArray, Wheels]:
-        """Return the covariance (3, 3) of the odometry's step, and the wheels' motion over it.
-
-        Where a scan could not be placed the step is the wheels' own, or a guess, and as sure as these are.
-        """
-        covariance = step.error.covariance if step.processed else np.zeros((3, 3))
-        dt_s = (step.time_ns - self._time_ns) * 1e-9
-        motion = self.pipeline.wheels.motion_between(self._time_ns, step.time_ns)
-        if step.lost:
-            covariance = covariance + (np.diag((_GUESSED * dt_s) ** 2) if motion is None else motion.covariance)
-        if motion is None:
-            return covariance, Wheels(dt_s, math.nan, math.nan)
-        forward_m = math.copysign(math.hypot(motion.delta[0], motion.delta[1]), motion.delta[0])
-        turn_rad = math.nan if motion.source == "tachometer" else float(motion.delta[2])
-        return covariance, Wheels(dt_s, forward_m, turn_rad)
-
-    def _hits(self, step: OdometryStep, odometry: PlanarOdometry) -> tuple[FloatArray, int]:
-        """Return hits (N, 2) of both scanners near the machine, thinned, and how many are the front one's."""
-        parts, rear = [], odometry.points_behind
-        if not len(rear) or not len(
-            odometry.points
-        ):  # where nothing tilts, or the front one is blind, it has no use for it
-            view = self.pipeline.front_end.behind_at(step.time_ns)
-            rear = rear if view is None else behind(view, step.velocity, 0.0, self._floor_m, self._settings.hits).points
-        most = self._settings.hits * (1 if self._information > _HELD else 2)  # smooth walls tell a little with each hit
-        for points in (odometry.points, rear):
-            near = points[np.hypot(points[:, 0], points[:, 1]) < self._settings.range_m, :2]
-            parts.append(near[:: max(-(-2 * len(near) // most), 1)])
-        return np.concatenate(parts), len(parts[0])
 
     def _correct(self, points: FloatArray, front: int) -> str:
         tracker = self._tracker
@@ -347,27 +277,14 @@ class Localizer:
             self._drop(f"the map's walls agree with {mean:.0%} of the hits, {wanted:.0%} were wanted")
 
     def _look_near(self, stamp_ns: int, points: FloatArray) -> None:
-        """Take a lost place up again near where the odometry has carried it, where two looks in a row say the same."""
+        """Take a lost place up again near where the odometry has carried it."""
         tracker = self._tracker
-        if self._status != LOST or tracker is None or len(points) < _LEAST_HITS or stamp_ns < self._look_ns:
+        if self._status != LOST or tracker is None:
             return
-        if self._travelled_m - self._lost_m > _NEAR_M:
-            return
-        self._look_ns = stamp_ns + _LOOK_NS
-        found = best_start(self._walls, poses_along(tracker.pose, tracker.height_m), points)
-        before, self._near = self._near, None
-        if found.support < max(self._wanted_support(), found.rival + _CLEARLY):
-            return
-        self._near = tracker.pose.copy(), found.pose
-        if before is None:
-            return
-        off = se2.between(se2.compose(before[1], se2.between(before[0], tracker.pose)), found.pose)
-        if math.hypot(off[0], off[1]) > _SAME_M:
-            return
-        std = np.array([0.15, 0.15, math.radians(1.0)])
-        self._tracker = self._tracks(found.pose.copy(), std, tracker.height_m)
-        self._status, self._near = TRACKING, None
-        self._supports.clear()
+        found = self._near.look(stamp_ns, self._travelled_m, tracker, points, self._wanted_support)
+        if found is not None:
+            self._tracker, self._status = self._tracks(found, _FOUND_NEAR_STD, tracker.height_m), TRACKING
+            self._supports.clear()
 
     def _wanted_support(self) -> float:
         """Return the share of hits that must agree with the walls where the machine is."""
@@ -383,30 +300,30 @@ class Localizer:
         self._denials = 0
         self._probability = 0.0
         self._finder.again()
-        if self._trial is not None:
+        if self._trial_m is not None:
             self.withheld += 1
-            self._trial, self._tracker = None, None
+            self._trial_m, self._tracker = None, None
             self._status = UNKNOWN if self.first_fix is None else LOST
             return
         self.lost_stretches += 1
-        self._lost_m, self._near, self._look_ns = self._travelled_m, None, self._stamp_ns + _LOOK_NS
+        self._near.lost(self._stamp_ns, self._travelled_m)
         self._status = LOST
         self._finder.forget()
 
     def _look_around(self, stamp_ns: int, step: OdometryStep) -> None:
         """Take over what a search has said, and begin the next one that is due."""
-        said = self._finder.answer(stamp_ns, step.T_odom_base)
+        said = self._finder.answer(stamp_ns, step.pose_odom_base)
         if said is not None and said.purpose == self._purpose:
             self._take_over(said)
-        if self._trial is not None and self._travelled_m - self._trial.since_m < self._settings.confirm_m:
+        if self._trial_m is not None and self._travelled_m - self._trial_m < self._settings.confirm_m:
             return
         tracker = None if self._purpose == FIND else self._tracker
         claimed = None if tracker is None else np.append(tracker.pose, tracker.height_m)
         came = None
         if self._status == TRACKING and tracker is not None:
-            T_map_odom = se2.compose(tracker.pose, se2.inverse(step.T_odom_base))
-            came = partial(self.world.stands_in, T_map_odom, tracker.height_m)
-        self._finder.ask(self._purpose, stamp_ns, self._travelled_m, step.T_odom_base, claimed, came)
+            pose_map_odom = se2.compose(tracker.pose, se2.inverse(step.pose_odom_base))
+            came = partial(self.world.stands_in, pose_map_odom, tracker.height_m)
+        self._finder.ask(self._purpose, stamp_ns, self._travelled_m, step.pose_odom_base, claimed, came)
 
     @property
     def _purpose(self) -> str:
@@ -421,7 +338,7 @@ class Localizer:
         elif said.purpose == FIND:
             self.withheld += bool(said.candidates)
         elif said.purpose == CONFIRM and said.confirms:
-            self._status, self._trial = TRACKING, None
+            self._status, self._trial_m = TRACKING, None
         elif said.purpose == CONFIRM or (self._denied_again(said) and not self.digs):
             self._drop(said.denied or said.refused or "a search finds another place")
 
@@ -434,17 +351,16 @@ class Localizer:
         self._denials = self._denials + 1 if said.denied and tells else 0
         return self._denials >= _DENIALS
 
-    def _try(self, found: Candidate) -> None:
-        std = np.array([0.1, 0.1, math.radians(1.0)])
+    def _try(self, found: PlaceCandidate) -> None:
         height = self._placer.height_m(found.pose[0], found.pose[1], found.height_m)
         if self._tracker is not None:
             self.world.found(self._travelled_m, self._tracker.pose, found.pose)
-        self._tracker = self._tracks(found.pose, std, height)
-        self._trial = _Trial(self._travelled_m)
+        self._tracker = self._tracks(found.pose, _SEARCHED_STD, height)
+        self._trial_m = self._travelled_m
         self._status, self._probability = CANDIDATE, found.probability
         self._supports.clear()
 
-    def _row(self, stamp_ns: int, step: OdometryStep, source: str, latency_ms: float) -> Row:
+    def _row(self, stamp_ns: int, step: OdometryStep, source: str, latency_ms: float) -> LocalizationRow:
         row = NOWHERE._replace(
             stamp_ns=stamp_ns, status=self._status, probability=self._probability, source=source, latency_ms=latency_ms
         )
@@ -452,20 +368,4 @@ class Localizer:
         if tracker is None:
             return row
         place = self._placer.at(tracker.pose, tracker.height_m, float(step.velocity[0]))
-        along, across, heading = tracker.deviations.tolist()
-        return row._replace(
-            node=place.node,
-            rho_m=place.rho_m,
-            lateral_m=place.lateral_m,
-            heading_rad=place.heading_rad,
-            x_m=float(tracker.pose[0]),
-            y_m=float(tracker.pose[1]),
-            z_m=tracker.height_m,
-            yaw_rad=math.remainder(float(tracker.pose[2]), 2.0 * math.pi),
-            std_along_m=along,
-            std_across_m=across,
-            std_heading_rad=heading,
-            information_along=self._information,
-            next_point=place.next_point,
-            next_point_m=place.next_m,
-        )
+        return row_of(row._replace(information_along=self._information), place, tracker)

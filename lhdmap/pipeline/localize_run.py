@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -15,31 +15,37 @@ from lhdmap.errors import InputError
 from lhdmap.geometry import se3
 from lhdmap.localization.changes import Change
 from lhdmap.localization.episodes import episodes
-from lhdmap.localization.rows import TRACKING, Row, columns
+from lhdmap.localization.rows import TRACKING, LocalizationRow, columns
 from lhdmap.logs.source import LogSource
 from lhdmap.machine import Machine
-from lhdmap.messages import FloatArray
+from lhdmap.messages import FloatArray, Message
 from lhdmap.outputs import free_folder
-from lhdmap.pipeline.build import Progress
-from lhdmap.pipeline.localize import KnownMap, Localizer
+from lhdmap.pipeline.build import Progress, renamed
+from lhdmap.pipeline.inputs import ROLES_READ
+from lhdmap.pipeline.known_map import KnownMap
+from lhdmap.pipeline.localize import Localizer, LocalizerOptions
 from lhdmap.pipeline.mounts import machine_of
-from lhdmap.pipeline.outcome import ROLES_READ
+from lhdmap.pipeline.stream import Stream
+from lhdmap.provenance import source_entry
+from lhdmap.report.live_recording import add_pose_now
 from lhdmap.report.localization_data import LocalizationData
 from lhdmap.report.localization_page import write_localization_report
 from lhdmap.report.localization_recording import record_localization
-from lhdmap.report.recording import RecordingWriter
+from lhdmap.report.recording import RecordingWriter, Thinning
 from lhdmap.runfolder import RunFolderWriter, RunInfo
 from lhdmap.topology.model import TopologicalMap
 from lhdmap.trajectory import Trajectory, write_tum
 
 KIND = "localization"
+_NOW_S = 0.2  # between the poses that those who follow a running machine are shown
 
 
 @dataclass(frozen=True, slots=True)
 class LocalizeRequest:
     """What is asked for: logs, map folder, the folder to make, settings, about where the drive starts (4,: x, y, yaw, z).
 
-    `smoother`: rows are those of the fixed-lag smoother.
+    `smoother`: rows are those of the fixed-lag smoother. `stream`: the log is still being written. `recorded_as`: names of logs
+    in `run.json`, where they are moved later.
     """
 
     logs: Sequence[Path]
@@ -52,6 +58,8 @@ class LocalizeRequest:
     progress: Progress | None = None
     force: bool = False
     smoother: bool = False
+    stream: Stream | None = None
+    recorded_as: Mapping[Path, Path] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,7 +68,7 @@ class LocalizeResult:
 
     folder: Path
     summary: dict[str, Any]
-    rows: list[Row]
+    rows: list[LocalizationRow]
 
 
 def localize(request: LocalizeRequest) -> LocalizeResult:
@@ -73,15 +81,18 @@ def localize(request: LocalizeRequest) -> LocalizeResult:
     inputs = [request.map, *request.logs]
     free_folder(request.target, force=request.force, inputs=inputs)
     known = KnownMap.read(request.map)
+    growing, port = (None, None) if request.stream is None else (request.stream.opened, request.stream.live_port)
     with (
         RunFolderWriter(KIND, request.target, force=request.force, inputs=inputs) as folder,
-        LogSource(list(request.logs), request.topics, force=request.force) as source,
+        LogSource(list(request.logs), request.topics, force=request.force, growing=growing) as source,
     ):
         machine = machine_of(source, request.machine)
         drawn = folder.path / "recording.rrd"
-        with RecordingWriter(drawn, request.target.name, source.start_ns or 0, request.settings.recording) as recording:
+        with RecordingWriter(
+            drawn, request.target.name, source.start_ns or 0, request.settings.recording, live_port=port
+        ) as recording:
             localizer = _localized(request, known, source, machine, recording)
-            told = [*source.warnings, *source.damage, *localizer.pipeline.warnings]
+            told = renamed([*source.warnings, *source.damage, *localizer.pipeline.warnings], request.recorded_as)
             if not localizer.rows:
                 raise InputError(f"{request.logs[0]}: no usable scan in it; lhdmap doctor tells what is wrong")
             summary = summary_of(localizer)
@@ -113,7 +124,9 @@ def localize(request: LocalizeRequest) -> LocalizeResult:
             **settings_table(request.settings),
             "request": {"map": str(request.map.resolve()), "smoother": request.smoother},
         }
-        path = folder.complete(RunInfo(request.logs, options, summary, told))
+        moved = request.recorded_as
+        hashes = {log: source_entry(log) | {"path": str(moved[log])} for log in request.logs if log in moved}
+        path = folder.complete(RunInfo(request.logs, options, summary, told), hashes)
     return LocalizeResult(path, summary | {"warnings": told}, localizer.rows)
 
 
@@ -121,12 +134,23 @@ def _localized(
     request: LocalizeRequest, known: KnownMap, source: LogSource, machine: Machine | None, recording: RecordingWriter
 ) -> Localizer:
     """Send the log through a localizer; scans that have a place are recorded."""
-    with Localizer(known, request.settings, machine, request.start, smoother=request.smoother) as localizer:
-        messages = source.messages([role for role in ROLES_READ if role in source.roles])
-        for role, message in request.progress(messages, source.duration_s) if request.progress else messages:
+    options = LocalizerOptions(smoother=request.smoother)
+    with Localizer(known, request.settings, machine, request.start, options) as localizer:
+        messages: Iterable[tuple[str, Message]] = source.messages([role for role in ROLES_READ if role in source.roles])
+        if request.progress is not None:
+            messages = request.progress(messages, source.duration_s)
+        if request.stream is not None:
+            messages = request.stream.through(source, messages, localizer)
+        now = Thinning(_NOW_S) if request.stream is not None and request.stream.live_port is not None else None
+        for role, message in messages:
             localizer.update(role, message)
             if localizer.newest is not None:
                 recording.add_scan(*localizer.newest)
+                if now is not None and localizer.fix is not None and now.take(localizer.newest[0], "now"):
+                    x, y, heading = localizer.fix.pose_map
+                    add_pose_now(
+                        recording, localizer.newest[0], np.array([x, y, localizer.fix.height_m, 0, 0, heading])
+                    )
         localizer.finish()
     return localizer
 
@@ -147,7 +171,7 @@ def summary_of(localizer: Localizer) -> dict[str, Any]:
     }
 
 
-def trajectory_of(rows: Sequence[Row]) -> Trajectory:
+def trajectory_of(rows: Sequence[LocalizationRow]) -> Trajectory:
     """Return the poses of the rows that track."""
     kept = [row for row in rows if row.status == TRACKING and math.isfinite(row.x_m)]
     stamps = np.array([row.stamp_ns for row in kept], dtype=np.int64)
@@ -160,7 +184,8 @@ def changes_table(changes: Sequence[Change], topology: TopologicalMap, request: 
     """Return what is not as in the map as JSON values, and the command that takes it over."""
     names = {node.id: node.name for node in topology.nodes.values()}
     listed = [{"name": names.get(one.node, ""), **_rounded(one._asdict())} for one in changes]
-    command = " ".join(["lhdmap update-map", str(request.map), *map(str, request.logs)]) if changes else None
+    logs = [str(request.recorded_as.get(log, log)) for log in request.logs]
+    command = " ".join(["lhdmap update-map", str(request.map), *logs]) if changes else None
     return {"changes": listed, "update": command}
 
 

@@ -19,9 +19,10 @@ import numpy as np
 from lhdmap.config import Settings
 from lhdmap.machine import Machine
 from lhdmap.messages import FloatArray, LaserScan, Message, PointCloud, Text, WheelPose
-from lhdmap.odometry.cloud_odometry import CloudOdometry, CloudStep
+from lhdmap.odometry.anchored.rear_view import behind
+from lhdmap.odometry.cloud.odometry import CloudOdometry
+from lhdmap.odometry.cloud.steps import CloudStep
 from lhdmap.odometry.planar import PlanarOdometry
-from lhdmap.odometry.rear_view import behind
 from lhdmap.odometry.start import starting_velocity
 from lhdmap.odometry.steps import OdometryStep
 from lhdmap.pipeline.front_end import FrontEnd
@@ -194,14 +195,14 @@ class MappingPipeline:
 
     def _take(self, scan: LaserScan, time_ns: int, step: OdometryStep, odometry: PlanarOdometry) -> None:
         """Hand a processed scan on to all that live by its pose."""
-        self.track.append(time_ns, step.T_odom_base, *self.front_end.attitude_at(time_ns))
+        self.track.append(time_ns, step.pose_odom_base, *self.front_end.attitude_at(time_ns))
         if self.front_end.gyro.there:
             self.turns.append(time_ns, self.front_end.gyro.turned_at(np.array([time_ns]))[0])
         believed = odometry.wheels.use.used
         self._newest = Newest(step.covariance, step.velocity, odometry.wheels.scale if believed else None)
-        self.smoother.keys.update(time_ns, step.T_odom_base, odometry.points, step.error, unseen=step.unseen)
+        self.smoother.keys.update(time_ns, step.pose_odom_base, odometry.points, step.error, unseen=step.unseen)
         self._view(scan, time_ns, step, odometry)
-        aligned = AlignedScan(time_ns, step.T_odom_base, odometry.points, odometry.points_behind, weak=step.lost)
+        aligned = AlignedScan(time_ns, step.pose_odom_base, odometry.points, odometry.points_behind, weak=step.lost)
         self.path.update(aligned)
         self._record(scan.stamp_ns, time_ns, step)
         self._look_for_pile(scan, time_ns, step)
@@ -210,7 +211,7 @@ class MappingPipeline:
     def _view(self, scan: LaserScan, time_ns: int, step: OdometryStep, odometry: PlanarOdometry) -> None:
         """Keep what both scanners saw, where the views want it."""
         height_m = self.track.height_m
-        if not self._cloud or not self.views.wants(step.T_odom_base, height_m):
+        if not self._cloud or not self.views.wants(step.pose_odom_base, height_m):
             return
         front = odometry.points - [0.0, 0.0, height_m]
         fans = [(self.front_end.placement(scan, time_ns)[:2, 3], front)]
@@ -242,7 +243,7 @@ class MappingPipeline:
 
     def _look_for_pile(self, scan: LaserScan, time_ns: int, step: OdometryStep) -> None:
         if self.pile is not None and self.has_inclinometer:
-            x, y, heading = step.T_odom_base
+            x, y, heading = step.pose_odom_base
             pose, placement = np.array([x, y, self.track.height_m, heading]), self.front_end.placement(scan, time_ns)
             self.pile.update(PlacedScan(scan, placement, step.velocity, self.front_end.boxes, pose))
 

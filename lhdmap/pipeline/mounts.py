@@ -13,7 +13,7 @@ from lhdmap.messages import FloatArray, Joints, Mount
 _BY_ROLE = {"front": "lidar_front", "rear": "lidar_rear", "inclinometer": "inclinometer", "points": "lidar_points"}
 
 
-class Mounts:
+class SensorMounts:
     """Mounts by sensor frame, found out once per frame; what had to be assumed is said in `warnings`."""
 
     def __init__(self, machine: Machine | None) -> None:

@@ -19,7 +19,7 @@ from lhdmap.logs.source import LogSource
 from lhdmap.machine import Machine
 from lhdmap.messages import LaserScan, Mount
 from lhdmap.pipeline.build import Progress
-from lhdmap.pipeline.mounts import Mounts, machine_of
+from lhdmap.pipeline.mounts import SensorMounts, machine_of
 
 _SCANNERS = ("front", "rear")
 _WITHOUT = {
@@ -110,7 +110,7 @@ def _walls(
     wanted = [role for role in _SCANNERS if role in source.roles]
     if machine is None or not wanted or not len(signals.speed_mps.time_s) or not len(signals.articulation_rad.time_s):
         return [], [] if machine else ["no LHD by its topics: walls are not known (--machine FILE tells what it is)"]
-    gauge, mounts = WallGauge(WheelPath(signals, machine), machine, signals.start_ns), Mounts(machine)
+    gauge, mounts = WallGauge(WheelPath(signals, machine), machine, signals.start_ns), SensorMounts(machine)
     messages: Iterable[Any] = source.messages(["tf_static", *wanted])
     for role, message in progress(messages, source.duration_s) if progress else messages:
         if isinstance(message, Mount):

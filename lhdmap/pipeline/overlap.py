@@ -18,7 +18,7 @@ from lhdmap.localization.recent_way import RecentWay
 from lhdmap.localization.search import FIND, GlobalSearch, Question
 from lhdmap.localization.walls import MapWalls
 from lhdmap.messages import FloatArray
-from lhdmap.pipeline.localize import KnownMap
+from lhdmap.pipeline.known_map import KnownMap
 from lhdmap.topology.views import View
 from lhdmap.update import fit
 

@@ -9,7 +9,7 @@ import numpy as np
 from lhdmap.messages import FloatArray
 from lhdmap.pile.moved import moved_report
 from lhdmap.pile.result import PileReport
-from lhdmap.pipeline.track import Rows, Track
+from lhdmap.pipeline.track import Track, TrackRows
 from lhdmap.smoothing.moves import Moves
 from lhdmap.smoothing.realign import AlignedScan, Realigner
 from lhdmap.smoothing.settings import SmoothingSettings
@@ -57,7 +57,7 @@ class FinalPath:
         rows = self.track.rows_after(self._used, until_ns)
         if len(moves) and len(rows.times_ns):
             recent = Correction(*moves.since(max(self._moves - 1, 0)), 0)
-            self.final.extend(Rows(rows.times_ns, corrected(rows.poses, rows.times_ns, recent)))
+            self.final.extend(TrackRows(rows.times_ns, corrected(rows.poses, rows.times_ns, recent)))
         self._used, self._moves = self._used + len(rows.times_ns), len(moves)
 
 

@@ -10,8 +10,8 @@ import numba as nb
 
 from lhdmap.config import Settings
 from lhdmap.messages import FloatArray, LaserScan
-from lhdmap.pile.face import Registration
-from lhdmap.pile.figure9_stage import Figure9Stage
+from lhdmap.pile.face import FaceRegistration
+from lhdmap.pile.figure9.stage import Figure9Stage
 from lhdmap.pile.result import PileReport
 from lhdmap.pile.stage import PileStage, ScanHits
 from lhdmap.scan_matching.scan_points import planar_points
@@ -60,7 +60,7 @@ class PileSink(Protocol):
 class PileWatch:
     """The stage of `pile.method` on placed scans; `registration`: how far poses may be wrong, if not as set."""
 
-    def __init__(self, settings: Settings, registration: Registration | None = None) -> None:
+    def __init__(self, settings: Settings, registration: FaceRegistration | None = None) -> None:
         self._method = settings.pile.method
         self._stage = _stage(settings, registration)
 
@@ -87,7 +87,7 @@ def _place(points, pose):  # type: ignore[no-untyped-def]
         points[i, 2] += pose[2]
 
 
-def _stage(settings: Settings, registration: Registration | None) -> PileStage | Figure9Stage | None:
+def _stage(settings: Settings, registration: FaceRegistration | None) -> PileStage | Figure9Stage | None:
     match settings.pile.method:
         case "off":
             return None

@@ -11,8 +11,8 @@ from lhdmap.geometry import se3
 from lhdmap.kinematics import T_base_rear
 from lhdmap.machine import Machine
 from lhdmap.messages import LaserScan
-from lhdmap.odometry.rear_view import RearView
-from lhdmap.pipeline.mounts import Mounts
+from lhdmap.odometry.anchored.rear_view import RearView
+from lhdmap.pipeline.mounts import SensorMounts
 from lhdmap.proprioception.wheels import WheelOdometry
 from lhdmap.scan_matching.scan_points import half_sweep_ns
 
@@ -26,7 +26,7 @@ _AVERAGED_NS = np.arange(-4, 5) * 20_000_000
 class RearScans:
     """Keeps the newest rear scans; `near` gives the one of a moment."""
 
-    def __init__(self, mounts: Mounts, wheels: WheelOdometry, machine: Machine) -> None:
+    def __init__(self, mounts: SensorMounts, wheels: WheelOdometry, machine: Machine) -> None:
         self._mounts, self._wheels, self._machine = mounts, wheels, machine
         self._scans: deque[tuple[int, LaserScan]] = deque(maxlen=_KEPT)
 

@@ -95,6 +95,11 @@ class ScanRecords:
         return bool(self._lost) and bool(self._lost[-1])
 
     @property
+    def weak_now(self) -> bool:
+        """Whether the last processed scan left a direction unobserved."""
+        return bool(self._degenerate) and bool(self._degenerate[-1])
+
+    @property
     def all_lost(self) -> bool:
         """Whether none of the scans after the first could be placed."""
         return len(self._lost) > 1 and all(self._lost[1:])

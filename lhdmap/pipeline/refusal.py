@@ -8,12 +8,12 @@ import numpy as np
 
 from lhdmap.errors import InputError
 from lhdmap.pipeline.records import ScanRecords
-from lhdmap.pipeline.track import Rows
+from lhdmap.pipeline.track import TrackRows
 
 _KEY_SCANS_S, _MOSTLY = 0.5, 0.5
 
 
-def require_a_map(path: Path, records: ScanRecords, rows: Rows) -> None:
+def require_a_map(path: Path, records: ScanRecords, rows: TrackRows) -> None:
     """Refuse a run of the odometry that led nowhere; `rows`: its final poses.
 
     Raises:
@@ -35,7 +35,7 @@ def key_scans_remark(records: ScanRecords) -> list[str]:
     return [f"{text}; build the map at given poses (--poses FILE.tum)"]
 
 
-def _no_map(records: ScanRecords, rows: Rows) -> str:
+def _no_map(records: ScanRecords, rows: TrackRows) -> str:
     stamps = records.stamps_ns
     if len(stamps) < 2:
         return "one scan only: no drive, no map"

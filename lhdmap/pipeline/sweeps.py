@@ -13,11 +13,11 @@ import numpy as np
 from lhdmap.config import Settings
 from lhdmap.integration.batch import BatchPoses, size_of
 from lhdmap.integration.beams import sweep_stamps_ns
-from lhdmap.integration.cloud import Cloud
+from lhdmap.integration.cloud import GridCloud
 from lhdmap.integration.integrator import Integrator
 from lhdmap.machine import Machine
 from lhdmap.messages import FloatArray, LaserScan, PointCloud
-from lhdmap.pipeline.mounts import Mounts
+from lhdmap.pipeline.mounts import SensorMounts
 from lhdmap.pipeline.track import FinalTrack, Track
 from lhdmap.proprioception.wheels import WheelOdometry
 
@@ -44,7 +44,7 @@ class SweepIntegration:
         self,
         settings: Settings,
         machine: Machine | None,
-        mounts: Mounts,
+        mounts: SensorMounts,
         on_sweep: ScanSink | None,
         worker: Executor | None = None,
     ) -> None:
@@ -133,7 +133,7 @@ class SweepIntegration:
             )
         return told
 
-    def cloud(self) -> Cloud:
+    def cloud(self) -> GridCloud:
         """Return the cloud with normals and curvature; after `finish`."""
         return self.integrator.cloud()
 

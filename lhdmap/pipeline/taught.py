@@ -13,13 +13,13 @@ import numpy as np
 import numpy.typing as npt
 
 from lhdmap.errors import unmark_kept
-from lhdmap.integration.cloud import Cloud
+from lhdmap.integration.cloud import GridCloud
 from lhdmap.integration.cloud_io import read_cloud
 from lhdmap.interrupts import before_interrupt
 from lhdmap.mapfolder import MapFolder
 from lhdmap.messages import FloatArray
 from lhdmap.pipeline.topology import each_step
-from lhdmap.pipeline.track import Rows
+from lhdmap.pipeline.track import TrackRows
 from lhdmap.pipeline.update_files import later
 from lhdmap.topology.files import read_topology
 from lhdmap.topology.model import TopologicalMap
@@ -41,7 +41,7 @@ class TaughtMap:
     views: list[View]
     sheets: list[Sheet]
     topology: TopologicalMap
-    cloud: Cloud
+    cloud: GridCloud
     later_ns: int = 0
 
     @classmethod
@@ -80,7 +80,7 @@ class TaughtMap:
 
 def path_of(trajectory: Trajectory) -> tuple[FloatArray, npt.NDArray[np.int64]]:
     """Return a trajectory each quarter metre: poses (M, 4: x, y, z, heading) and times (M,)."""
-    rows = Rows(trajectory.stamps_ns, merge.poses_of(trajectory))
+    rows = TrackRows(trajectory.stamps_ns, merge.poses_of(trajectory))
     chosen = each_step(rows)
     return rows.poses[chosen][:, merge.PLANAR_AND_HEIGHT], rows.times_ns[chosen]
 

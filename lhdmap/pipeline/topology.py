@@ -9,14 +9,14 @@ import numpy as np
 import numpy.typing as npt
 
 from lhdmap.pipeline.mapping import MappingPipeline
-from lhdmap.pipeline.track import Rows, resample
+from lhdmap.pipeline.track import TrackRows, resample
 from lhdmap.topology.build import Seen, Topology
 
 _STEP_M = 0.25
 _PLANAR_AND_HEIGHT = [0, 1, 2, 5]  # of a pose: x, y, z, heading
 
 
-def seen_of(pipeline: MappingPipeline, rows: Rows) -> Seen:
+def seen_of(pipeline: MappingPipeline, rows: TrackRows) -> Seen:
     """Return what a run saw along its final path `rows`; views beyond its ends are left out (given poses may be fewer)."""
     views = [view for view in pipeline.views if rows.times_ns[0] <= view.time_ns <= rows.times_ns[-1]]
     times = np.array([view.time_ns for view in views], dtype=np.int64)
@@ -45,7 +45,7 @@ def counts_of(topology: Topology) -> dict[str, Any]:
     }
 
 
-def each_step(rows: Rows) -> npt.NDArray[np.int64]:
+def each_step(rows: TrackRows) -> npt.NDArray[np.int64]:
     """Return the rows each quarter metre of a path, the first and the last among them."""
     steps = np.linalg.norm(np.diff(rows.poses[:, :2], axis=0), axis=1)
     travelled = np.concatenate([[0.0], np.cumsum(steps)])

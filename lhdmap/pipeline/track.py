@@ -21,7 +21,7 @@ _POSE = 6  # numbers of a pose
 _MOST_CARRIED = 3.0  # a growing track's last step goes on for up to two of its lengths
 
 
-class Rows(NamedTuple):
+class TrackRows(NamedTuple):
     """Poses as columns: `times_ns` (N,) rising, `poses` (N, 6): x, y, z (m), roll, pitch, heading (rad, unwrapped)."""
 
     times_ns: Stamps
@@ -57,15 +57,15 @@ class Track:
         """The newest pose: x, y, z (m), roll, pitch, heading (rad)."""
         return tuple(self._poses[-_POSE:])
 
-    def append(self, time_ns: int, T_odom_base: FloatArray, roll_rad: float, pitch_rad: float) -> None:
+    def append(self, time_ns: int, pose_odom_base: FloatArray, roll_rad: float, pitch_rad: float) -> None:
         """Add a planar pose (3,) with its attitude; `time_ns` must rise."""
-        pose = self.ahead(T_odom_base, roll_rad, pitch_rad)
+        pose = self.ahead(pose_odom_base, roll_rad, pitch_rad)
         self._times.append(time_ns)
         self._poses.extend(pose)
 
-    def ahead(self, T_odom_base: FloatArray, roll_rad: float, pitch_rad: float) -> tuple[float, ...]:
+    def ahead(self, pose_odom_base: FloatArray, roll_rad: float, pitch_rad: float) -> tuple[float, ...]:
         """Return the pose (x, y, z, roll, pitch, heading) that a planar pose (3,) with its attitude would add."""
-        x, y, heading = (float(value) for value in T_odom_base)
+        x, y, heading = (float(value) for value in pose_odom_base)
         z = 0.0
         if self._poses:
             x0, y0, z, roll0, pitch0, heading0 = self.newest
@@ -79,12 +79,12 @@ class Track:
             z -= self._lever_m * (math.tan(pitch_rad) - math.tan(pitch0))
         return x, y, z, roll_rad, pitch_rad, heading
 
-    def extend(self, rows: Rows) -> None:
+    def extend(self, rows: TrackRows) -> None:
         """Add rows that are complete, height included; their times must rise."""
         self._times.extend(rows.times_ns.tolist())
         self._poses.extend(rows.poses.ravel().tolist())
 
-    def rows_after(self, first: int, until_ns: int) -> Rows:
+    def rows_after(self, first: int, until_ns: int) -> TrackRows:
         """Return the poses from row `first` on that are not later than a time."""
         return self._between(first, bisect_right(self._times, until_ns))
 
@@ -102,20 +102,20 @@ class Track:
         first = max(bisect_left(self._times, int(times_ns.min(initial=self._times[-1]))) - 1, 0)
         return _matrices(*self._between(first, len(self)), times_ns, _MOST_CARRIED)
 
-    def rows(self) -> Rows:
+    def rows(self) -> TrackRows:
         """Return all poses as columns."""
         return self._between(0, len(self))
 
-    def _between(self, first: int, last: int) -> Rows:
+    def _between(self, first: int, last: int) -> TrackRows:
         """Return the rows [first, last), copied: while an array is looked at, it cannot grow."""
         times = np.array(self._times[first:last], dtype=np.int64)
-        return Rows(times, np.array(self._poses[_POSE * first : _POSE * last], dtype=float).reshape(-1, _POSE))
+        return TrackRows(times, np.array(self._poses[_POSE * first : _POSE * last], dtype=float).reshape(-1, _POSE))
 
 
 class FinalTrack:
     """A finished path: any pose by time."""
 
-    def __init__(self, rows: Rows) -> None:
+    def __init__(self, rows: TrackRows) -> None:
         self._rows = rows
 
     def covers(self, time_ns: int) -> bool:
@@ -155,7 +155,7 @@ def _write_pose(row: FloatArray, out: FloatArray) -> None:
     out[3, 3] = 1.0
 
 
-def resample(rows: Rows, times_ns: Stamps) -> Rows:
+def resample(rows: TrackRows, times_ns: Stamps) -> TrackRows:
     """Return poses at other times, shape (M,): linear between the rows.
 
     For a moment beyond them (half a sweep) the motion goes on, then the pose is held.
@@ -169,10 +169,10 @@ def resample(rows: Rows, times_ns: Stamps) -> Rows:
             slope = (rows.poses[edge] - rows.poses[inner]) / (x[edge] - x[inner])
             beyond = np.clip(at[outside] - x[edge], -_CARRY_ON_NS, _CARRY_ON_NS)
             poses[outside] = rows.poses[edge] + beyond[:, None] * slope
-    return Rows(times_ns, poses)
+    return TrackRows(times_ns, poses)
 
 
-def trajectory_of(rows: Rows, stamps_ns: Stamps) -> Trajectory:
+def trajectory_of(rows: TrackRows, stamps_ns: Stamps) -> Trajectory:
     """Return the rows as a trajectory that carries the scans' own stamps (N,)."""
     quaternions = se3.quaternions_from_rpy(rows.poses[:, 3], rows.poses[:, 4], rows.poses[:, 5])
     return Trajectory(stamps_ns, rows.poses[:, :3].copy(), quaternions)

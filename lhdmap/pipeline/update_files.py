@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from lhdmap.config import Settings, settings_toml
-from lhdmap.integration.cloud import Cloud
+from lhdmap.integration.cloud import GridCloud
 from lhdmap.integration.cloud_io import write_cloud
 from lhdmap.landmarks.model import Landmarks
 from lhdmap.landmarks.store import write_landmarks
@@ -51,7 +51,7 @@ class Made(NamedTuple):
     topology: TopologicalMap
     sheets: Sequence[Sheet]
     landmarks: Landmarks
-    cloud: Cloud
+    cloud: GridCloud
     difference: dict[str, Any]
     walls: list[Walls]
     counts: dict[str, Any]

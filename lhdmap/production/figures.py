@@ -87,6 +87,31 @@ class Production:
         productive = self.stack.class_s(Usage.PRODUCTIVE)
         return len(own) * float(np.mean(own)) / productive if own and productive > 0.0 else math.nan
 
+    @property
+    def machines(self) -> tuple[str, ...]:
+        """The machines, in the order of their first cycles."""
+        return tuple(dict.fromkeys(one.machine for one in self.cycles))
+
+    def by_machine(self) -> list[dict[str, Any]]:
+        """Return for each machine buckets, tonnes, mean cycle, way, and the time that it waited for others; unknown is None."""
+        rows = []
+        for name in self.machines:
+            own = [one for one in self.cycles if one.machine == name]
+            done = [one for one in own if one.finished]
+            cycle_s, way_m = _mean([one.seconds() for one in done]), sum(one.distance_m for one in own)
+            waits = (Phase.TRAFFIC, Phase.QUEUE_LOAD, Phase.QUEUE_DUMP)
+            rows.append(
+                {
+                    "machine": name,
+                    "cycles": len(done),
+                    "tonnes": float(np.nansum([one.mass_t for one in done])) if done else 0.0,
+                    "cycle_mean_s": cycle_s if math.isfinite(cycle_s) else None,
+                    "waits_s": sum(one.seconds(*waits) for one in own),
+                    "distance_m": way_m if math.isfinite(way_m) else None,
+                }
+            )
+        return rows
+
     def values(self) -> dict[str, Any]:
         """Return the figures as JSON values; what is not known is None."""
         finished = self.finished
@@ -119,6 +144,7 @@ class Production:
         stops = [one._asdict() for one in self.stops]
         return {
             **known, "time_by_phase_s": self.time_by_phase_s, "usage_s": classes, "levels_s": levels, "stops": stops,
+            "machines": self.by_machine(),
         }  # fmt: skip
 
 

@@ -2,7 +2,9 @@
 
 Names, order, types and what must be there follow OPC UA for Mining, Part 1: IREDES (OPC 40568-1, v1.0.0): Tables 64 and 66
 (LTPPwaitProc), 67 (LTPPTimeRep), 70 and 72 (LTPPMission), 73 and 75 (LTPPaccPts), 76 (LTPPLoadRep), enumerations of 6.7 to 6.9.
-The specification types waiting times as DateTime though they are durations; they are written as durations (PT12.5S).
+The tables and the enumerations were compared with reference.opcfoundation.org, what is mandatory in a trip with the published
+node set (types 1018, 1019, 1025, 1028). What is optional there and not known here (IDs of tags, operator, area, observations) is
+not written. The specification types waiting times as DateTime though they are durations; they are written as durations (PT12.5S).
 """
 
 from __future__ import annotations
@@ -52,9 +54,9 @@ _MISSION = (
     Field("LTPPMaction", ACTIONS),
     Field("LTPPMwaitgen", "duration", required=False),
     Field("LTPPMtimeAct", "duration", required=False),
-    Field("LTPPMpayld", 2, required=False),
-    Field("LTPPMtramEnd", "time", required=False),
-    Field("LTPPMtramDist", 4, required=False),
+    Field("LTPPMpayld", 2),
+    Field("LTPPMtramEnd", "time"),
+    Field("LTPPMtramDist", 4),
 )
 LOAD_REPORT = Field(
     "LTPPLoadRep",

@@ -1,7 +1,8 @@
 """Records of cycles from a run folder's `journal.jsonl`, and what a mission writes into it.
 
 The process `mission` notes each phase as a state (`values`: `place`, `odometer_m`) and each bucket as an event `cycle` (`values`:
-the columns of a cycle). A run without a mission has what navigation notes (drives, rests, help, lost
+the columns of a cycle). Of several machines the first one's processes have these names, those of the others begin with their
+machine and a slash (`lhd2/mission`). A run without a mission has what navigation notes (drives, rests, help, lost
 places) and the stops of the executor; its ways are not known.
 """
 
@@ -18,6 +19,7 @@ from lhdmap.haulage.records import Cycle, Ledger, Phase
 
 MISSION, NAVIGATION = "mission", "navigation"
 _EXECUTOR, _ASKED_FOR = "executor: state", ("navigation", "queue")
+_ALONE = "lhd"
 _PHASES = {str(phase): phase for phase in Phase}
 _OF_NAVIGATION = {
     "driving": Phase.TRAM, "resting": Phase.TRAM, "backing": Phase.TRAM, "planning": Phase.ROUTE, "halted": Phase.PLACE,
@@ -32,15 +34,39 @@ def cycle_values(cycle: Cycle) -> dict[str, Any]:
 
 
 def cycles_of_journal(path: Path) -> list[Cycle]:
-    """Return the cycles of a run; the last one may not be finished.
+    """Return the cycles of a run, one machine after the other; the last one of each may not be finished.
 
     Raises:
         InputError: the file cannot be read, or is no journal.
     """
     events = list(_events(path))
-    if any(one["process"] == MISSION and one["event"] == "state" for one in events):
-        return _cycles(events, _of_mission)
-    return _cycles(events, _Navigated())
+    machines = list(dict.fromkeys(_machine(one) for one in events if _is_mission(one)))
+    if not machines:
+        return _cycles(events, _Navigated())
+    end_ns = events[-1]["t_ns"]
+    return [
+        cycle
+        for machine in machines
+        for cycle in _cycles(_events_of(events, machine), _of_mission, _name(machine, len(machines)), end_ns)
+    ]
+
+
+def _machine(one: Mapping[str, Any]) -> str:
+    """Return the machine that an event is of; empty: the first one."""
+    return str(one["process"]).rpartition("/")[0]
+
+
+def _is_mission(one: Mapping[str, Any]) -> bool:
+    return str(one["process"]).rpartition("/")[2] == MISSION and one["event"] == "state"
+
+
+def _name(machine: str, count: int) -> str:
+    return machine or (_ALONE if count == 1 else f"{_ALONE}1")
+
+
+def _events_of(events: Sequence[Mapping[str, Any]], machine: str) -> list[Mapping[str, Any]]:
+    """Return the events of one machine as they would be if it were the only one."""
+    return [{**one, "process": str(one["process"]).rpartition("/")[2]} for one in events if _machine(one) == machine]
 
 
 def _events(path: Path) -> Iterator[Mapping[str, Any]]:
@@ -99,7 +125,13 @@ class _Navigated:
         return Phase.OBSTACLE if cause.startswith("guard") else Phase.STOPPED, "", cause
 
 
-def _cycles(events: Sequence[Mapping[str, Any]], said: Callable[[Mapping[str, Any]], Said | None]) -> list[Cycle]:
+def _cycles(
+    events: Sequence[Mapping[str, Any]],
+    said: Callable[[Mapping[str, Any]], Said | None],
+    machine: str = _ALONE,
+    end_ns: int | None = None,
+) -> list[Cycle]:
+    """Return the cycles of one machine; `end_ns`: of the run, where that is later than its last event."""
     ledger, cycles, odometer_m = Ledger(), list[Cycle](), math.nan
     now: Said = (Phase.IDLE, "", "")
     for one in events:
@@ -110,10 +142,10 @@ def _cycles(events: Sequence[Mapping[str, Any]], said: Callable[[Mapping[str, An
             now = following or now
             ledger.note(one["t_ns"], *now, odometer_m)
         if ends:
-            cycles.append(_cycle(one["values"], ledger, finished=True))
+            cycles.append(_cycle({"machine": machine, **one["values"]}, ledger, finished=True))
     if events:
-        ledger.note(events[-1]["t_ns"], *now, odometer_m)
-    rest = _cycle({"number": len(cycles) + 1}, ledger, finished=False)
+        ledger.note(events[-1]["t_ns"] if end_ns is None else end_ns, *now, odometer_m)
+    rest = _cycle({"number": len(cycles) + 1, "machine": machine}, ledger, finished=False)
     return [*cycles, rest] if rest.intervals else cycles
 
 
@@ -123,7 +155,7 @@ def _cycle(values: Mapping[str, Any], ledger: Ledger, *, finished: bool) -> Cycl
         return math.nan if value is None else float(value)
 
     return Cycle(
-        str(values.get("machine", "lhd")),
+        str(values.get("machine", _ALONE)),
         int(values.get("number", 0)),
         str(values.get("load", "")),
         str(values.get("dump", "")),

@@ -2,7 +2,7 @@
 
 Angular velocity (p, q, r) of the body, with its mount undone, turns the heading by (q sin(roll) + r cos(roll)) / cos(pitch): the
 third row of the Euler rates (Titterton and Weston, *Strapdown Inertial Navigation Technology*, 3.6). Nothing is taken off here:
-what a gyroscope is wrong by, only the scans can tell (`lhdmap.smoothing.heading`, `lhdmap.odometry.gyro_turn`).
+what a gyroscope is wrong by, only the scans can tell (`lhdmap.smoothing.heading`, `lhdmap.odometry.wheels.gyro`).
 """
 
 from __future__ import annotations

@@ -66,7 +66,7 @@ _STRAIGHT = np.zeros(1, dtype=np.int64), np.zeros(1)  # an articulation of zero 
 RESOLUTION = 1e-3  # of poses in logs, m and rad
 
 
-class Motion(NamedTuple):
+class WheelMotion(NamedTuple):
     """Planar motion of `base_link`: `delta` (x, y, heading) in the frame at its start, `covariance` (3, 3); m, rad."""
 
     delta: FloatArray
@@ -132,7 +132,7 @@ class WheelOdometry:
         angles = self._angles
         return values_at(angles.stamps_ns, angles.rows[:, 0], stamps_ns, self._limits_ns)
 
-    def motion_between(self, start_ns: int, end_ns: int) -> Motion | None:
+    def motion_between(self, start_ns: int, end_ns: int) -> WheelMotion | None:
         """Return the motion between two times, or None where no sensor covers them.
 
         Where `end_ns` is earlier there is none either, but for dead reckoning with poses of just these stamps.
@@ -179,16 +179,16 @@ class WheelOdometry:
         """Return whether samples go from start to end without a long gap (the last one may be held for a while)."""
         return bool(covered(samples.stamps_ns, (start_ns, end_ns), *self._limits_ns))
 
-    def _driven(self, start_ns: int, end_ns: int, source: Source) -> Motion:
+    def _driven(self, start_ns: int, end_ns: int, source: Source) -> WheelMotion:
         speeds, angles = self._speeds, self._angles
         if source == "articulated":
             articulation, errors = (angles.stamps_ns, angles.rows[:, 0]), self._bending
         else:
             articulation, errors = _STRAIGHT, self._straight
         speed = speeds.stamps_ns, speeds.rows[:, 0]
-        return Motion(*drive(speed, articulation, (start_ns, end_ns), self._lengths, 1.0, errors), source)
+        return WheelMotion(*drive(speed, articulation, (start_ns, end_ns), self._lengths, 1.0, errors), source)
 
-    def _reckoned(self, start_ns: int, end_ns: int) -> Motion | None:
+    def _reckoned(self, start_ns: int, end_ns: int) -> WheelMotion | None:
         settings, step = self.settings, self._poses.step_between(start_ns, end_ns)
         if step is None:
             return None
@@ -197,4 +197,4 @@ class WheelOdometry:
         turn = math.hypot(settings.pose_turn_std * delta[2], math.radians(settings.pose_drift_deg) * path_m)
         turn = math.hypot(turn, late_s * step.turn_rps, RESOLUTION)
         along = math.hypot(settings.pose_distance_std * path_m, late_s * step.speed_mps, RESOLUTION)
-        return Motion(delta, motion_covariance(along, along, turn, delta), "wheel_pose")
+        return WheelMotion(delta, motion_covariance(along, along, turn, delta), "wheel_pose")

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
+from types import MappingProxyType
 from typing import NamedTuple
 
 from lhdmap.config import Settings
@@ -16,11 +17,16 @@ from lhdmap.navigation.control import NavigationControl
 from lhdmap.replay.assemble_haulage import haulage_processes, lane_of
 from lhdmap.replay.assemble_loading import guidance_of, loading_processes
 from lhdmap.replay.assemble_mission import mission_processes
+from lhdmap.replay.assemble_station import station_of
+from lhdmap.replay.crew_mission import Job, crew_mission, section_watch
+from lhdmap.replay.crew_parts import FIRST
 from lhdmap.replay.engine import Engine, overrun_targets
 from lhdmap.replay.faults import Faults
 from lhdmap.replay.journal import Journal
+from lhdmap.replay.judges import Judges
 from lhdmap.replay.link import Link
 from lhdmap.replay.load_tally import LoadTally
+from lhdmap.replay.namespace import InNamespace, JournalOf, Scribes
 from lhdmap.replay.parts import Autonomous, Parts
 from lhdmap.replay.process import MACHINE, STATION, Process
 from lhdmap.replay.processes.driver import Driver
@@ -33,7 +39,7 @@ from lhdmap.replay.processes.navigator import NAVIGATION, Navigator
 from lhdmap.replay.processes.perception import PERCEPTION, Perception
 from lhdmap.replay.processes.plant import Plant
 from lhdmap.replay.processes.recorder import Recorder
-from lhdmap.replay.processes.station import Station
+from lhdmap.replay.processes.section_watch import SECTION_WATCH
 from lhdmap.replay.scenario import HAULAGE, TELEOPERATOR, Scenario
 from lhdmap.replay.verdict import Tally
 from lhdmap.settings import nearest
@@ -66,11 +72,15 @@ _REPLAYED = ("tram", "loading", "mission", HAULAGE)
 
 
 class Watchers(NamedTuple):
-    """Who watches a run: the film for the page, the recorder of the log, and others that a caller adds."""
+    """Who watches a run: the film for the page, the recorder of the log, and others that a caller adds.
+
+    `others`: films of the other machines of a crew.
+    """
 
     film: Film
     recorder: Recorder | None = None
     more: Sequence[Process] = ()
+    others: Mapping[str, Film] = MappingProxyType({})
 
 
 class Run(NamedTuple):
@@ -80,6 +90,7 @@ class Run(NamedTuple):
     monitor: Monitor
     faults: Faults
     link: Link
+    judges: Judges
 
 
 def assemble(
@@ -92,17 +103,26 @@ def assemble(
     """
     faults = Faults(scenario.faults, journal, parts.places)
     link = Link(scenario.link, faults, scenario.seed)
-    load = LoadTally(parts.machine.drive.payload_kg) if parts.loading is not None or scenario.mission else None
-    monitor = Monitor(
-        Tally(scenario.kind, scenario.limits, parts.goal_m), journal.of(Monitor.name), load, lane_of(parts)
-    )
+    monitor = _monitor(scenario, parts, journal)
+    monitors, sections = {FIRST: monitor}, None
     processes: list[Process] = [Plant(parts, faults, link, journal.of(Plant.name), scenario.seed)]
     if parts.haulage is not None:
         processes += haulage_processes(scenario, parts, parts.haulage, journal)
     elif parts.loading is not None:
         processes += loading_processes(scenario, parts, parts.loading, journal)
     elif parts.autonomous is not None and scenario.mission:
-        processes += mission_processes(scenario, parts, parts.autonomous, journal)
+        given = crew_mission(scenario, parts.crew) if parts.crew else None
+        job = None if given is None else given.jobs[FIRST]
+        processes += mission_processes(scenario, parts, parts.autonomous, journal, job)
+        if given is not None:
+            sections = section_watch(given, parts.crew, journal.of(SECTION_WATCH))
+            others = {name: own for name, own in parts.crew.items() if name != FIRST}
+            monitors |= {name: _monitor(scenario, own, JournalOf(journal, name)) for name, own in others.items()}
+            for name, own in others.items():
+                made = _other(scenario, own, given.jobs[name], JournalOf(journal, name))
+                made += [monitors[name], *([watchers.others[name]] if name in watchers.others else [])]
+                processes += [InNamespace(one, name) for one in made]
+            processes.append(sections)
     elif parts.autonomous is not None:
         processes += _autonomous(scenario, parts, parts.autonomous, journal)
     elif scenario.perception:
@@ -114,7 +134,20 @@ def assemble(
     processes += [] if watchers.recorder is None else [watchers.recorder]
     _check(scenario, parts, processes)
     engine = Engine(processes, journal, faults=faults, link=link, withhold_truth=withhold_truth)
-    return Run(engine, monitor, faults, link)
+    return Run(engine, monitor, faults, link, Judges(monitors, sections))
+
+
+def _monitor(scenario: Scenario, parts: Parts, journal: Scribes) -> Monitor:
+    load = LoadTally(parts.machine.drive.payload_kg) if parts.loading is not None or scenario.mission else None
+    tally = Tally(scenario.kind, scenario.limits, parts.goal_m)
+    return Monitor(tally, journal.of(Monitor.name), load, lane_of(parts))
+
+
+def _other(scenario: Scenario, parts: Parts, job: Job, journal: JournalOf) -> list[Process]:
+    """Return the processes of another machine of a crew; faults of the scenario are those of the first one."""
+    assert parts.autonomous is not None  # noqa: S101  # a mission drives itself
+    plant = Plant(parts, Faults((), Journal()), None, journal.of(Plant.name), scenario.seed)
+    return [plant, *mission_processes(scenario, parts, parts.autonomous, journal, job)]
 
 
 def _autonomous(scenario: Scenario, parts: Parts, given: Autonomous, journal: Journal) -> list[Process]:
@@ -135,7 +168,7 @@ def _autonomous(scenario: Scenario, parts: Parts, given: Autonomous, journal: Jo
         Navigator(navigation, given.errand, journal.of(NAVIGATION)),
         Guide(guidance, settings.executor.jumps, journal.of(GUIDANCE)),
         Execute(control, machine, given.mode, journal.of(EXECUTOR)),
-        Station(scenario.wanted_modes, scenario.rearm_s, scenario.assist_s, journal.of(Station.name), scenario.assists),
+        station_of(scenario, parts, journal, scenario.assists),
     ]
 
 

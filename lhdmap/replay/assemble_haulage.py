@@ -12,7 +12,8 @@ from lhdmap.replay.processes.executive import EXECUTIVE
 from lhdmap.replay.processes.site_driver import SITE_DRIVER, SiteDriver
 from lhdmap.replay.processes.site_executive import SiteExecutive
 from lhdmap.replay.processes.site_work import SITE_WORK, SiteWork
-from lhdmap.replay.scenario import Scenario
+from lhdmap.replay.processes.station import Station
+from lhdmap.replay.scenario import ModeAt, Scenario
 from lhdmap.replay.site_drive import SiteDrive
 from lhdmap.replay.site_sight import SiteSight
 from lhdmap.tracking.tracker import Tracker
@@ -31,6 +32,9 @@ def haulage_processes(scenario: Scenario, parts: Parts, given: Haulage, journal:
         SiteExecutive(mission, orders, full_t, journal.of(EXECUTIVE)),
         SiteDriver(drive, tracker, SiteSight(given.ground.bodies), top_mps, journal.of(SITE_DRIVER)),
         SiteWork(plan.load_s, plan.dump_s, full_t, journal.of(SITE_WORK)),
+        Station(
+            (ModeAt(),), scenario.rearm_s, scenario.assist_s, journal.of(Station.name), scenario.assists, backs_up=False
+        ),
     ]
 
 

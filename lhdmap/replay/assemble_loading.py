@@ -15,6 +15,7 @@ from lhdmap.loading.shake import Shake
 from lhdmap.loading.task import LoadingTask
 from lhdmap.loading.weighing import Weighing
 from lhdmap.machine import Machine
+from lhdmap.replay.assemble_station import station_of
 from lhdmap.replay.journal import Journal
 from lhdmap.replay.parts import Loading, Parts
 from lhdmap.replay.process import Process
@@ -23,7 +24,6 @@ from lhdmap.replay.processes.guide import GUIDANCE, Guide
 from lhdmap.replay.processes.load import LOADS, Loads
 from lhdmap.replay.processes.perception import PERCEPTION
 from lhdmap.replay.processes.scouting import Scouting
-from lhdmap.replay.processes.station import Station
 from lhdmap.replay.scenario import LoadingPlan, Scenario
 
 
@@ -37,7 +37,7 @@ def loading_processes(scenario: Scenario, parts: Parts, given: Loading, journal:
         Loads(task_of(scenario.loading, settings, machine), given.way, journal.of(LOADS)),
         Guide(guidance_of(machine, model, bodies, settings), settings.executor.jumps, journal.of(GUIDANCE)),
         Execute(control, machine, given.mode, journal.of(EXECUTOR)),
-        Station(scenario.wanted_modes, scenario.rearm_s, scenario.assist_s, journal.of(Station.name)),
+        station_of(scenario, parts, journal),
     ]
 
 

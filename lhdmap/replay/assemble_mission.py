@@ -12,7 +12,10 @@ from lhdmap.haulage.of_map import layout_of_map
 from lhdmap.movement.routes import RoutePlanner
 from lhdmap.navigation.control import NavigationControl
 from lhdmap.replay.assemble_loading import guidance_of, task_of
-from lhdmap.replay.journal import Journal
+from lhdmap.replay.assemble_station import station_of
+from lhdmap.replay.crew_mission import Job
+from lhdmap.replay.journal import Scribe
+from lhdmap.replay.namespace import Scribes
 from lhdmap.replay.parts import Autonomous, Parts
 from lhdmap.replay.process import Process
 from lhdmap.replay.processes.dumps import DUMPS, Dumps
@@ -25,12 +28,17 @@ from lhdmap.replay.processes.navigator import NAVIGATION
 from lhdmap.replay.processes.ordered import OrderedNavigation
 from lhdmap.replay.processes.perception import PERCEPTION
 from lhdmap.replay.processes.scouting import PileAhead
-from lhdmap.replay.processes.station import Station
 from lhdmap.replay.scenario import Scenario
+from lhdmap.topology.model import TopologicalMap
 
 
-def mission_processes(scenario: Scenario, parts: Parts, given: Autonomous, journal: Journal) -> list[Process]:
-    """Return what runs a mission: perception on the map and of piles, executive, navigation, loading, dumping, and what drives."""
+def mission_processes(
+    scenario: Scenario, parts: Parts, given: Autonomous, journal: Scribes, job: Job | None = None
+) -> list[Process]:
+    """Return what runs a mission: perception on the map and of piles, executive, navigation, loading, dumping, and what drives.
+
+    `job`: of a machine among others.
+    """
     machine, settings = parts.machine, parts.settings
     full_kg = machine.drive.payload_kg
     models = drive_model(machine, 0.0), drive_model(machine, full_kg)
@@ -38,18 +46,27 @@ def mission_processes(scenario: Scenario, parts: Parts, given: Autonomous, journ
     navigation = NavigationControl(
         RoutePlanner(topology, settings.movement), models[0], bodies, settings.navigation, journal.of(NAVIGATION).goes
     )
-    orders = [Buckets(one.source, one.to, one.buckets) for one in scenario.mission]
-    layout = checked(layout_of_map(topology, scenario.mine))
-    executive = MissionTask(layout, park=scenario.start if scenario.start in layout.of("park") else "")
     control = Control(models[0], bodies, settings.executor, PERIODS_S)
     guidance = guidance_of(machine, models[0], bodies, settings)
     return [
         Locating(given.known, settings, machine, given.start, journal.of(PERCEPTION), pile=PileAhead(settings)),
-        Executive(executive, orders, topology, 1e-3 * full_kg, journal.of(EXECUTIVE)),
+        _executive(scenario, topology, 1e-3 * full_kg, journal.of(EXECUTIVE), job),
         OrderedNavigation(navigation, journal.of(NAVIGATION)),
         Loads(task_of(scenario.loading, settings, machine), None, journal.of(LOADS)),
         Dumps(journal.of(DUMPS), machine.linkage),
         Guide(guidance, settings.executor.jumps, journal.of(GUIDANCE), models=models),
         Execute(control, machine, given.mode, journal.of(EXECUTOR), models=models),
-        Station(scenario.wanted_modes, scenario.rearm_s, scenario.assist_s, journal.of(Station.name), scenario.assists),
+        station_of(scenario, parts, journal, scenario.assists),
     ]
+
+
+def _executive(
+    scenario: Scenario, topology: TopologicalMap, full_t: float, scribe: Scribe, job: Job | None
+) -> Executive:
+    if job is not None:
+        task = job.task
+        return Executive(task, job.orders, topology, full_t, scribe, free=lambda: task.free)
+    layout = checked(layout_of_map(topology, scenario.mine))
+    alone = MissionTask(layout, park=scenario.start if scenario.start in layout.of("park") else "")
+    orders = [Buckets(one.source, one.to, one.buckets) for one in scenario.mission]
+    return Executive(alone, orders, topology, full_t, scribe)

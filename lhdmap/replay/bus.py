@@ -6,6 +6,7 @@ from collections import deque
 from collections.abc import Iterator, Sequence
 
 from lhdmap.replay.link import Link
+from lhdmap.replay.namespace import role_of
 from lhdmap.replay.process import EVERYTHING, TRUTH, Process, Received
 
 SEES_TRUTH = ("plant", "operator", "monitor", "recorder", "film")
@@ -58,7 +59,7 @@ class Bus:
         self._parted: dict[tuple[str, str, bool], tuple[list[tuple[Inbox, bool]], list[Inbox]]] = {}
         for process in processes:
             secret = [topic for topic in process.reads if topic.startswith(TRUTH)]
-            if secret and process.name not in SEES_TRUTH:
+            if secret and role_of(process.name) not in SEES_TRUTH:
                 raise ValueError(f"process '{process.name}' may not see {secret[0]}: only {', '.join(SEES_TRUTH)}")
 
     def deliveries(self, sender: Process, topic: str, sent_ns: int) -> Iterator[tuple[int, list[Inbox]]]:
@@ -104,6 +105,6 @@ def _parted(here: str, route: list[Inbox], *, at_fault: bool) -> tuple[list[tupl
 
 
 def _gets(process: Process, topic: str) -> bool:
-    if topic.startswith(TRUTH) and process.name not in SEES_TRUTH:
+    if topic.startswith(TRUTH) and role_of(process.name) not in SEES_TRUTH:
         return False
     return topic in process.reads or EVERYTHING in process.reads

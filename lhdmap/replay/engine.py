@@ -10,6 +10,7 @@ from lhdmap.replay.bus import Bus, Inbox
 from lhdmap.replay.faults import Faults
 from lhdmap.replay.journal import Journal
 from lhdmap.replay.link import Link
+from lhdmap.replay.namespace import role_of
 from lhdmap.replay.process import ENGINE, Outgoing, Process, Received
 from lhdmap.simulation.history import SECOND_NS, START_NS
 
@@ -136,4 +137,4 @@ class Engine:
 
 def overrun_targets(processes: Sequence[Process]) -> list[str]:
     """Return the processes that can be made to overrun: all but the simulator and the witnesses."""
-    return [process.name for process in processes if process.site and process.name not in (ENGINE, "plant")]
+    return [process.name for process in processes if process.site and role_of(process.name) not in (ENGINE, "plant")]

@@ -22,8 +22,10 @@ THINGS = ("obstacle", "person")
 class Fault:
     """A fault of a run: when it holds, and what followed it."""
 
-    def __init__(self, number: int, settings: FaultSettings, place_m: Position | None) -> None:
-        self.number, self.settings, self.place_m = number, settings, place_m
+    def __init__(
+        self, number: int, settings: FaultSettings, place_m: Position | None, *, scripted: bool = True
+    ) -> None:
+        self.number, self.settings, self.place_m, self.scripted = number, settings, place_m, scripted
         self.from_ns = START_NS + round(settings.at_s * SECOND_NS)
         self.began_ns: int | None = None
         self.ended_ns: int | None = None
@@ -33,6 +35,11 @@ class Fault:
     def waits_for_place(self) -> bool:
         """Whether it begins where the machine comes to a place; a thing stands there, whether it comes or not."""
         return self.place_m is not None and self.settings.kind not in THINGS
+
+    @property
+    def known_time(self) -> bool:
+        """Whether its time is known from the start on: its sensor has it in itself then."""
+        return self.scripted and not self.waits_for_place
 
     @property
     def until_ns(self) -> int:
@@ -83,6 +90,17 @@ class Faults:
         for fault in [one for one in self._waiting if one.from_ns <= now_ns and not one.waits_for_place]:
             self._begin(fault, now_ns)
         self.next_ns = self._next()
+
+    def inject(self, settings: FaultSettings, now_ns: int) -> Fault:
+        """Begin a fault that no scenario has, at this moment."""
+        if not self.all:
+            self._journal.listeners.append(self._follow)
+        fault = Fault(len(self.all) + 1, settings, None, scripted=False)
+        self.all.append(fault)
+        self._waiting.append(fault)
+        self._begin(fault, now_ns)
+        self.next_ns = self._next()
+        return fault
 
     def reached(self, position_m: Position, now_ns: int) -> None:
         """Begin what waits for the place that the machine is at."""

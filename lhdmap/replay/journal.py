@@ -56,6 +56,10 @@ class Journal:
         for listener in self.listeners:
             listener(one)
 
+    def listen(self, listener: Listener) -> None:
+        """Tell a listener of each event from now on."""
+        self.listeners.append(listener)
+
     def of(self, process: str) -> Scribe:
         """Return what a process writes with."""
         return Scribe(self, process)

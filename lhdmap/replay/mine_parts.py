@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -80,7 +81,7 @@ def mine_parts(scenario: Scenario, folder: Path, settings: Settings) -> Parts:
     vehicle = _vehicle(scenario, machine, world)
     places = places_of(network, machine)
     way_m = sum(leg.length_m for leg in legs)
-    return Parts(
+    parts = Parts(
         machine=machine,
         world=world,
         vehicle=vehicle,
@@ -97,6 +98,12 @@ def mine_parts(scenario: Scenario, folder: Path, settings: Settings) -> Parts:
         settings=settings,
         autonomous=autonomous,
     )
+    if scenario.machines == 1:
+        return parts
+    from lhdmap.replay.crew_parts import crew_of  # it needs what is here
+
+    crew = crew_of(parts, scenario, network, world)
+    return replace(next(iter(crew.values())), crew=crew)
 
 
 def _buckets_s(scenario: Scenario) -> float:

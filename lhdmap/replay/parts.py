@@ -8,10 +8,11 @@ from dataclasses import dataclass, field
 from typing import Any, NamedTuple, Protocol
 
 from lhdmap.config import Settings
+from lhdmap.console.attendant import Attendant
 from lhdmap.guidance.directive import Directive
 from lhdmap.machine import Machine
 from lhdmap.messages import Command, FloatArray
-from lhdmap.pipeline.localize import KnownMap
+from lhdmap.pipeline.known_map import KnownMap
 from lhdmap.replay.faults import Position
 from lhdmap.replay.processes.navigator import Errand
 from lhdmap.replay.processes.told import ModeNow
@@ -155,6 +156,10 @@ class Parts:
         loading: what a machine that loads is given; None: it does not.
         autonomous: what a machine that drives itself is given; None: nobody does, or the operator.
         haulage: what a machine on a surface site is given; None: it is in a mine.
+        attendant: who attends the machine, at a console or a terminal; None: the script does.
+        park: of a machine of a crew: where it stands at first, and goes when nothing is left.
+        T_mine_map: where the map's frame began in the mine's grid (4,: x, y, z, yaw), for those who judge by the truth.
+        crew: the parts of all machines by name, this one first; empty: there is one.
     """
 
     machine: Machine
@@ -174,3 +179,7 @@ class Parts:
     loading: Loading | None = None
     autonomous: Autonomous | None = None
     haulage: Haulage | None = None
+    attendant: Attendant | None = None
+    crew: Mapping[str, Parts] = field(default_factory=dict)
+    park: str = ""
+    T_mine_map: FloatArray | None = None

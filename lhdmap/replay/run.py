@@ -5,18 +5,23 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import ExitStack
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
 from lhdmap import __version__
 from lhdmap.config import Settings
+from lhdmap.console.attendant import Attendant
 from lhdmap.logs.writer import LogWriter
 from lhdmap.pipeline.interruption import Interruption
 from lhdmap.replay.assemble import Run, Watchers, assemble, parts_of
-from lhdmap.replay.journal import Journal
+from lhdmap.replay.assemble_station import check_attended
+from lhdmap.replay.crew_parts import FIRST
+from lhdmap.replay.journal import Event, Journal, Listener
 from lhdmap.replay.mission_tally import MissionTally
+from lhdmap.replay.namespace import machine_of, only, role_of
 from lhdmap.replay.parts import Parts
+from lhdmap.replay.processes.executive import EXECUTIVE
 from lhdmap.replay.processes.film import Film
 from lhdmap.replay.processes.film_drive import DriveFilm
 from lhdmap.replay.processes.film_load import LoadFilm
@@ -45,7 +50,8 @@ class ReplayRequest:
 
     `truth`: the true pose in the log; `recording`: a Rerun recording; `live_port`: where it can be followed meanwhile;
     `sources`: files that the run is made from; `settings`: of perception
-    and control; `progress` shows the simulated times that it is given with their end (s).
+    and control; `progress` shows the simulated times that it is given with their end (s); `attendant`: who attends the machine
+    instead of the scripted station.
     """
 
     scenario: Scenario
@@ -58,6 +64,7 @@ class ReplayRequest:
     sources: Sequence[Path] = ()
     progress: Progress | None = None
     settings: Settings | None = None
+    attendant: Attendant | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,6 +83,8 @@ def replay(request: ReplayRequest, parts: Parts | None = None) -> ReplayResult:
         ConfigError: a fault of the scenario has no target here.
         KeyboardInterrupt: Ctrl-C was pressed; what was finished is kept in the partial folder.
     """
+    if request.attendant is not None:
+        check_attended(request.scenario)
     if request.scenario.kind == GRIZZLY:
         from lhdmap.replay.grizzly_folder import replay_grizzly  # it needs what is here
 
@@ -83,6 +92,7 @@ def replay(request: ReplayRequest, parts: Parts | None = None) -> ReplayResult:
     interruption = Interruption()
     with RunFolderWriter(KIND, request.target, force=request.force, inputs=request.sources) as folder:
         made = parts_of(request.scenario, folder.path, request.settings) if parts is None else parts
+        made = replace(made, attendant=request.attendant or made.attendant)
         with interruption.comes_first():
             verdict = _Replay(request, made, folder).run(interruption)
         path = folder.complete(run_info(request, verdict))
@@ -96,28 +106,30 @@ class _Replay:
         self._request, self._parts, self._folder = request, parts, folder
         self._timeline, self._stops = Timeline(), Stops()
         self._recording: ReplayRecording | None = None
+        self._others: dict[str, Film] = {}
 
     def run(self, interruption: Interruption) -> dict[str, Any]:
         """Run, write all files, return the verdict."""
         journal = Journal(self._folder.path / JOURNAL)
-        journal.listeners += [self._timeline, self._stops]
+        journal.listeners += [_shown_of(self._timeline), only("", self._stops)]
         with ExitStack() as open_files:
             open_files.callback(journal.close)
             log = open_files.enter_context(LogWriter(self._folder.path / LOG))
             film = self._film(journal)
-            run = assemble(
-                self._request.scenario, self._parts, journal, Watchers(film, Recorder(log, truth=self._request.truth))
-            )
-            missions = MissionTally() if self._request.scenario.kind in ("mission", HAULAGE) else None
-            journal.listeners += [] if missions is None else [missions]
+            spaces = [_space(name) for name in self._parts.crew] or [""]
+            recorder = Recorder(log, truth=self._request.truth, machines=spaces)
+            self._others = {name: Film(own.machine) for name, own in self._parts.crew.items() if _space(name)}
+            run = assemble(self._request.scenario, self._parts, journal, Watchers(film, recorder, others=self._others))
+            told = self._request.scenario.kind in ("mission", HAULAGE)
+            missions = {name: MissionTally() for name in (self._parts.crew or (FIRST,)) if told}
+            journal.listeners += [only(_space(name), one) for name, one in missions.items()]
             started = time.monotonic()
             with interruption:
                 self._go(run, journal, interruption)
             simulated_s = (run.engine.now_ns - START_NS) / SECOND_NS
             factor = simulated_s / max(time.monotonic() - started, 1e-6)
         faults = [fault.told() for fault in run.faults.all]
-        verdict = run.monitor.tally.verdict(run.engine.now_ns, faults, factor, journal.sha256) | run.monitor.verdict()
-        verdict |= {} if missions is None else missions.verdict(run.engine.now_ns)
+        verdict = run.judges.verdict(run.engine.now_ns, faults, factor, journal.sha256, missions)
         self._write(verdict, film)
         return verdict
 
@@ -142,15 +154,14 @@ class _Replay:
         settings = {"kind": scenario.kind, "mine": Path(scenario.mine or scenario.site).stem, "seed": scenario.seed}
         journal.write("engine", "started", values=settings)
         for _ in self._shown(run.engine.run(START_NS + round((scenario.limits.time_s + _GRACE_S) * SECOND_NS))):
-            if run.monitor.ended or interruption.asked:
+            if run.judges.ended or interruption.asked:
                 break
         if interruption.asked:
-            run.monitor.tally.interrupt()
+            run.judges.interrupt()
         run.engine.finish()
-        tally = run.monitor.tally
         missed = {name: count for name, count in run.engine.missed().items() if count}
-        values = {"ok": tally.ok, "messages": run.engine.messages, "lost": run.link.lost, "missed": missed}
-        journal.write("engine", "ended", cause=tally.reason, values=values)
+        values = {"ok": run.judges.ok, "messages": run.engine.messages, "lost": run.link.lost, "missed": missed}
+        journal.write("engine", "ended", cause=run.judges.reason, values=values)
 
     def _shown(self, moments: Iterator[int]) -> Iterable[int]:
         request = self._request
@@ -191,7 +202,23 @@ class _Replay:
             f"Replay {self._request.name}", verdict, rows, START_NS, self._timeline.changes,
             self._parts.lines_m, film.believed_m(), self._parts.goal_m, made, scenario_toml(scenario),
             warnings if left_out else (), drive, self._stops.rows(), None if film.load is None else film.load.data(),
+            {name: one.series.rows() for name, one in self._others.items()},
         )  # fmt: skip
+
+
+def _shown_of(timeline: Timeline) -> Listener:
+    """Return a listener that is told of the first machine's events, and of the missions of the others."""
+
+    def listen(event: Event) -> None:
+        if not machine_of(event.process) or role_of(event.process) == EXECUTIVE:
+            timeline(event)
+
+    return listen
+
+
+def _space(name: str) -> str:
+    """Return the namespace of a machine: the first one has the contract's topics."""
+    return "" if name == FIRST else name
 
 
 def run_info(request: ReplayRequest, verdict: dict[str, Any]) -> RunInfo:

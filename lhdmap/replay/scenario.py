@@ -24,6 +24,7 @@ KINDS = ("tram", "loading", "mission", HAULAGE, GRIZZLY)
 AUTONOMOUS, OPERATOR, TELEOPERATOR = "autonomous", "operator", "teleoperator"
 MODES = ("idle", "autonomous", "assisted", "teleoperated", "manual")
 FOLDER = "pipelines/scenarios"
+MOST_MACHINES = 3
 _NO_MEASUREMENTS = ("/tf_static", "/ground_truth/odometry")
 
 
@@ -34,6 +35,7 @@ class Errand:
     source: str = setting(REQUIRED, key="from", doc="Draw point.")
     to: str = setting(REQUIRED, doc="Dump.")
     buckets: int = setting(1, minimum=1, maximum=10_000, doc="How many.")
+    machine: int = setting(1, minimum=1, maximum=MOST_MACHINES, doc="Which of several machines hauls them.")
 
 
 @dataclass(frozen=True, slots=True)
@@ -135,6 +137,12 @@ class Scenario:
     wander_m: float = setting(0.0, unit="m", minimum=0.0, maximum=1.0, doc="The operator's lateral wandering, rms.")
     perception: bool = setting(True, doc="Whether odometry runs on what the sensors say.")
     mission: tuple[Errand, ...] = part(tuple)
+    machines: int = setting(
+        1,
+        minimum=1,
+        maximum=MOST_MACHINES,
+        doc="Machines in the mine, each with a place to park; one without errands has those of the first. Only of kind mission.",
+    )
     rocks: int = setting(
         0, minimum=0, maximum=100, doc="Rocks on the grizzly that do not fall through, besides the pile's."
     )
@@ -167,6 +175,8 @@ class Scenario:
         if self.kind not in (GRIZZLY, HAULAGE) and not self.mine:
             raise ConfigError("mine is missing: the name of a plan that ships or a file was wanted")
         _check_grizzly(self)
+        if self.machines > 1 and self.kind != "mission":
+            raise ConfigError(f"machines = {self.machines} and kind = '{self.kind}': several have a mission")
         if self.goal and self.mission:
             raise ConfigError(f"goal = '{self.goal}' and mission: one of them was wanted")
         if self.driver == AUTONOMOUS and not self.goal:

@@ -50,13 +50,17 @@ class SiteDrive:
         self.at, self.goal, self.state, self.reason = at, "", IDLE, ""
         self.edges: tuple[int, ...] = ()
         self.docks = False
-        self._dock = -1
+        self._dock, self._at_backup = -1, False
         self._legs: LegRun | None = None
 
     def begin(self, goal: str, *, loaded: bool) -> None:
         """Begin a drive to a point."""
         self._tracker.model = self._ground.models[loaded]
+        again = self.state == ASSISTANCE and goal == self.goal
         self.goal, self.state, self.reason = goal, DRIVING, ""
+        if again and self.edges:
+            self._again()
+            return
         self._legs, self.docks = None, False
         layout = self._ground.layout
         back = next((k for k in layout.entering[self.at] if layout.edges[k].start == goal), None)
@@ -68,6 +72,18 @@ class SiteDrive:
                 self._lay(to_queue, pose_at_end(layout, to_queue), gear=1)
             else:
                 self._follow(layout.route(self.at, goal))
+        except InputError as error:
+            self.state, self.reason = ASSISTANCE, str(error)
+
+    def _again(self) -> None:
+        """Go on with the drive after help: with its dock where it had come to it, else along the edges that it was on."""
+        try:
+            if self._dock >= 0 and self._at_backup:
+                self._lay(self._dock, pose_at_end(self._ground.layout, self._dock), gear=-1)
+            else:
+                self._legs = None
+                way = way_of(self._ground.layout, self.edges)
+                self._tracker.follow(way.points_m, way.speeds_mps)
         except InputError as error:
             self.state, self.reason = ASSISTANCE, str(error)
 
@@ -107,12 +123,13 @@ class SiteDrive:
             raise InputError(f"no way leads from {self.at} to {self.goal}")
         way = way_of(self._ground.layout, edges)
         self._tracker.follow(way.points_m, way.speeds_mps)
-        self.edges, self._dock = tuple(edges), way.dock
+        self.edges, self._dock, self._at_backup = tuple(edges), way.dock, False
 
     def _arrived(self) -> None:
         """Go on with the dock at the end of a way, or say how the drive ended."""
         layout = self._ground.layout
         if self._dock >= 0 and not self.docks:  # the way up to the backup point
+            self._at_backup = True
             try:
                 self._lay(self._dock, pose_at_end(layout, self._dock), gear=-1)
             except InputError as error:

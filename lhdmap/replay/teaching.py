@@ -13,7 +13,7 @@ from lhdmap.machine import Machine
 from lhdmap.messages import FloatArray
 from lhdmap.mine.network import Network
 from lhdmap.pipeline.build import BuildRequest, build_map
-from lhdmap.pipeline.localize import KnownMap
+from lhdmap.pipeline.known_map import KnownMap
 from lhdmap.replay.parts import Autonomous
 from lhdmap.replay.processes.navigator import Errand
 from lhdmap.replay.processes.told import ModeNow
@@ -68,6 +68,11 @@ def _start(topology: TopologicalMap, name: str) -> tuple[str, FloatArray]:
     if isinstance(found, (Waypoint, AccessPoint)):
         return "", np.concatenate([found.pose[None, [0, 1, 3, 2]], poses_about(topology, found)])
     return "", poses_in(topology, found.id)
+
+
+def start_on(topology: TopologicalMap, name: str) -> FloatArray:
+    """Return poses (4,) or (N, 4) on the map that a machine at a place begins with."""
+    return _start(topology, name)[1]
 
 
 def _known(topology: TopologicalMap, name: str, key: str) -> object:

@@ -43,6 +43,7 @@ class Tally:
         self._has_moved = False
         self._done_ns: int | None = None
         self._aborted = ""
+        self.company: Sequence[Tally] = (self,)
 
     def at(self, state: State) -> None:
         """Take a true state."""
@@ -113,12 +114,22 @@ class Tally:
             self._end(self._aborted)
         elif self._done_ns is not None:
             self._judge_end(now_ns, self._done_ns)
-        elif self._anchor is not None and now_ns - self._anchor[0] > limits.no_progress_s * SECOND_NS:
+        elif self._anchor is not None and now_ns - self._went_on_ns > limits.no_progress_s * SECOND_NS:
             x, y, z = self._anchor[1]
             within = f"within {figure(limits.no_progress_m)} m of ({x:.1f}, {y:.1f}, {z:.1f}) m"
             self._end(f"no progress: {figure(limits.no_progress_s)} s {within}")
         elif now_ns - START_NS >= limits.time_s * SECOND_NS:
             self._end(self._late())
+
+    @property
+    def moved_ns(self) -> int:
+        """When this machine moved on."""
+        return 0 if self._anchor is None else self._anchor[0]
+
+    @property
+    def _went_on_ns(self) -> int:
+        """When this machine moved on, or another one that it may have waited for."""
+        return max((one.moved_ns for one in self.company if not one.ended), default=0)
 
     def _late(self) -> str:
         if self._state is None:

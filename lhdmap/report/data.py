@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from lhdmap.evaluation.trajectory import TrajectoryEvaluation
-from lhdmap.integration.cloud import Cloud
+from lhdmap.integration.cloud import GridCloud
 from lhdmap.landmarks.model import Landmarks
 from lhdmap.landmarks.settings import LandmarkSettings
 from lhdmap.mapfolder import Diagnostics
@@ -118,7 +118,7 @@ class ReportData:
     trajectory: Trajectory
     odometry: Trajectory | None = None
     evaluation: TrajectoryEvaluation | None = None
-    cloud: Cloud | None = None
+    cloud: GridCloud | None = None
     diagnostics: Diagnostics | None = None
     odometry_speed: SpeedSeries | None = None
     tachometer_speed: SpeedSeries | None = None

@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from lhdmap.report.recording import RecordingWriter
+from lhdmap.report.recording_end import rerun
 from lhdmap.report.rockbreaker_recording import add_arm, bar_lines
 from lhdmap.rockbreaker.machine import Rockbreaker
 from lhdmap.rockbreaker.story import Look, Story
@@ -24,8 +25,7 @@ _BLOW_S = 1.0
 
 def write_grizzly_recording(path: Path, title: str, machine: Rockbreaker, story: Story) -> None:
     """Write a `.rrd` file of a run that moved at least once."""
-    import rerun as rr
-
+    rr = rerun()
     rows = story.table()
     rows[:, 0] += story.began_s
     with RecordingWriter(path, title, 0) as writer:
@@ -58,8 +58,7 @@ def write_grizzly_recording(path: Path, title: str, machine: Rockbreaker, story:
 
 def _add_look(writer: RecordingWriter, look: Look) -> None:
     """Add rocks and cloud as they were seen at a time."""
-    import rerun as rr
-
+    rr = rerun()
     at_ns, rocks = round(1e9 * look.at_s), look.scene.rocks
     large = {tuple(np.round(one.top_m[:2], 1)) for one in look.oversize}
     colours = [_LARGE if tuple(np.round(one.top_m[:2], 1)) in large else _SMALL for one in rocks]

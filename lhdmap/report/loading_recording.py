@@ -11,6 +11,7 @@ from lhdmap.machine import Machine
 from lhdmap.messages import FloatArray
 from lhdmap.report.loading_data import LoadData
 from lhdmap.report.recording import RecordingWriter
+from lhdmap.report.recording_end import rerun
 
 _BLUE, _ORANGE, _GREEN, _RED = 0x2F86C9FF, 0xE69F00FF, 0x009E73FF, 0xD55E00FF
 _CURVES = (
@@ -27,8 +28,7 @@ _BUCKET_STEP_S, _BUCKET_RAD = 0.2, 0.005
 
 def add_load(writer: RecordingWriter, load: LoadData, machine: Machine, start_ns: int) -> None:
     """Add curves, the bucket where it moves, and each pile that was seen at the time of it."""
-    import rerun as rr
-
+    rr = rerun()
     if not len(load.rows):
         return
     stamps_ns = start_ns + np.round(1e9 * load.column("time_s")).astype(np.int64)
@@ -46,8 +46,7 @@ def add_load(writer: RecordingWriter, load: LoadData, machine: Machine, start_ns
 
 
 def _add_bucket(writer: RecordingWriter, load: LoadData, machine: Machine, stamps_ns: Any) -> None:
-    import rerun as rr
-
+    rr = rerun()
     before = (math.inf, math.inf)
     half_m = 0.5 * machine.digging.bucket_width_m
     for stamp_ns, row in zip(stamps_ns.tolist(), load.rows[:, [4, 5]].tolist(), strict=True):

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from lhdmap.localization.rows import CANDIDATE, LOST, TRACKING, UNKNOWN, Row
+from lhdmap.localization.rows import CANDIDATE, LOST, TRACKING, UNKNOWN, LocalizationRow
 from lhdmap.messages import FloatArray
 from lhdmap.report import charts
 from lhdmap.report.localization_data import LocalizationData
@@ -22,7 +22,7 @@ _MOST_CANDIDATES = 400
 _SHOWN_FROM = 0.02  # of probability
 
 
-def drawn_map(data: LocalizationData, rows: Sequence[Row]) -> str:
+def drawn_map(data: LocalizationData, rows: Sequence[LocalizationRow]) -> str:
     """Return the map with the way, the places that searches found, and what has changed, as a data URI."""
     lines = [tunnel.line_m for tunnel in data.topology.tunnels]
     figure = charts.new_figure(charts.plan_height_in(np.vstack(lines)) + 0.8 if lines else 5.0)
@@ -61,7 +61,7 @@ def _draw_candidates(axes: Axes, data: LocalizationData) -> None:
         axes.scatter(at[:, 0], at[:, 1], sizes, facecolors="none", edgecolors=charts.ODOMETRY, label="places found")
 
 
-def drawn_sure(rows: Sequence[Row]) -> str:
+def drawn_sure(rows: Sequence[LocalizationRow]) -> str:
     """Return status, deviations and probability over time as a data URI."""
     figure = charts.new_figure(5.4)
     status, sure, likely = figure.subplots(3, 1, sharex=True, gridspec_kw={"height_ratios": [1.0, 2.4, 1.0]})
@@ -83,7 +83,7 @@ def drawn_sure(rows: Sequence[Row]) -> str:
     return charts.svg_uri(figure)
 
 
-def drawn_latency(rows: Sequence[Row]) -> str:
+def drawn_latency(rows: Sequence[LocalizationRow]) -> str:
     """Return what a scan took over time as a data URI."""
     figure = charts.new_figure(2.4)
     axes = figure.add_subplot()
@@ -99,6 +99,6 @@ def drawn_latency(rows: Sequence[Row]) -> str:
     return charts.svg_uri(figure)
 
 
-def _seconds(rows: Sequence[Row]) -> FloatArray:
+def _seconds(rows: Sequence[LocalizationRow]) -> FloatArray:
     began = rows[0].stamp_ns
     return np.array([(row.stamp_ns - began) * 1e-9 for row in rows])

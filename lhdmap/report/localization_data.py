@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 
 from lhdmap.localization.changes import Change
 from lhdmap.localization.episodes import Episode
-from lhdmap.localization.rows import Row
+from lhdmap.localization.rows import LocalizationRow
 from lhdmap.localization.search import Search
 from lhdmap.messages import FloatArray
 from lhdmap.report.data import AngleSeries
@@ -25,7 +25,7 @@ class LocalizationData(NamedTuple):
     topology: TopologicalMap
     sheets: Sequence[Sheet]
     walls: FloatArray
-    rows: Sequence[Row]
+    rows: Sequence[LocalizationRow]
     searches: Sequence[Search]
     changes: Sequence[Change]
     episodes: Sequence[Episode]

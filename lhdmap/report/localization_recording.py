@@ -12,12 +12,13 @@ from collections.abc import Sequence
 import numpy as np
 
 from lhdmap.geometry import se3
-from lhdmap.localization.rows import CANDIDATE, LOST, TRACKING, UNKNOWN, Row
+from lhdmap.localization.rows import CANDIDATE, LOST, TRACKING, UNKNOWN, LocalizationRow
 from lhdmap.localization.search import Search
 from lhdmap.machine import Machine
 from lhdmap.messages import FloatArray
 from lhdmap.report.localization_data import LocalizationData
 from lhdmap.report.recording import PathStyle, RecordingWriter
+from lhdmap.report.recording_end import rerun
 from lhdmap.report.recording_layout import Curves
 from lhdmap.report.topology_recording import add_topology
 from lhdmap.trajectory import Trajectory
@@ -71,8 +72,7 @@ def record_localization(writer: RecordingWriter, data: LocalizationData, machine
 
 
 def _add_map(writer: RecordingWriter, data: LocalizationData) -> None:
-    import rerun as rr
-
+    rr = rerun()
     if len(data.walls):
         walls = data.walls[:: max(len(data.walls) // _MOST_WALLS, 1)] + np.array([0.0, 0.0, 1.0])
         writer.add_shape("map/walls", rr.Points3D(walls, colors=_GREY, radii=rr.Radius.ui_points(1.0)))
@@ -87,7 +87,9 @@ def _add_map(writer: RecordingWriter, data: LocalizationData) -> None:
         writer.explain("red balls", "what is not as in the map")
 
 
-def _add_machine(writer: RecordingWriter, placed: Sequence[Row], data: LocalizationData, machine: Machine) -> None:
+def _add_machine(
+    writer: RecordingWriter, placed: Sequence[LocalizationRow], data: LocalizationData, machine: Machine
+) -> None:
     stamps = np.array([row.stamp_ns for row in placed], dtype=np.int64)
     positions = np.array([[row.x_m, row.y_m, row.z_m] for row in placed])
     zero = np.zeros(len(placed))
@@ -103,10 +105,9 @@ def _add_machine(writer: RecordingWriter, placed: Sequence[Row], data: Localizat
         writer.add_path("tracked", Trajectory(stamps[tracked], positions[tracked], quaternions[tracked]), _PATH)
 
 
-def _add_ellipses(writer: RecordingWriter, placed: Sequence[Row]) -> None:
+def _add_ellipses(writer: RecordingWriter, placed: Sequence[LocalizationRow]) -> None:
     """Record how sure the place is, twice a second."""
-    import rerun as rr
-
+    rr = rerun()
     next_ns = 0
     for row in placed:
         if row.stamp_ns < next_ns or not math.isfinite(row.std_along_m):
@@ -116,7 +117,7 @@ def _add_ellipses(writer: RecordingWriter, placed: Sequence[Row]) -> None:
     writer.explain("pink ellipse", f"{_SIGMAS:.0f} standard deviations of the place")
 
 
-def ellipse(row: Row) -> FloatArray:
+def ellipse(row: LocalizationRow) -> FloatArray:
     """Return the ellipse (N, 3) of a row's deviations in `map`, many times as large so that it is seen."""
     along, across = _SIGMAS * row.std_along_m * np.cos(_CIRCLE), _SIGMAS * row.std_across_m * np.sin(_CIRCLE)
     c, s = math.cos(row.yaw_rad), math.sin(row.yaw_rad)
@@ -126,8 +127,7 @@ def ellipse(row: Row) -> FloatArray:
 
 def _add_candidates(writer: RecordingWriter, searches: Sequence[Search]) -> None:
     """Record the places of each search with their probabilities, until the next one; and why none was believed."""
-    import rerun as rr
-
+    rr = rerun()
     for said in searches:
         if said.candidates:
             at = np.array([[*one.pose[:2], one.height_m + 2.0 * _ABOVE_M] for one in said.candidates])

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from lhdmap.geometry.frame import UprightFrame
 from lhdmap.messages import FloatArray
 from lhdmap.pile.result import STATUSES, PileEstimate, PileReport, Snapshot
 from lhdmap.report import charts
@@ -30,10 +31,9 @@ _ELSEWHERE_M = 5.0
 
 
 class Ahead(NamedTuple):
-    """The pile's own frame: origin in the middle of the toe, x into the pile, y to the left, z up."""
+    """The pile's own frame, origin in the middle of the toe, x into the pile, y to the left, z up; half the pile's width (m)."""
 
-    origin_m: FloatArray
-    heading_rad: float
+    frame: UprightFrame
     half_m: float
 
     @classmethod
@@ -41,17 +41,20 @@ class Ahead(NamedTuple):
         """Return the frame of an estimate that was found."""
         across = pile.left_limit_m - pile.right_limit_m
         heading = math.atan2(-float(across[0]), float(across[1]))
-        frame = cls(0.5 * (pile.left_limit_m + pile.right_limit_m), heading, 0.5 * float(np.hypot(*across[:2])))
-        if not len(pile.toe_m):
-            return frame
-        x, _, z = np.median(frame.local(pile.toe_m), axis=0)  # the limits of Fig. 9 are not at the toe
-        return frame._replace(origin_m=frame.origin_m + np.array([x * math.cos(heading), x * math.sin(heading), z]))
+        frame = UprightFrame(0.5 * (pile.left_limit_m + pile.right_limit_m), heading)
+        if len(pile.toe_m):
+            x, _, z = np.median(frame.local(pile.toe_m), axis=0)  # the limits of Fig. 9 are not at the toe
+            frame = UprightFrame(frame.map(np.array([x, 0.0, z])), heading)
+        return cls(frame, 0.5 * float(np.hypot(*across[:2])))
+
+    @property
+    def heading_rad(self) -> float:
+        """Heading of the x axis in the map, rad."""
+        return self.frame.heading_rad
 
     def local(self, points_m: FloatArray) -> FloatArray:
         """Return points (N, 3) of the map in this frame."""
-        c, s = math.cos(self.heading_rad), math.sin(self.heading_rad)
-        d = np.atleast_2d(points_m) - self.origin_m
-        return np.column_stack([c * d[:, 0] + s * d[:, 1], -s * d[:, 0] + c * d[:, 1], d[:, 2]])
+        return self.frame.local(np.atleast_2d(points_m))
 
 
 def above_chart(report: PileReport, pile: PileEstimate) -> Figure:

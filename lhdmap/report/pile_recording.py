@@ -17,6 +17,7 @@ from lhdmap.messages import FloatArray
 from lhdmap.pile.result import STATUSES, PileEstimate, PileReport
 from lhdmap.report.pile_normals import across_colours, normal_cloud
 from lhdmap.report.recording import RecordingWriter
+from lhdmap.report.recording_end import rerun
 
 CURVES = (
     ("Width, m", ("pile/width/**",)),
@@ -76,15 +77,13 @@ def add_pile(
 
 
 def _dots(points_m: FloatArray, colours: int | npt.NDArray[np.uint32] = 0x8A949EFF, size: float = 1.2) -> Any:
-    import rerun as rr
-
+    rr = rerun()
     return rr.Points3D(points_m, colors=colours, radii=rr.Radius.ui_points(size))
 
 
 def _shapes(pile: PileEstimate) -> dict[str, Any]:
     """Return what is drawn, by name."""
-    import rerun as rr
-
+    rr = rerun()
     pixels = rr.Radius.ui_points
     limits = np.vstack([pile.left_limit_m, pile.right_limit_m])
     across = (limits[0] - limits[1]) / max(float(np.linalg.norm(limits[0] - limits[1])), 1e-9)

@@ -39,11 +39,29 @@ def render(production: Production, title: str = "Production") -> str:
     parts = [
         markup.section("What was produced", markup.cards(_cards(production))),
         *pictures,
+        markup.section("By machine", _machines(production)),
         markup.section("Phases", _phases(production)),
         markup.section("Stops by cause and place", _stops(production)),
         markup.section("Buckets", _buckets(production)),
     ]
     return markup.document(title, "".join(parts))
+
+
+def _machines(production: Production) -> str:
+    """Return a table of the machines, where there are several."""
+    rows = [
+        (
+            one["machine"],
+            str(one["cycles"]),
+            f"{one['tonnes']:.1f}",
+            _figure(one["cycle_mean_s"], "", 0),
+            f"{one['waits_s']:.1f}",
+            _UNKNOWN if one["distance_m"] is None else f"{one['distance_m']:.0f}",
+        )
+        for one in production.by_machine()
+    ]
+    head = ("machine", "buckets", "mass, t", "cycle, s", "waited for others, s", "driven, m")
+    return markup.table(head, rows, numbers_from=1) if len(rows) > 1 else ""
 
 
 def _cards(production: Production) -> Iterator[tuple[str, str, str]]:

@@ -19,12 +19,12 @@ import numpy as np
 import numpy.typing as npt
 
 from lhdmap.errors import InputError
-from lhdmap.integration.cloud import Cloud
+from lhdmap.integration.cloud import GridCloud
 from lhdmap.machine import Machine
 from lhdmap.mapfolder import Diagnostics
 from lhdmap.messages import Float32Array, FloatArray
 from lhdmap.names import in_utf8, shown
-from lhdmap.report.recording_end import load_quietly, write_out
+from lhdmap.report.recording_end import rerun, warn_if_left_out, write_out
 from lhdmap.report.recording_layout import RUN_CURVES, Curves, blueprint, whole_of
 from lhdmap.settings import setting
 from lhdmap.trajectory import Trajectory
@@ -92,11 +92,15 @@ class RecordingWriter:
         settings: RecordingSettings | None = None,
         *,
         live_port: int | None = None,
+        warns: bool = True,
     ) -> None:
         """Open the file in the background; `start_ns` is the stamp that counts as time zero.
 
-        `live_port`: viewers on this machine may follow there while it is written.
+        `live_port`: viewers on this machine may follow there while it is written. `warns`: says where Rerun is not
+        installed, and nothing will be written.
         """
+        if warns:
+            warn_if_left_out(path)
         self._settings = settings or RecordingSettings()
         self._path, self._failed = path, False
         self._start_ns = self._end_ns = start_ns
@@ -202,20 +206,22 @@ class RecordingWriter:
         self.add_joint(stamps_ns, angles_rad, machine)
         self._boxes("map/base_link/rear_link/rear_body", machine.boxes("rear_link"))
 
-    def add_bodies(self, machine: Machine) -> None:
+    def add_bodies(self, machine: Machine, entity: str = "map/base_link") -> None:
         """Record the boxes of both bodies; their poses come with `add_moving` and `add_joint`."""
-        self._boxes("map/base_link/front_body", machine.boxes("base_link"))
-        self._boxes("map/base_link/rear_link/rear_body", machine.boxes("rear_link"))
+        self._boxes(f"{entity}/front_body", machine.boxes("base_link"))
+        self._boxes(f"{entity}/rear_link/rear_body", machine.boxes("rear_link"))
 
-    def add_joint(self, stamps_ns: Stamps, angles_rad: FloatArray, machine: Machine) -> None:
+    def add_joint(
+        self, stamps_ns: Stamps, angles_rad: FloatArray, machine: Machine, entity: str = "map/base_link"
+    ) -> None:
         """Record how the rear body stands to the front one, by joint angles (M,)."""
         front_m, rear_m = machine.dimensions.joint_to_front_axle_m, machine.dimensions.joint_to_rear_axle_m
         x, y = -front_m - rear_m * np.cos(angles_rad), rear_m * np.sin(angles_rad)
         zero = np.zeros(len(x))
         quaternions = np.column_stack([zero, zero, np.sin(-angles_rad / 2), np.cos(-angles_rad / 2)])
-        self.add_moving("map/base_link/rear_link", stamps_ns, np.column_stack([x, y, zero]), quaternions)
+        self.add_moving(f"{entity}/rear_link", stamps_ns, np.column_stack([x, y, zero]), quaternions)
 
-    def add_cloud(self, cloud: Cloud) -> None:
+    def add_cloud(self, cloud: GridCloud) -> None:
         """Record the cloud in parts, each from the time on at which its points were first measured."""
         if not len(cloud):
             return
@@ -323,7 +329,7 @@ class RecordingWriter:
 
 def _open(path: Path, title: str, start_ns: int, live_port: int | None) -> tuple[Any, Any]:
     """Return the module of Rerun, and a stream into the file; what goes wrong is told by `close`, in our words."""
-    rr = load_quietly()
+    rr = rerun()
     title = shown(title)
     stream = rr.RecordingStream(APPLICATION, recording_id=f"{title} {start_ns}")
     with in_utf8(path) as written:  # it is open from here on

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from lhdmap.messages import Float32Array, FloatArray
+from lhdmap.report.recording_end import rerun
 
 FIELD_OF_VIEW_RAD = 0.9  # of the viewer, upright
 ASPECT, PLAN_ASPECT = 1.6, 2.5  # of the two views in a window of usual shape
@@ -53,8 +54,7 @@ def blueprint(
     show the whole drive. `topology`: it has a view of its own, in front of that from above, and is left out of the others;
     `beside`: entities that this view has, too.
     """
-    import rerun.blueprint as rrb
-
+    rrb = rerun().blueprint
     boundary = rrb.TimeRangeBoundary.absolute
     whole = rrb.TimeAxis(view_range=rrb.TimeRange(boundary(nanos=0), boundary(nanos=max(duration_ns, 1))))
     scene = ["+ map/**", *(["- map/topology/**"] if topology else [])]
@@ -80,16 +80,14 @@ def blueprint(
 
 
 def _view(name: str, contents: Sequence[str], bounds_m: FloatArray | None, *, oblique: bool) -> Any:
-    import rerun.blueprint as rrb
-
+    rrb = rerun().blueprint
     eye = _eye(bounds_m, oblique=oblique)
     return rrb.Spatial3DView(name=name, origin="map", contents=list(contents), eye_controls=eye)
 
 
 def _eye(bounds_m: FloatArray | None, *, oblique: bool) -> Any:
     """Return an eye that sees the bounds whole, from the south and above or from straight above."""
-    import rerun.blueprint as rrb
-
+    rrb = rerun().blueprint
     if bounds_m is None:
         return None
     position, target = eye_of(bounds_m, oblique=oblique)

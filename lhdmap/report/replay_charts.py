@@ -28,13 +28,18 @@ _SHADES = (charts.FINAL, charts.ODOMETRY, charts.TRUTH, charts.FLAGGED, charts.W
 def plan_chart(data: ReplayData) -> Figure:
     """Draw walls, true path, what perception believed, start, end, goal, contacts and where faults began."""
     way = data.rows[:, 1:4]
-    whole = np.vstack([way, *data.lines_m]) if data.drive is None else extent_m(data.drive, way)
+    ways = np.vstack([way, *(rows[:, 1:4] for rows in data.others.values())])
+    whole = np.vstack([ways, *data.lines_m]) if data.drive is None else extent_m(data.drive, ways)
     figure = charts.new_figure(charts.plan_height_in(whole, least=3.0) + _LEGEND_ROW_IN)
     axes = figure.add_subplot()
     for line in data.lines_m:
         axes.plot(line[:, 0], line[:, 1], color=charts.INK, linewidth=0.6, alpha=0.35)
     if data.drive is not None:
         draw_drive(axes, data.drive)
+    for (name, others), colour in zip(data.others.items(), _SHADES[3:], strict=False):
+        if len(others):
+            rows = charts.thinned(len(others))
+            axes.plot(others[rows, 1], others[rows, 2], color=colour, linewidth=1.2, label=f"true path of {name}")
     rows = charts.thinned(len(way))
     axes.plot(way[rows, 0], way[rows, 1], color=charts.FINAL, label="true path")
     if len(data.believed_m):

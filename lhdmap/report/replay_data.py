@@ -72,6 +72,7 @@ class ReplayData:
     """A run: its verdict, `rows` (N, 10) of `COLUMNS`, its states, its lines (walls, N × 3) and what perception believed.
 
     `believed_m` (M, 3): path by perception, placed at the true start. `settings_text`: the scenario as a file.
+    `others`: rows of the other machines of a crew, by name.
     """
 
     title: str
@@ -88,6 +89,7 @@ class ReplayData:
     drive: DriveData | None = None
     stops: Sequence[StopRow] = ()
     load: LoadData | None = None
+    others: Mapping[str, FloatArray] = field(default_factory=dict)
 
     def column(self, name: str) -> FloatArray:
         """Return a column of `rows` by its name, shape (N,)."""

@@ -62,6 +62,7 @@ def render(data: ReplayData) -> str:
         *pictures,
         markup.section("What navigation decided", _decided(data)),
         markup.section("Stops", _stops(data.stops)),
+        markup.section("Machines", _machines(data.verdict)),
         markup.section("Docks", haulage_section.docks(data.verdict)),
         markup.section("Contacts", _contacts(data.verdict["contacts"])),
         markup.section("Faults and what followed", _faults(data.verdict["faults"])),
@@ -182,6 +183,28 @@ def _followed(one: Mapping[str, Any]) -> str:
     return f"{one['after_s']:+.2f} s {one['process']}: {one['to'] or one['event']}"
 
 
+def _machines(verdict: Mapping[str, Any]) -> str:
+    """Return a table of the machines of a crew, and of sections that two of them were in; nothing where there is one."""
+    rows = [
+        (
+            one["machine"],
+            one["reason"],
+            str(one["cycles"]),
+            f"{one['tonnes']:.1f}",
+            f"{one['distance_m']:.0f}",
+            f"{one['time_by_phase_s'].get('traffic', 0.0):.1f}",
+            str(one["contacts"]),
+        )
+        for one in verdict.get("machines", ())
+    ]
+    shared = verdict.get("sections_shared", ())
+    told = [f"{one['t_s']:.1f} s: {' and '.join(one['machines'])} in section {one['section']}" for one in shared]
+    words = "No section had two machines in it at any time, by the truth." if rows and not told else ""
+    head = ("machine", "ended", "buckets", "mass, t", "driven, m", "waited for a section, s", "contacts")
+    table = markup.table(head, rows, numbers_from=2) if rows else ""
+    return table + (markup.paragraph(words) if words else "") + (markup.listed(told, "warning") if told else "")
+
+
 def _phases(verdict: Mapping[str, Any]) -> str:
     by_phase = verdict.get("time_by_phase_s", {})
     whole_s = max(sum(by_phase.values()), 1e-9)
@@ -193,7 +216,7 @@ def _verdict(verdict: Mapping[str, Any]) -> str:
     rows = [
         (key, _said(value))
         for key, value in verdict.items()
-        if key not in ("contacts", "docks", "faults", "time_by_phase_s")
+        if key not in ("contacts", "docks", "faults", "time_by_phase_s", "machines", "sections_shared")
     ]
     return markup.table(("figure of verdict.json", "value"), rows)
 

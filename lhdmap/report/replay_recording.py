@@ -1,7 +1,8 @@
 """A replay in a Rerun recording, written while it goes on: machine, newest scan, curves, events as texts, states as steps.
 
 Entities: `map/base_link/…` (the machine as it truly is), `map/scan/…`, `map/walls`, `map/path/…`, `motion/…`, `state/…`, `log`; of
-a machine that drives itself `map/topology/…`, `map/route/…` (its legs), `map/plan/horizon` (what guidance predicts), `place/…`.
+a machine that drives itself `map/topology/…`, `map/route/…` (its legs), `map/plan/horizon` (what guidance predicts), `place/…`; of
+other machines of a crew `map/lhd2/base_link/…`.
 """
 
 from __future__ import annotations
@@ -15,6 +16,7 @@ from lhdmap.machine import Machine
 from lhdmap.messages import FloatArray
 from lhdmap.report.loading_recording import add_load
 from lhdmap.report.recording import PathStyle, RecordingWriter
+from lhdmap.report.recording_end import rerun
 from lhdmap.report.recording_layout import REPLAY_CURVES, REPLAY_GRAPH
 from lhdmap.report.replay_data import COLUMNS, DriveData, ReplayData
 from lhdmap.report.topology_recording import add_topology, raised
@@ -55,8 +57,7 @@ class ReplayRecording:
 
     def begin(self, lines_m: Sequence[FloatArray], expected_s: float) -> None:
         """Record the machine's bodies and the walls as lines (N, 3); viewers that follow get their layout."""
-        import rerun as rr
-
+        rr = rerun()
         self._writer.add_bodies(self._machine)
         if len(lines_m):
             lines = rr.LineStrips3D(list(lines_m), colors=_GREY, radii=rr.Radius.ui_points(1.0))
@@ -92,8 +93,7 @@ class ReplayRecording:
 
     def add_horizon(self, stamp_ns: int, way_m: FloatArray) -> None:
         """Record the way (K, 3) that guidance predicts at a time; empty: none."""
-        import rerun as rr
-
+        rr = rerun()
         if len(way_m) or self._planned:
             lines = [way_m] if len(way_m) else []
             strip = rr.LineStrips3D(lines, colors=_PINK, radii=rr.Radius.ui_points(3.0))
@@ -113,6 +113,7 @@ class ReplayRecording:
         """
         if data is not None:
             self._add_paths(data)
+            self._add_others(data)
             self._add_states(data)
         if data is not None and data.drive is not None:
             self._add_drive(data.drive)
@@ -121,8 +122,7 @@ class ReplayRecording:
         self._writer.close()
 
     def _add_paths(self, data: ReplayData) -> None:
-        import rerun as rr
-
+        rr = rerun()
         positions = data.rows[:, 1:4]
         self._writer.widen(positions)
         self._writer.add_path("true", _trajectory(positions), _TRUE)
@@ -134,10 +134,21 @@ class ReplayRecording:
             self._writer.add_shape("map/contacts", points)
             self._writer.explain("red points", "contacts")
 
+    def _add_others(self, data: ReplayData) -> None:
+        """Record the bodies of the other machines of a crew as they moved, and their paths."""
+        for (name, rows), rgba in zip(data.others.items(), (_PINK, _GREEN, _RED), strict=False):
+            if not len(rows):
+                continue
+            entity = f"map/{name}/base_link"
+            stamps = self._start_ns + np.round(1e9 * rows[:, 0]).astype(np.int64)
+            self._writer.add_bodies(self._machine, entity)
+            self._writer.add_moving(entity, stamps, rows[:, 1:4], _quaternions(rows, np.zeros((len(rows), 2))))
+            self._writer.add_joint(stamps, rows[:, COLUMNS.index("articulation_rad")], self._machine, entity)
+            self._writer.add_path(name, _trajectory(rows[:, 1:4]), PathStyle(f"path of {name}", "thin", rgba, 0.75))
+
     def _add_drive(self, drive: DriveData) -> None:
         """Record the map where it fits best, the legs that were asked for, and by how much the place on the map was off."""
-        import rerun as rr
-
+        rr = rerun()
         if drive.topology is not None:
             self.add_map(drive.topology)
         for gear, (rgba, colour) in _GEARS.items():

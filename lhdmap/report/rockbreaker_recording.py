@@ -14,6 +14,7 @@ import numpy as np
 
 from lhdmap.messages import FloatArray
 from lhdmap.report.recording import RecordingWriter
+from lhdmap.report.recording_end import rerun
 from lhdmap.rockbreaker.collision import Obstacles
 from lhdmap.rockbreaker.machine import JOINTS, Rockbreaker
 from lhdmap.rockbreaker.plan import Trajectory
@@ -72,8 +73,7 @@ def add_arm(writer: RecordingWriter, machine: Rockbreaker, rows: FloatArray) -> 
 
 def _link(machine: Rockbreaker, joint: int, length_m: float) -> Any:
     """Return a link as a capsule: the swing post upwards, the others along their x axis."""
-    import rerun as rr
-
+    rr = rerun()
     post = joint == 0
     return rr.Capsules3D(
         lengths=[max(machine.base.height_m, 0.1) if post else length_m],
@@ -92,8 +92,7 @@ def _add_surroundings(
     writer: RecordingWriter, machine: Rockbreaker, scene: Scene | None, obstacles: Obstacles, end_m: FloatArray
 ) -> None:
     """Add grizzly, rocks, cloud and boxes; the rock under the tip's end (3,) is the target."""
-    import rerun as rr
-
+    rr = rerun()
     writer.widen(np.array([[0.0, 0.0, machine.base.height_m]]))
     writer.add_shape("map/grizzly", rr.LineStrips3D(bar_lines(machine, scene), colors=0x8A949EFF, radii=0.03))
     if scene is not None and scene.rocks:
@@ -140,8 +139,7 @@ def bar_lines(machine: Rockbreaker, scene: Scene | None) -> list[FloatArray]:
 
 def _add_way(writer: RecordingWriter, number: int, way: FloatArray) -> None:
     """Add the way of the tip in one step, with its name."""
-    import rerun as rr
-
+    rr = rerun()
     name, (colour, rgba) = f"step {number + 1}", _WAYS[number % len(_WAYS)]
     line = rr.LineStrips3D([way], colors=rgba, radii=rr.Radius.ui_points(2.5), labels=[name], show_labels=True)
     writer.add_shape(f"map/tip/{number}", line)

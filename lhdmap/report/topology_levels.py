@@ -16,7 +16,7 @@ _STRAY_PCT = 0.5
 Indices = npt.NDArray[np.int64]
 
 
-class Level(NamedTuple):
+class DrawnLevel(NamedTuple):
     """A level: its name, and its free space where that is known."""
 
     name: str
@@ -28,8 +28,8 @@ class Levels:
 
     def __init__(self, topology: TopologicalMap, sheets: Sequence[Sheet] = ()) -> None:
         self._ranges = np.array([sheet.heights_m for sheet in sheets], dtype=float).reshape(-1, 2)
-        self.all = [Level(name, sheet) for name, sheet in zip(self._names(topology, sheets), sheets, strict=True)]
-        self.all = self.all or [Level("all levels")]
+        self.all = [DrawnLevel(name, sheet) for name, sheet in zip(self._names(topology, sheets), sheets, strict=True)]
+        self.all = self.all or [DrawnLevel("all levels")]
 
     def of(self, points_m: FloatArray) -> Indices:
         """Return the index of the level that each point (N, 3) is on: whose heights hold it, or are next to it."""

@@ -13,7 +13,7 @@ from lhdmap.report.data import ClosureRow, ReportData
 from lhdmap.report.landmark_page import landmarks_section
 from lhdmap.report.topology_charts import level_figure
 from lhdmap.report.topology_drawing import kind_of
-from lhdmap.report.topology_levels import Level, Levels, counted, summary
+from lhdmap.report.topology_levels import DrawnLevel, Levels, counted, summary
 from lhdmap.topology.model import DEAD_END, TopologicalMap, Tunnel
 
 MOST_LEVELS, MOST_ROWS = 12, 400
@@ -55,7 +55,7 @@ def _pictures(topology: TopologicalMap, levels: Levels, found: Sequence[ClosureR
     return "".join(pictures)
 
 
-def _named(level: Level, *, several: bool) -> str:
+def _named(level: DrawnLevel, *, several: bool) -> str:
     """Return what a picture of a level shows."""
     name = f"Level {level.name}, from above" if several else "From above"
     if level.sheet is None:

@@ -12,6 +12,7 @@ import numpy as np
 from lhdmap.messages import FloatArray
 from lhdmap.report.data import ClosureRow
 from lhdmap.report.recording import RecordingWriter
+from lhdmap.report.recording_end import rerun
 from lhdmap.report.route_legs import legs_of
 from lhdmap.report.topology_drawing import kind_of
 from lhdmap.report.topology_levels import middle
@@ -53,8 +54,7 @@ def add_topology(writer: RecordingWriter, topology: TopologicalMap, closures: Se
 
 def record_route(writer: RecordingWriter, topology: TopologicalMap, route_states: Sequence[Step]) -> None:
     """Record a route: forward green, reverse orange, where it changes gear or turns, start and goal."""
-    import rerun as rr
-
+    rr = rerun()
     legs = legs_of(topology, route_states)
     for gear, rgba, colour in (("forward", _GREEN, "green"), ("reverse", _ORANGE, "orange")):
         lines = [raised(leg.line_m, 2.0 * _ABOVE_M) for leg in legs if leg.gear == gear]
@@ -94,8 +94,7 @@ def raised(points_m: FloatArray, by_m: float = _ABOVE_M) -> FloatArray:
 
 def _add_tunnels(writer: RecordingWriter, topology: TopologicalMap) -> None:
     """Record centre lines; the name that a waypoint in a tunnel has, too, stands there alone."""
-    import rerun as rr
-
+    rr = rerun()
     for kind, (rgba, drawn, meaning) in _TUNNELS.items():
         own = [one for one in topology.tunnels if kind_of(one) == kind]
         names = [one.name for one in own]
@@ -142,8 +141,7 @@ def _add_arrows(
     shown: bool = False,
 ) -> None:
     """Record poses as arrows; names that are not shown, there are many of access points, are seen on selection."""
-    import rerun as rr
-
+    rr = rerun()
     if points:
         poses = np.array([one.pose for one in points])
         ahead = long_m * np.column_stack([np.cos(poses[:, 3]), np.sin(poses[:, 3]), np.zeros(len(poses))])
@@ -184,8 +182,7 @@ def _add_lines(
     shown: bool = False,
 ) -> None:
     """Record lines (N, 3) of a size in points on screen; nothing where there is none."""
-    import rerun as rr
-
+    rr = rerun()
     if lines:
         radii = rr.Radius.ui_points(size)
         strips = rr.LineStrips3D(lines, colors=rgba, radii=radii, labels=labels, show_labels=shown)
@@ -195,8 +192,7 @@ def _add_lines(
 def _add_marks(
     writer: RecordingWriter, entity: str, at: Sequence[FloatArray], rgba: int, labels: Sequence[str]
 ) -> None:
-    import rerun as rr
-
+    rr = rerun()
     points = raised(np.array(at), 3.0 * _ABOVE_M)
     shape = rr.Points3D(points, colors=rgba, radii=rr.Radius.ui_points(7.0), labels=labels, show_labels=True)
     writer.add_shape(entity, shape)

@@ -7,8 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from lhdmap.messages import FloatArray
+from lhdmap.rockbreaker.cylinders import CYLINDER_JOINT, rho_of_theta
 from lhdmap.rockbreaker.flow import LIMITS, flows_m3ps, speed_loads
-from lhdmap.rockbreaker.kinematics import CYLINDER_JOINT, rho_of_theta, theta_of_pose
+from lhdmap.rockbreaker.kinematics import theta_of_pose
 from lhdmap.rockbreaker.machine import JOINTS, Rockbreaker
 from lhdmap.rockbreaker.paths import Path
 from lhdmap.rockbreaker.timing import TimeLaw

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from lhdmap.messages import FloatArray
-from lhdmap.rockbreaker.kinematics import CYLINDER_JOINT
+from lhdmap.rockbreaker.cylinders import CYLINDER_JOINT
 from lhdmap.rockbreaker.machine import Rockbreaker
 from lhdmap.rockbreaker.paths import Path, cylinders
 

@@ -9,50 +9,8 @@ from __future__ import annotations
 import numpy as np
 
 from lhdmap.messages import FloatArray
+from lhdmap.rockbreaker.cylinders import CYLINDER_DELTA, CYLINDER_JOINT, cylinder_beta, lengths, pins
 from lhdmap.rockbreaker.machine import Rockbreaker
-
-DELTA = np.array([1.0, 1.0, -1.0, -1.0])  # δ of Eq. (2)
-CYLINDER_DELTA = np.array([-1.0, 1.0, 1.0, -1.0, -1.0])  # dβ_j / dθ; erratum 2
-CYLINDER_JOINT = np.array([0, 0, 1, 2, 3])
-
-
-def beta_of_rho(machine: Rockbreaker, rho: FloatArray) -> FloatArray:
-    """Return β (…, 4) of cylinder lengths (…, 4), one for each joint (of the swing: cylinder 1), Eq. (1); NaN out of reach."""
-    u, v = machine.per_joint("body_pin_m"), machine.per_joint("rod_pin_m")
-    cosine = (u**2 + v**2 - rho**2) / (2.0 * u * v)
-    return np.arccos(np.where(np.abs(cosine) <= 1.0 + 1e-12, np.clip(cosine, -1.0, 1.0), np.nan))
-
-
-def theta_of_beta(machine: Rockbreaker, beta: FloatArray) -> FloatArray:
-    """Return θ (…, 4) of β (…, 4), Eq. (2)."""
-    return DELTA * beta + np.radians(machine.per_joint("offset_deg"))
-
-
-def cylinder_beta(machine: Rockbreaker, theta: FloatArray) -> FloatArray:
-    """Return β of the five cylinders (…, 5) of θ (…, 4): Eq. (2) solved for β, cylinder 0 by the mirror image."""
-    offset = np.radians(machine.per_joint("offset_deg"))[CYLINDER_JOINT]
-    mirrored = np.where(np.arange(5) == 0, -1.0, 1.0)
-    own_delta = DELTA[CYLINDER_JOINT]
-    return own_delta * (mirrored * theta[..., CYLINDER_JOINT] - offset)
-
-
-def rho_of_theta(machine: Rockbreaker, theta: FloatArray) -> FloatArray:
-    """Return the cylinder lengths (…, 5) of θ (…, 4), Eq. (1) solved for ρ."""
-    return _lengths(machine, np.cos(cylinder_beta(machine, theta)))
-
-
-def _lengths(machine: Rockbreaker, cos_beta: FloatArray) -> FloatArray:
-    u, v = _pins(machine)
-    return np.asarray(np.sqrt(u**2 + v**2 - 2.0 * u * v * cos_beta))
-
-
-def _pins(machine: Rockbreaker) -> tuple[FloatArray, FloatArray]:
-    return machine.per_joint("body_pin_m")[CYLINDER_JOINT], machine.per_joint("rod_pin_m")[CYLINDER_JOINT]
-
-
-def theta_of_rho(machine: Rockbreaker, rho: FloatArray) -> FloatArray:
-    """Return θ (…, 4) of cylinder lengths (…, 5), Eqs. (1) and (2); of the two swing cylinders ρ_1 is used."""
-    return theta_of_beta(machine, beta_of_rho(machine, rho[..., 1:]))
 
 
 def pose_of_theta(machine: Rockbreaker, theta: FloatArray) -> FloatArray:
@@ -122,8 +80,8 @@ def jacobian_theta(machine: Rockbreaker, theta: FloatArray) -> FloatArray:
 def rho_rate(machine: Rockbreaker, theta: FloatArray) -> FloatArray:
     """Return dρ_j / dθ of each cylinder for its own joint (…, 5): δ_j u v sin β / ρ (Eq. (5), errata 3 and 4), m/rad."""
     beta = cylinder_beta(machine, theta)
-    u, v = _pins(machine)
-    return np.asarray(CYLINDER_DELTA * u * v * np.sin(beta) / _lengths(machine, np.cos(beta)))
+    u, v = pins(machine)
+    return np.asarray(CYLINDER_DELTA * u * v * np.sin(beta) / lengths(machine, np.cos(beta)))
 
 
 def jacobian_rho(machine: Rockbreaker, theta: FloatArray) -> FloatArray:

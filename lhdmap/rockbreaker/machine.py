@@ -13,7 +13,9 @@ from pathlib import Path
 import numpy as np
 
 from lhdmap.errors import ConfigError
+from lhdmap.geometry import se3
 from lhdmap.messages import FloatArray
+from lhdmap.rockbreaker.cylinders import beta_of_rho, rho_of_theta, theta_of_beta
 from lhdmap.settings import check_corners, setting
 from lhdmap.settings_tree import load_tree, part, tree_toml
 
@@ -64,7 +66,7 @@ class Base:
 
 
 @dataclass(frozen=True, slots=True)
-class Joint:
+class ArmJoint:
     """A revolute joint, the link that it carries, and its cylinder (for the swing: both cylinders alike)."""
 
     link_m: float = setting(1.0, unit="m", source=PAPER, minimum=0.01, maximum=50.0, doc="a: to the next joint (or P).")
@@ -117,13 +119,13 @@ class Grizzly:
         check_corners(self.min_m, self.max_m)
 
 
-def _table1() -> tuple[Joint, ...]:
+def _table1() -> tuple[ArmJoint, ...]:
     swing = {"shortest_m": 1.07, "longest_m": 1.5, "blind_area_m2": 1.03e-2, "rod_area_m2": 7.16e-3}
     return (
-        Joint(0.37, 1.28, 0.22, -89.04, 24.0, **swing, radius_m=0.40),
-        Joint(3.06, 0.70, 2.09, -57.63, 60.0, radius_m=0.30),
-        Joint(2.38, 2.07, 0.73, -7.60, 60.0),
-        Joint(2.57, 2.12, 0.63, 60.56, 38.0),
+        ArmJoint(0.37, 1.28, 0.22, -89.04, 24.0, **swing, radius_m=0.40),
+        ArmJoint(3.06, 0.70, 2.09, -57.63, 60.0, radius_m=0.30),
+        ArmJoint(2.38, 2.07, 0.73, -7.60, 60.0),
+        ArmJoint(2.57, 2.12, 0.63, 60.56, 38.0),
     )
 
 
@@ -133,7 +135,7 @@ class Rockbreaker:
 
     name: str = setting("rockbreaker_table1", doc="Name of the machine.")
     base: Base = part(Base)
-    joints: tuple[Joint, ...] = part(_table1, key="joint", names=JOINTS)
+    joints: tuple[ArmJoint, ...] = part(_table1, key="joint", names=JOINTS)
     grizzly: Grizzly = part(Grizzly)
 
     def per_joint(self, name: str) -> FloatArray:
@@ -157,8 +159,6 @@ class Rockbreaker:
         They are given in the turn around zero, whatever turn the offsets ε are in. The outer boom is kept a degree from in
         line with the inner one, straight or folded back, where the arm is singular, on the side where most of its range lies.
         """
-        from lhdmap.rockbreaker.kinematics import beta_of_rho, theta_of_beta
-
         ends = np.array([[joint.shortest_m, joint.longest_m] for joint in self.joints]).T
         theta = np.sort(theta_of_beta(self, beta_of_rho(self, ends)), axis=0)
         theta -= 2.0 * np.pi * np.round(theta.mean(axis=0) / (2.0 * np.pi))
@@ -176,8 +176,6 @@ class Rockbreaker:
     @cached_property
     def swing_rate_limit(self) -> float:
         """Lowest point of Fig. 6: swing rate that the valve allows at each angle, Eq. (17) with errata 3 and 8, rad/s."""
-        from lhdmap.rockbreaker.kinematics import rho_of_theta
-
         theta = np.zeros((20_001, 4))
         theta[:, 0] = np.linspace(self.theta_limits[0, 0], self.theta_limits[1, 0], len(theta))
         rate = np.abs(np.gradient(rho_of_theta(self, theta)[:, :2], theta[:, 0], axis=0))
@@ -187,8 +185,6 @@ class Rockbreaker:
     @cached_property
     def T_cloud_base(self) -> FloatArray:  # noqa: N802  # frames in the name
         """Pose of the base's frame in that of a cloud, shape (4, 4)."""
-        from lhdmap.geometry import se3
-
         return se3.from_rpy(0.0, 0.0, math.radians(self.base.yaw_deg), self.base.position_m)
 
 
@@ -221,7 +217,7 @@ def _check(machine: Rockbreaker) -> None:
             raise ConfigError(f"joint.{name}: its cylinder leaves it no angle to move in")
 
 
-def _check_joint(name: str, joint: Joint) -> None:
+def _check_joint(name: str, joint: ArmJoint) -> None:
     """Raise ConfigError where the cylinder's range is empty or does not close the triangle of its pins."""
     nearest_m, farthest_m = abs(joint.body_pin_m - joint.rod_pin_m), joint.body_pin_m + joint.rod_pin_m
     if not nearest_m <= joint.shortest_m < joint.longest_m <= farthest_m + 1e-9:

@@ -8,7 +8,8 @@ from typing import Literal
 import numpy as np
 
 from lhdmap.messages import FloatArray
-from lhdmap.rockbreaker.kinematics import planar_rates, planar_theta, rho_of_theta, rho_rate
+from lhdmap.rockbreaker.cylinders import rho_of_theta
+from lhdmap.rockbreaker.kinematics import planar_rates, planar_theta, rho_rate
 from lhdmap.rockbreaker.machine import Rockbreaker
 from lhdmap.rockbreaker.turning import Turning
 

@@ -12,8 +12,9 @@ from lhdmap.messages import FloatArray
 from lhdmap.rockbreaker import corridor, turning
 from lhdmap.rockbreaker.collision import Obstacles
 from lhdmap.rockbreaker.corridor import Refusal
+from lhdmap.rockbreaker.cylinders import rho_of_theta
 from lhdmap.rockbreaker.flow import FlowCurve, flow_curve, least_duration_s
-from lhdmap.rockbreaker.kinematics import rho_of_theta, theta_of_pose
+from lhdmap.rockbreaker.kinematics import theta_of_pose
 from lhdmap.rockbreaker.machine import Rockbreaker
 from lhdmap.rockbreaker.orientation import nearest_vertical, phi_intervals, planar_position, unwrapped
 from lhdmap.rockbreaker.paths import Kind, Path

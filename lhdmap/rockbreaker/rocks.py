@@ -10,12 +10,14 @@ import numpy.typing as npt
 from scipy import ndimage
 
 from lhdmap.errors import InputError
+from lhdmap.geometry.plane import robust_plane
 from lhdmap.messages import FloatArray
 from lhdmap.rockbreaker.machine import Grizzly
 
 _CELL_M = 0.05
 _BORDER_M = 0.3  # a rock may reach over the grizzly's edge by that
 _PLANE_M = 0.03  # from a plane's points
+_ROUNDS = 3  # of least squares on the points near the plane that chance found
 _LEAST_SHARE = 0.1  # of the area that is seen, which a plane must cover
 _PLANES = 4  # that are looked for
 _STEEPEST = math.tan(math.radians(15.0))
@@ -132,11 +134,10 @@ def _level_plane(points_m: FloatArray, rng: np.random.Generator) -> FloatArray:
             continue
         count = int(np.count_nonzero(np.abs(_over(points_m, plane)) < _PLANE_M))
         best, most = (plane, count) if count > most else (best, most)
-    for _ in range(3 if most else 0):
-        near = points_m[np.abs(_over(points_m, best)) < _PLANE_M]
-        design = np.column_stack([np.ones(len(near)), near[:, :2]])
-        best = np.linalg.lstsq(design, near[:, 2], rcond=None)[0].astype(np.float64)
-    return best
+    if not most:
+        return best
+    near = np.abs(_over(points_m, best)) < _PLANE_M
+    return robust_plane(points_m[:, :2], points_m[:, 2], lambda off, _: np.abs(off) < _PLANE_M, _ROUNDS, near).terms
 
 
 def _over(points_m: FloatArray, plane: FloatArray) -> FloatArray:

@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from lhdmap.rockbreaker.cylinders import rho_of_theta
 from lhdmap.rockbreaker.flow import least_duration_s
-from lhdmap.rockbreaker.kinematics import rho_of_theta
 from lhdmap.rockbreaker.plan import Plan, Planner, Request
 from lhdmap.rockbreaker.rocks import Rock, Scene
 

@@ -21,10 +21,13 @@ from numba.extending import intrinsic
 from lhdmap.messages import FloatArray
 
 KERNEL_CELLS = 3  # a line is fitted to the cells within this many cells of a point
-LINE = 8  # numbers of a line: see `fit_line`
 KERNEL_SIGMA_CELLS = 2.0
-_CLOT_SHARE = 0.1  # of the variance along a line: from which on what scatters across it is a clot
-_CLOT_WIDER = 9.0  # times that variance: what a clot is taken to scatter by
+# Columns of a line, as `fit_line` gives it: centre (m), unit normal, variance across the line (m²), effective number of cells,
+# cell of the level that served (m; 0: none; left to the caller), and by how much the cells lie lower than the point (m).
+CENTRE_X, CENTRE_Y, NORMAL_X, NORMAL_Y, SCATTER, CELLS, SERVED, BELOW = range(8)
+LINE = 8
+_CLUSTER_SHARE = 0.1  # of the variance along a line: from which on what scatters across it is a degenerate cluster
+_CLUSTER_WIDER = 9.0  # times that variance: what a degenerate cluster is taken to scatter by
 LAYERS = 8
 LAYER_M = 0.12
 _LAYERS_PER_M = 1.0 / LAYER_M  # one expression for all: a height between two layers falls into one
@@ -235,10 +238,9 @@ def fit_line(
     """Fit the wall near `at` (x, y, height) by a line with Gaussian weights; return whether the cells there support one.
 
     `layered`: look at the layers above and below, too (a planar scan has one). `wanted`: effective cells that a line needs,
-    and the variance (m²) that noise alone gives: few far hits that scatter no more are a clot, whose direction is noise; it agrees
-    with all that is near, and says hardly anything (0: none is one). `sums` (8,) is room to work in. `line`, shape (LINE,),
-    receives: centre x, y, normal x, y, scatter across the line (variance, m²), effective number of cells, [6] left to the
-    caller, and by how much the cells lie lower than the point (m).
+    and the variance (m²) that noise alone gives: few far hits that scatter no more are a degenerate cluster, whose direction is
+    noise; it agrees with all that is near, and says hardly anything (0: none is one). `sums` (8,) is room to work in.
+    `line`, shape (LINE,), receives the columns above but `SERVED`.
     """
     if not _gather(level, at[0], at[1], at[2], layered, sums):
         return False
@@ -250,7 +252,7 @@ def fit_line(
         return False
     mx, my, mz = sums[2] / s0, sums[3] / s0, sums[4] / s0
     cxx, cxy, cyy = sums[5] / s0 - mx * mx, sums[6] / s0 - mx * my, sums[7] / s0 - my * my
-    line[7] = -mz
+    line[BELOW] = -mz
     half_trace, half_difference = 0.5 * (cxx + cyy), 0.5 * (cxx - cyy)
     root = math.sqrt(half_difference * half_difference + cxy * cxy)
     small, large = max(half_trace - root, 0.0), half_trace + root
@@ -262,7 +264,7 @@ def fit_line(
         math.sqrt(max(0.5 * (1.0 + cos2), 0.0)),
         math.copysign(math.sqrt(max(0.5 * (1.0 - cos2), 0.0)), cxy),
     )
-    line[0], line[1], line[2], line[3] = at[0] + mx, at[1] + my, -along_y, along_x
-    clot = small > _CLOT_SHARE * large and small < wanted[1]
-    line[4], line[5] = _CLOT_WIDER * large if clot else small, effective
+    line[CENTRE_X], line[CENTRE_Y], line[NORMAL_X], line[NORMAL_Y] = at[0] + mx, at[1] + my, -along_y, along_x
+    degenerate = small > _CLUSTER_SHARE * large and small < wanted[1]
+    line[SCATTER], line[CELLS] = _CLUSTER_WIDER * large if degenerate else small, effective
     return True

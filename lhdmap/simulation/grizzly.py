@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from lhdmap.integration.cloud import Cloud
+from lhdmap.integration.cloud import GridCloud
 from lhdmap.integration.cloud_io import write_cloud
 from lhdmap.messages import FloatArray
 from lhdmap.outputs import OutputFiles
@@ -142,7 +142,7 @@ def write_scene(path: Path, machine: Rockbreaker, scene: GrizzlyScene, *, force:
     T_cloud_base, truth = machine.T_cloud_base, truth_path(path)
     points_m = scene.points_m @ T_cloud_base[:3, :3].T + T_cloud_base[:3, 3]
     with OutputFiles(truth, path, force=force) as files:
-        write_cloud(files.at(path), Cloud(points_m.astype(np.float32)))
+        write_cloud(files.at(path), GridCloud(points_m.astype(np.float32)))
         text = json.dumps(scene_json(machine, scene), indent=1)
         files.at(truth).write_text(text + "\n", encoding="utf-8")
     return truth

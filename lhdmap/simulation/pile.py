@@ -7,35 +7,16 @@ from typing import NamedTuple
 
 import numpy as np
 
+from lhdmap.geometry.frame import UprightFrame
 from lhdmap.machine import Machine
 from lhdmap.messages import FloatArray
 from lhdmap.simulation.crossing import joined
 from lhdmap.simulation.drift import Drift, Mesh
 from lhdmap.simulation.pile_face import Face, Room, make_face
 from lhdmap.simulation.pile_rocks import cylinder, extent, rock, standing_machine
-from lhdmap.simulation.pile_sections import PileSettings
+from lhdmap.simulation.pile_sections import SimulatedPileSettings
 
 _MARGIN_M = 0.6  # how far the face goes into walls, roof and end
-
-
-class PileFrame(NamedTuple):
-    """Frame of the foot: origin (3,) on the centre line in `map`, x along the drift's end heading, z up."""
-
-    origin_m: FloatArray
-    heading_rad: float
-
-    def to_map(self, points_m: FloatArray) -> FloatArray:
-        """Return points (..., 3) of this frame in `map`."""
-        return points_m @ self._axes() + self.origin_m
-
-    def from_map(self, points_m: FloatArray) -> FloatArray:
-        """Return points (..., 3) of `map` in this frame."""
-        return (points_m - self.origin_m) @ self._axes().T
-
-    def _axes(self) -> FloatArray:
-        """Return the axes of this frame in `map`, as rows, shape (3, 3)."""
-        c, s = math.cos(self.heading_rad), math.sin(self.heading_rad)
-        return np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])
 
 
 class Oversize(NamedTuple):
@@ -47,10 +28,10 @@ class Oversize(NamedTuple):
 
 
 class Pile(NamedTuple):
-    """All that stands at the end of a drift, in the frame of the foot, which lies at arc length `place_m`."""
+    """All that stands at the end of a drift, in the frame of the foot: x along its end heading, at arc length `place_m`."""
 
-    settings: PileSettings
-    frame: PileFrame
+    settings: SimulatedPileSettings
+    frame: UprightFrame
     place_m: float
     face: Face | None
     boulders: tuple[Oversize, ...]
@@ -60,7 +41,7 @@ class Pile(NamedTuple):
         """Return all parts in `map`."""
         parts = [self.face.mesh()] if self.face is not None else []
         parts += [boulder.mesh for boulder in self.boulders]
-        return [Mesh(self.frame.to_map(part.vertices_m), part.triangles) for part in [*parts, *self.others]]
+        return [Mesh(self.frame.map(part.vertices_m), part.triangles) for part in [*parts, *self.others]]
 
     def joined_to(self, mesh: Mesh) -> Mesh:
         """Return a mesh of the drift with all parts."""
@@ -69,10 +50,12 @@ class Pile(NamedTuple):
         return mesh
 
 
-def make_pile(settings: PileSettings, drift: Drift, place_m: float, machine: Machine, rng: np.random.Generator) -> Pile:
+def make_pile(
+    settings: SimulatedPileSettings, drift: Drift, place_m: float, machine: Machine, rng: np.random.Generator
+) -> Pile:
     """Return the pile whose foot lies at arc length `place_m` of the drift."""
     x, y, z, heading = drift.line.at(np.array([place_m]))[0].tolist()
-    frame = PileFrame(np.array([x, y, z]), heading)
+    frame = UprightFrame(np.array([x, y, z]), heading)
     face_rng, rock_rng = rng.spawn(2)
     room = _room(drift, place_m)
     face = make_face(settings, room, face_rng) if settings.face else None
@@ -104,7 +87,7 @@ def _boulder(face: Face, place: tuple[float, float, float, float], rng: np.rando
     return Oversize(Mesh(mesh.vertices_m + middle, mesh.triangles), middle, extent(mesh.vertices_m))
 
 
-def _spill(settings: PileSettings, drift: Drift, place_m: float, rng: np.random.Generator) -> list[Mesh]:
+def _spill(settings: SimulatedPileSettings, drift: Drift, place_m: float, rng: np.random.Generator) -> list[Mesh]:
     """Return rocks on the floor before the foot, most of them near it."""
     parts = []
     for _ in range(settings.spill):
@@ -125,7 +108,7 @@ def floor_height(drift: Drift, place_m: float, along_m: FloatArray, lateral_m: F
     return rise + drift.floor_offset(s, lateral_m)
 
 
-def _obstacle(settings: PileSettings, drift: Drift, place_m: float, machine: Machine) -> list[Mesh]:
+def _obstacle(settings: SimulatedPileSettings, drift: Drift, place_m: float, machine: Machine) -> list[Mesh]:
     """Return what stands at the foot: a machine whose nearest point is there, or a post from floor to roof."""
     lateral = settings.obstacle_lateral_m
     floor = float(floor_height(drift, place_m, np.zeros(1), np.array([lateral]))[0])

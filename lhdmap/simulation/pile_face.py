@@ -14,7 +14,7 @@ import numpy as np
 from lhdmap.messages import FloatArray
 from lhdmap.simulation.drift import Mesh, Triangles
 from lhdmap.simulation.noise_field import Scales, noise_field
-from lhdmap.simulation.pile_sections import PileSettings
+from lhdmap.simulation.pile_sections import SimulatedPileSettings
 
 _BELOW_M = 0.6  # how deep under the floor the face begins
 _BEND_OVER_M = 0.25  # height over which the slope changes at the bend
@@ -64,7 +64,7 @@ def sheet(rows: int, columns: int) -> Triangles:
     return np.concatenate([np.stack([a, b, c], axis=1), np.stack([b, d, c], axis=1)]).astype(np.uint32)
 
 
-def make_face(settings: PileSettings, room: Room, rng: np.random.Generator) -> Face:
+def make_face(settings: SimulatedPileSettings, room: Room, rng: np.random.Generator) -> Face:
     """Return the face of a pile (or a bare end wall) in a drift's `room`."""
     curve = profile_curve(settings, room)
     count = math.ceil(2 * room.half_width_m / settings.mesh_m)
@@ -78,7 +78,7 @@ def make_face(settings: PileSettings, room: Room, rng: np.random.Generator) -> F
     return Face(np.stack([along, np.broadcast_to(lateral, along.shape), height], axis=2), curve, lateral)
 
 
-def profile_curve(settings: PileSettings, room: Room) -> FloatArray:
+def profile_curve(settings: SimulatedPileSettings, room: Room) -> FloatArray:
     """Return the nominal profile (along, height), shape (T, 2), a point each `mesh_m`; (0, 0) is the foot."""
     step, foot = settings.mesh_m, math.radians(settings.slope_deg)
     below = math.ceil(_BELOW_M / (step * math.sin(foot)))
@@ -90,13 +90,13 @@ def profile_curve(settings: PileSettings, room: Room) -> FloatArray:
     return np.array(points)
 
 
-def _slope_rad(settings: PileSettings, height_m: float) -> float:
+def _slope_rad(settings: SimulatedPileSettings, height_m: float) -> float:
     share = min(max((height_m - settings.bend_m) / _BEND_OVER_M + 0.5, 0.0), 1.0)
     slope = settings.slope_deg + share * (settings.upper_slope_deg - settings.slope_deg)
     return math.radians(slope if height_m < settings.crest_m else min(slope, _TOP_DEG))
 
 
-def plan_offset(settings: PileSettings, lateral_m: FloatArray, half_width_m: float) -> FloatArray:
+def plan_offset(settings: SimulatedPileSettings, lateral_m: FloatArray, half_width_m: float) -> FloatArray:
     """Return how far behind the straight foot line the face stands (m) at lateral places: skew, bulge and lobe."""
     share = np.clip(lateral_m / half_width_m, -1.2, 1.2)
     skew = -math.tan(math.radians(settings.skew_deg)) * lateral_m
@@ -104,7 +104,7 @@ def plan_offset(settings: PileSettings, lateral_m: FloatArray, half_width_m: flo
     return skew - settings.bulge_m * (2.0 / 3.0 - share**2) - settings.lobe_m * lobe
 
 
-def _displacement(settings: PileSettings, shape: tuple[int, int], rng: np.random.Generator) -> FloatArray:
+def _displacement(settings: SimulatedPileSettings, shape: tuple[int, int], rng: np.random.Generator) -> FloatArray:
     """Return how far each vertex stands out along the normal (m), shape (T, Y), of mean zero."""
     up, across = (np.arange(count, dtype=np.float64) * settings.mesh_m for count in shape)
     waves_rng, rocks_rng = rng.spawn(2)
@@ -119,7 +119,7 @@ def _displacement(settings: PileSettings, shape: tuple[int, int], rng: np.random
     return out
 
 
-def _rocks(settings: PileSettings, shape: tuple[int, int], rng: np.random.Generator) -> FloatArray:
+def _rocks(settings: SimulatedPileSettings, shape: tuple[int, int], rng: np.random.Generator) -> FloatArray:
     """Return the height of the rocks over what they lie on (m), shape (T, Y): the highest of the domes at each place."""
     area = shape[0] * shape[1] * settings.mesh_m**2
     mean_area = 0.25 * math.pi * settings.d50_m**2 * math.exp(2 * _SPREAD**2)

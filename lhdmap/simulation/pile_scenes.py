@@ -10,7 +10,7 @@ import numpy as np
 from lhdmap.errors import UsageError
 from lhdmap.settings import nearest
 from lhdmap.simulation.pile_draws import between, normal, rounded, tilt_error
-from lhdmap.simulation.pile_sections import VARIANTS, MountingSettings, PileSettings
+from lhdmap.simulation.pile_sections import VARIANTS, MountingSettings, SimulatedPileSettings
 from lhdmap.simulation.pile_variants import SHAPES
 from lhdmap.simulation.scenario import DriftScenario
 from lhdmap.simulation.sections import DriftSettings, DriveSettings
@@ -53,7 +53,7 @@ def _common(variant: str, seed: int, rng: np.random.Generator) -> DriftScenario:
         standstill_s=between(rng, 0.5, 1.2),
     )
     slope = between(rng, 35.0, 55.0)
-    pile = PileSettings(
+    pile = SimulatedPileSettings(
         variant=variant,
         toe_m=toe_m,
         back_m=between(rng, 6.0, 10.0),

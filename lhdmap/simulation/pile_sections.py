@@ -30,7 +30,7 @@ STATUSES = ("loadable", "too_shallow", "wall", "hang_up", "none")
 
 
 @dataclass(frozen=True, slots=True)
-class PileSettings:
+class SimulatedPileSettings:
     """What the drift ends in: a face of rubble or rock, oversized and spilled rocks, things that stand in the way."""
 
     variant: str = setting("normal", choices=VARIANTS, source=ISSUE, doc="Name of the kind of scene.")

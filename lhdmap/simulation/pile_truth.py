@@ -43,7 +43,7 @@ class Bodies:
         spacing = world.scenario.drift.mesh_m
         first = int((pile.place_m - 12.0 - pile.settings.mouth_m) / spacing)
         drift = world.crossing.mesh(first, world.drift.ring_count() + 1)
-        self._walls = Surface(Mesh(pile.frame.from_map(drift.vertices_m), drift.triangles))
+        self._walls = Surface(Mesh(pile.frame.local(drift.vertices_m), drift.triangles))
         self._face = Surface(pile.face.mesh()) if pile.face is not None else None
 
     def to_walls(self, starts_m: FloatArray, direction: FloatArray) -> FloatArray:
@@ -89,8 +89,8 @@ def pile_truth(world: DriftWorld) -> PileTruth:
         plane.inclination_deg if plane is not None else math.nan,
         left,
         right,
-        frame.to_map(center),
-        frame.to_map(toe),
+        frame.map(center),
+        frame.map(toe),
         plane,
         frame.heading_rad,
         floor + float(frame.origin_m[2]),
@@ -229,5 +229,5 @@ def _boulder_truth(pile: Pile, index: int) -> BoulderTruth:
     depth = _cast(ahead, vertices - [3.0, 0.0, 0.0], _FORWARD) - 3.0  # how far the face is behind a vertex
     out = vertices[depth > 0.0]
     seen = out if len(out) >= 3 else vertices
-    to_map = pile.frame.to_map
+    to_map = pile.frame.map
     return BoulderTruth(to_map(boulder.middle_m), to_map(seen.mean(axis=0)), boulder.size_m, extent(seen))

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from lhdmap.simulation.pile_draws import between, normal, rounded, signed, tilt_error
-from lhdmap.simulation.pile_sections import MountingSettings, PileSettings
+from lhdmap.simulation.pile_sections import MountingSettings, SimulatedPileSettings
 from lhdmap.simulation.scenario import DriftScenario
 
 
@@ -161,8 +161,8 @@ def _piled(scenario: DriftScenario, **changes: Any) -> DriftScenario:
     return replace(scenario, pile=replace(_pile(scenario), **changes))
 
 
-def _pile(scenario: DriftScenario) -> PileSettings:
-    return scenario.pile if scenario.pile is not None else PileSettings()
+def _pile(scenario: DriftScenario) -> SimulatedPileSettings:
+    return scenario.pile if scenario.pile is not None else SimulatedPileSettings()
 
 
 SHAPES: dict[str, Callable[[DriftScenario, np.random.Generator], DriftScenario]] = {

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from lhdmap.extras import library
 from lhdmap.messages import Float32Array, FloatArray
 from lhdmap.simulation.drift import Mesh
 
@@ -19,7 +20,7 @@ class Surface:
     """A mesh to cast rays against; `origin_m` (3,) in `map` is near it, so that float32 coordinates stay exact."""
 
     def __init__(self, mesh: Mesh) -> None:
-        import open3d as o3d
+        o3d = library("open3d")
 
         self.origin_m: FloatArray = np.round(mesh.vertices_m.mean(axis=0))
         core: Any = o3d.core  # its stubs know no array

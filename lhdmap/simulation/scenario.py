@@ -10,7 +10,7 @@ from typing import Any
 from lhdmap.errors import ConfigError
 from lhdmap.settings import figure, read_toml, setting
 from lhdmap.settings_tree import part, tree_from, tree_toml
-from lhdmap.simulation.pile_sections import MountingSettings, PileSettings
+from lhdmap.simulation.pile_sections import MountingSettings, SimulatedPileSettings
 from lhdmap.simulation.sections import DriftSettings, DriveSettings
 from lhdmap.simulation.sensing.faults import FaultSettings
 from lhdmap.simulation.sensing.sections import (
@@ -51,7 +51,7 @@ class DriftScenario:
     pressures: PressureSettings = part(PressureSettings)
     cloud: CloudSettings = part(CloudSettings)
     faults: tuple[FaultSettings, ...] = part(tuple, key="fault")
-    pile: PileSettings | None = None
+    pile: SimulatedPileSettings | None = None
     mounting: MountingSettings | None = None
 
     @property

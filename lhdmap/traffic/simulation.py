@@ -67,6 +67,7 @@ class _Simulation:
         self._longest = self._waits = 0
 
     def run(self, hours: float) -> Shift:
+        """Return what the machines have hauled in so many hours, and how long they waited."""
         end_ns = round(hours * 3600 * SECOND_NS)
         for name in self._hauls:
             self._at(0, "ready", name)

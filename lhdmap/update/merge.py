@@ -10,7 +10,7 @@ import numpy.typing as npt
 from scipy.spatial import KDTree
 
 from lhdmap.geometry import se3
-from lhdmap.integration.cloud import Cloud
+from lhdmap.integration.cloud import GridCloud
 from lhdmap.messages import FloatArray
 from lhdmap.smoothing.smoother import Correction, corrected
 from lhdmap.topology.views import View
@@ -49,7 +49,7 @@ def moved_trajectory(trajectory: Trajectory, correction: Correction) -> Trajecto
     return trajectory_of(trajectory.stamps_ns, corrected(poses_of(trajectory), trajectory.stamps_ns, correction))
 
 
-def moved_cloud(cloud: Cloud, correction: Correction) -> Cloud:
+def moved_cloud(cloud: GridCloud, correction: Correction) -> GridCloud:
     """Return a drive's cloud in the map's frame: each point moves as the machine did when it was measured."""
     stamps = _stamps(cloud, correction)
     points = np.zeros((len(cloud.points_m), 6))
@@ -63,7 +63,7 @@ def moved_cloud(cloud: Cloud, correction: Correction) -> Cloud:
     return replace(cloud, points_m=moved[:, :3].astype(np.float32), normals=normals, viewpoints_m=None)
 
 
-def joined_clouds(known: Cloud, drive: Cloud, went_m: FloatArray, path: FloatArray) -> Cloud:
+def joined_clouds(known: GridCloud, drive: GridCloud, went_m: FloatArray, path: FloatArray) -> GridCloud:
     """Return the map's cloud without the walls that went (N, 2), and what the drive saw where it has no point.
 
     `path` (M, 4): of both drives; its heights tell floor and roof.
@@ -78,7 +78,7 @@ def joined_clouds(known: Cloud, drive: Cloud, went_m: FloatArray, path: FloatArr
     stamps = None
     if known.stamps_ns is not None and drive.stamps_ns is not None:
         stamps = np.concatenate([known.stamps_ns[kept], drive.stamps_ns[new]])
-    return Cloud(
+    return GridCloud(
         points_m=np.concatenate([known.points_m[kept], drive.points_m[new]]),
         normals=_both(known.normals, drive.normals, kept, new),
         curvature=_both(known.curvature, drive.curvature, kept, new),
@@ -86,7 +86,7 @@ def joined_clouds(known: Cloud, drive: Cloud, went_m: FloatArray, path: FloatArr
     )
 
 
-def _stamps(cloud: Cloud, correction: Correction) -> npt.NDArray[np.int64]:
+def _stamps(cloud: GridCloud, correction: Correction) -> npt.NDArray[np.int64]:
     if cloud.stamps_ns is not None:
         return cloud.stamps_ns
     return np.full(len(cloud.points_m), correction.times_ns[0], dtype=np.int64)

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-import importlib.util
 import json
+import sys
 from pathlib import Path
 
 import pytest
@@ -39,8 +39,10 @@ def test_wrong_usage(tmp_path: Path, more: list[str], code: int) -> None:
     assert not (tmp_path / "out").exists()
 
 
-@pytest.mark.skipif(importlib.util.find_spec("distributed") is not None, reason="dask.distributed is there")
-def test_a_cluster_without_dask_says_how_to_install_it(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_cluster_without_dask_says_how_to_install_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setitem(sys.modules, "distributed", None)
     (tmp_path / "m.csv").write_text("log\na.mcap\n", encoding="utf-8")
     assert main(["batch", str(tmp_path / "m.csv"), "--cluster", "tcp://127.0.0.1:1"]) == 2
     assert "pip install 'lhdmap[cluster]'" in capsys.readouterr().err

@@ -7,7 +7,10 @@ import math
 import numpy as np
 import pytest
 from lhdmap.errors import UsageError
+from lhdmap.evaluation.planar_segments import planar_segments
 from lhdmap.evaluation.trajectory import TrajectoryEvaluationSettings, evaluate_trajectory
+from lhdmap.geometry import se3
+from lhdmap.messages import FloatArray
 from lhdmap.trajectory import Trajectory
 
 from tests.evaluation.paths import arc, moved, part, straight, trajectory, wandering
@@ -143,3 +146,24 @@ def test_planar_comparison_leaves_height_roll_and_pitch_out() -> None:
 def test_options_without_meaning_are_refused(settings: TrajectoryEvaluationSettings) -> None:
     with pytest.raises(UsageError):
         evaluate_trajectory(straight(10.0), straight(10.0), settings)
+
+
+def test_planar_segments_are_those_of_space() -> None:
+    """The means of the errors as vectors are those of the evaluation, which goes by 3D poses and rotation matrices."""
+    estimate, truth = arc(30.0, 40.0, bias_rad_per_m=math.radians(0.02)), arc(30.0, 40.0)
+    found = planar_segments(_planar(estimate), _planar(truth))
+    ten = next(one for one in evaluate_trajectory(estimate, truth).segments if one.length_m == 10.0)
+    assert len(found.vectors) == pytest.approx(ten.n, rel=0.1)  # there a start is a row at least half a metre on
+    assert found.translation_pct == pytest.approx(ten.translation_pct, rel=0.01)  # there divided by the way driven
+    assert found.rotation_deg_per_m == pytest.approx(ten.rotation_deg_per_m, rel=0.01)
+    assert found.worst_pct >= found.translation_pct
+
+
+def test_a_path_shorter_than_a_planar_segment_is_refused() -> None:
+    with pytest.raises(UsageError, match=r"3\.0 m long: segments of 10 m"):
+        planar_segments(_planar(straight(3.0)), _planar(straight(3.0)))
+
+
+def _planar(one: Trajectory) -> FloatArray:
+    heading = se3.rpy_from_quaternions(one.quaternions_xyzw)[:, 2]
+    return np.column_stack([one.positions_m[:, :2], heading])

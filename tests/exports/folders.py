@@ -6,7 +6,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-from lhdmap.integration.cloud import Cloud
+from lhdmap.integration.cloud import GridCloud
 from lhdmap.integration.ply import write_ply
 from lhdmap.mapfolder import MapFolderWriter
 from lhdmap.messages import FloatArray
@@ -50,13 +50,13 @@ def sloping_ladder() -> TopologicalMap:
     return replace(ladder(), tunnels=(replace(tunnel, line_m=line), *ladder().tunnels[1:]), connections=connections)
 
 
-def cloud() -> Cloud:
+def cloud() -> GridCloud:
     rng = np.random.default_rng(1)
     points = rng.uniform((-10.0, -2.5, 0.0), (70.0, 2.5, 4.0), (500, 3)).astype(np.float32)
     normals = rng.normal(size=(500, 3))
     normals /= np.linalg.norm(normals, axis=1)[:, None]
     stamps = 1_600_000_000_123_456_789 + np.arange(500, dtype=np.int64)
-    return Cloud(points, normals.astype(np.float32), stamps_ns=stamps)
+    return GridCloud(points, normals.astype(np.float32), stamps_ns=stamps)
 
 
 def map_folder(

@@ -51,6 +51,14 @@ def test_cells_mean_what_they_meant(exported: Exporter) -> None:
     assert table["resolution"] == CELL_M
 
 
+def test_unknown_would_be_free_at_nav2_s_usual_threshold(exported: Exporter) -> None:
+    """(255 - 205) / 255 = 0.196 is below the 0.25 that map_saver writes: nav2 PR 5278."""
+    _, table = loaded(exported("occupancy", ".yaml"))
+    unknown = (255 - 205) / 255
+    assert table["free_thresh"] <= unknown < 0.25
+    assert table["free_thresh"] > (255 - 254) / 255
+
+
 def test_pixels_are_map_saver_s_and_the_top_row_is_north(exported: Exporter) -> None:
     cells = np.zeros((3, 4), np.uint8)
     cells[0, 0], cells[2, 3] = FREE, OCCUPIED

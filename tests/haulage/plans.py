@@ -93,8 +93,10 @@ def _way(a: str, b: str, places: dict[str, tuple[str, FloatArray]]) -> Connectio
 
 def _tunnel(one: dict[str, Any], places: dict[str, tuple[str, FloatArray]]) -> Tunnel:
     line = np.array([pose[:3] for node, pose in places.values() if node == one["name"]])
-    if len(line) < 2:
-        line = np.vstack([line, line + np.array([one["length_m"], 0.0, 0.0])])
     first, last = one["ends"]
+    if len(line) < 2:  # a dead end without a place: straight on, away from its intersection
+        heading = next(float(pose[3]) for node, pose in places.values() if node == one["name"])
+        far = line - one["length_m"] * np.array([math.cos(heading), math.sin(heading), 0.0])
+        line = np.vstack([far, line] if first == "dead_end" else [line, far])
     half = np.full((len(line), 2), 2.3)
     return Tunnel(one["name"], one["name"], (first, last), line, half, np.array([*line[0], 0.0]))

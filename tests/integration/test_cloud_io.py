@@ -11,7 +11,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from lhdmap.errors import InputError, LhdmapError, UsageError
-from lhdmap.integration.cloud import Cloud
+from lhdmap.integration.cloud import GridCloud
 from lhdmap.integration.cloud_io import read_cloud, write_cloud
 from lhdmap.integration.pcd import lzf_decompress
 
@@ -19,11 +19,11 @@ Scalar = TypeVar("Scalar", bound=np.generic)
 FIRST_NS = 1_757_580_000_123_456_789
 
 
-def some_cloud(n: int = 50) -> Cloud:
+def some_cloud(n: int = 50) -> GridCloud:
     rng = np.random.default_rng(0)
     normals = rng.normal(size=(n, 3))
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)
-    return Cloud(
+    return GridCloud(
         points_m=rng.uniform(-30, 30, (n, 3)).astype(np.float32),
         normals=normals.astype(np.float32),
         curvature=rng.uniform(0, 0.33, n).astype(np.float32),
@@ -38,7 +38,7 @@ def known(array: npt.NDArray[Scalar] | None) -> npt.NDArray[Scalar]:
     return array
 
 
-def assert_same(a: Cloud, b: Cloud) -> None:
+def assert_same(a: GridCloud, b: GridCloud) -> None:
     for name in ("points_m", "normals", "curvature", "stamps_ns", "hits"):
         one, other = getattr(a, name), getattr(b, name)
         assert (one is None) == (other is None), name
@@ -56,7 +56,7 @@ def test_everything_comes_back_to_the_last_bit(tmp_path: Path, suffix: str, n: i
 @pytest.mark.parametrize("suffix", [".ply", ".pcd", ".las", ".laz"])
 def test_a_cloud_of_points_alone_is_written_too(tmp_path: Path, suffix: str) -> None:
     path = tmp_path / f"cloud{suffix}"
-    bare = Cloud(some_cloud().points_m)
+    bare = GridCloud(some_cloud().points_m)
     write_cloud(path, bare)
     if suffix in (".ply", ".pcd"):
         assert_same(read_cloud(path), bare)

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from lhdmap.errors import InputError
 from lhdmap.geometry import se3
-from lhdmap.integration.cloud import Cloud
+from lhdmap.integration.cloud import GridCloud
 from lhdmap.integration.integrator import IntegrationSettings, Integrator
 from lhdmap.integration.project import SweepPoses
 from lhdmap.machine import Machine
@@ -49,13 +49,13 @@ def drive(integrator: Integrator, seconds: float = 1.2, noise_m: float = 0.0) ->
 
 
 @pytest.fixture(scope="module")
-def integrated() -> tuple[Integrator, Cloud]:
+def integrated() -> tuple[Integrator, GridCloud]:
     integrator = Integrator(IntegrationSettings(), MOUNTS, MACHINE)
     drive(integrator, noise_m=0.012)
     return integrator, integrator.cloud()
 
 
-def test_the_cloud_lies_on_the_wall(integrated: tuple[Integrator, Cloud]) -> None:
+def test_the_cloud_lies_on_the_wall(integrated: tuple[Integrator, GridCloud]) -> None:
     integrator, cloud = integrated
     distances = rooms.tube_distance(cloud.points_m.astype(float))
     assert len(cloud) > 1000
@@ -67,7 +67,7 @@ def test_the_cloud_lies_on_the_wall(integrated: tuple[Integrator, Cloud]) -> Non
     assert integrator.grid.hits == totals.kept
 
 
-def test_its_normals_point_into_the_tube(integrated: tuple[Integrator, Cloud]) -> None:
+def test_its_normals_point_into_the_tube(integrated: tuple[Integrator, GridCloud]) -> None:
     _, cloud = integrated
     assert cloud.normals is not None
     assert cloud.curvature is not None
@@ -79,7 +79,7 @@ def test_its_normals_point_into_the_tube(integrated: tuple[Integrator, Cloud]) -
     assert ((cloud.curvature >= 0.0) & (cloud.curvature <= 1 / 3 + 1e-6)).all()
 
 
-def test_stamps_are_those_of_the_beams(integrated: tuple[Integrator, Cloud]) -> None:
+def test_stamps_are_those_of_the_beams(integrated: tuple[Integrator, GridCloud]) -> None:
     _, cloud = integrated
     assert cloud.stamps_ns is not None
     assert cloud.stamps_ns.min() >= 0
@@ -87,7 +87,7 @@ def test_stamps_are_those_of_the_beams(integrated: tuple[Integrator, Cloud]) -> 
     assert (cloud.stamps_ns % 40_000_000 > 0).mean() > 0.9
 
 
-def test_two_runs_give_the_same_bytes(integrated: tuple[Integrator, Cloud]) -> None:
+def test_two_runs_give_the_same_bytes(integrated: tuple[Integrator, GridCloud]) -> None:
     _, first = integrated
     again = Integrator(IntegrationSettings(), MOUNTS, MACHINE)
     drive(again, noise_m=0.012)

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from lhdmap.errors import InputError
-from lhdmap.integration.cloud import Cloud
+from lhdmap.integration.cloud import GridCloud
 from lhdmap.integration.cloud_io import read_cloud, write_cloud
 
 from tests.integration.test_cloud_io import known, outcome, some_cloud
@@ -55,10 +55,10 @@ def test_coordinates_of_a_grid_keep_their_millimetres(suffix: str, kind: int, ve
 
 @pytest.mark.parametrize("suffix", [".ply", ".pcd"])
 def test_32_bit_floats_of_a_grid_are_refused_and_near_ones_stay_as_they_are(suffix: str, tmp_path: Path) -> None:
-    write_cloud(tmp_path / f"far{suffix}", Cloud((some_cloud().points_m + UTM_M).astype(np.float32)))
+    write_cloud(tmp_path / f"far{suffix}", GridCloud((some_cloud().points_m + UTM_M).astype(np.float32)))
     with pytest.raises(InputError, match="32-bit floats keep no millimetres"):
         read_cloud(tmp_path / f"far{suffix}")
-    near = Cloud((some_cloud().points_m + np.float32(50_000.0)).astype(np.float32))
+    near = GridCloud((some_cloud().points_m + np.float32(50_000.0)).astype(np.float32))
     write_cloud(tmp_path / f"near{suffix}", near)
     assert np.array_equal(read_cloud(tmp_path / f"near{suffix}").points_m, near.points_m)
 

@@ -8,10 +8,10 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 from lhdmap.errors import InputError
-from lhdmap.geometry import se3
+from lhdmap.geometry import articulated, se3
 from lhdmap.integration.beams import beam_table, scan_points, sweep_stamps_ns, table_of
-from lhdmap.integration.project import Counts, Limits, SweepPoints, SweepPoses, project_cloud, project_scan
-from lhdmap.integration.self_filter import Rig, base_to_rear, rear_to_base, rig_of, self_hits
+from lhdmap.integration.project import BeamCounts, Limits, SweepPoints, SweepPoses, project_cloud, project_scan
+from lhdmap.integration.self_filter import Rig, rig_of, self_hits
 from lhdmap.kinematics import T_base_rear
 from lhdmap.machine import BodyBox, Machine
 from lhdmap.messages import FloatArray, LaserScan, Mount, PointCloud
@@ -31,10 +31,10 @@ def no_angle(_: float) -> float:
     return 0.0
 
 
-def projected(scan: LaserScan, poses: SweepPoses, rig: Rig) -> tuple[FloatArray, Counts]:
+def projected(scan: LaserScan, poses: SweepPoses, rig: Rig) -> tuple[FloatArray, BeamCounts]:
     out = SweepPoints.of_size(len(scan.ranges_m))
     limits = Limits(scan.range_min_m, scan.range_max_m)
-    counts = Counts(*project_scan(scan.ranges_m, table_of(scan), limits, sweep_stamps_ns(scan), poses, rig, out))
+    counts = BeamCounts(*project_scan(scan.ranges_m, table_of(scan), limits, sweep_stamps_ns(scan), poses, rig, out))
     return out.points_map[: counts.kept], counts
 
 
@@ -86,8 +86,10 @@ def test_the_rear_body_is_where_the_kinematics_put_it(articulation: float) -> No
     machine = Machine()
     size = machine.dimensions
     lengths = (size.joint_to_front_axle_m, size.joint_to_rear_axle_m)
-    assert base_to_rear(articulation, *lengths) == pytest.approx(T_base_rear(articulation, machine), abs=1e-12)
-    product = base_to_rear(articulation, *lengths) @ rear_to_base(articulation, *lengths)
+    assert articulated.T_base_rear(articulation, *lengths) == pytest.approx(
+        T_base_rear(articulation, machine), abs=1e-12
+    )
+    product = articulated.T_base_rear(articulation, *lengths) @ articulated.T_rear_base(articulation, *lengths)
     assert product == pytest.approx(np.eye(4), abs=1e-12)
 
 
@@ -132,7 +134,7 @@ def test_both_bodies_are_filtered_and_nothing_else(articulation: float) -> None:
     out = SweepPoints.of_size(4000)
     rig = rig_of(mount, machine, 0.1)
     poses = SweepPoses(np.eye(4), np.eye(4), articulation, articulation)
-    counts = Counts(*project_cloud(cloud, np.zeros(0, np.float32), Limits(0.0, 50.0), (0, 0), poses, rig, out))
+    counts = BeamCounts(*project_cloud(cloud, np.zeros(0, np.float32), Limits(0.0, 50.0), (0, 0), poses, rig, out))
     assert counts.self_hits == int(inside.sum())
     assert out.points_map[: counts.kept] == pytest.approx(points_base[~inside], abs=1e-5)
     assert np.array_equal(self_hits(rig, points_sensor, articulation), inside)
@@ -175,7 +177,7 @@ def test_a_clouds_points_are_compensated_by_their_own_times() -> None:
     rig = rig_of(Mount(0, "base_link", "s", np.eye(4)), BARE, 0.0)
     poses = rooms.ends(turning, no_angle, 0.5 + first, last - first)
     out = SweepPoints.of_size(500)
-    counts = Counts(*project_cloud(cloud, times, Limits(0.0, 50.0), (700, 1_700), poses, rig, out))
+    counts = BeamCounts(*project_cloud(cloud, times, Limits(0.0, 50.0), (700, 1_700), poses, rig, out))
     assert counts.kept == 500
     assert np.abs(out.points_map - targets).max() < 2e-3  # roll, pitch and yaw together do not turn about one axis
     assert np.array_equal(out.stamps_ns, 700 + np.round((times - first) / (last - first) * 1000))

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from lhdmap.landmarks.build import node_surface
 from lhdmap.landmarks.distinct import APART_M, gaps, not_distinctive
-from lhdmap.landmarks.profile import Profile, line_pose, profile_of
+from lhdmap.landmarks.profile import WallProfile, line_pose, profile_of
 from lhdmap.landmarks.settings import LandmarkSettings
 from lhdmap.messages import FloatArray
 
@@ -18,14 +18,14 @@ from tests.landmarks.worlds import HALF_WIDTH_M, ROUGH, SMOOTH, drive, tunnel
 SETTINGS = LandmarkSettings()
 
 
-def made(left: FloatArray, right: FloatArray) -> Profile:
+def made(left: FloatArray, right: FloatArray) -> WallProfile:
     """Return a straight profile with these walls."""
     n = len(left)
     at = (SETTINGS.profile_m * np.arange(n)).astype(np.float32)
     line = np.column_stack([at, np.zeros(n)]).astype(np.float32)
     var = np.full(n, 0.004**2, np.float32)
     walls = (left.astype(np.float32), right.astype(np.float32))
-    return Profile(at, line, np.zeros(n, np.float32), *walls, var, var, np.full(n, np.inf, np.float32))
+    return WallProfile(at, line, np.zeros(n, np.float32), *walls, var, var, np.full(n, np.inf, np.float32))
 
 
 def wall(seed: int, n: int, rms_m: float) -> FloatArray:
@@ -74,7 +74,7 @@ def test_it_does_not_matter_where_in_the_tunnel_one_drives(bent: Taught) -> None
     assert np.nanmedian(difference) < 0.02
 
 
-def plainly(profile: Profile, window: int) -> FloatArray:
+def plainly(profile: WallProfile, window: int) -> FloatArray:
     """Return the gap of each window by trying each place, both ways; the two walls alone."""
     n = len(profile.at_m)
     walls = np.stack([profile.left_m, profile.right_m]).astype(float)

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from lhdmap.geometry import se2
 from lhdmap.landmarks.icp import align
-from lhdmap.landmarks.scans import Cloud, along_tunnel
+from lhdmap.landmarks.scans import NodeCloud, along_tunnel
 from lhdmap.landmarks.settings import LandmarkSettings
 from lhdmap.landmarks.similarity import icp_model, similarity
 from lhdmap.landmarks.target import prepare
@@ -20,7 +20,7 @@ from tests.landmarks.worlds import drive
 SETTINGS = LandmarkSettings()
 
 
-def clouds_of(taught: Taught) -> list[Cloud]:
+def clouds_of(taught: Taught) -> list[NodeCloud]:
     return along_tunnel(taught.scans, taught.world.frame(), SETTINGS)
 
 

@@ -12,7 +12,7 @@ from lhdmap.landmarks.build import landmarks_of
 from lhdmap.landmarks.scans import NodeScan
 from lhdmap.landmarks.settings import LandmarkSettings
 from lhdmap.messages import FloatArray, LaserScan, Message, Mount
-from lhdmap.pipeline.localize import KnownMap
+from lhdmap.pipeline.known_map import KnownMap
 from lhdmap.simulation.planar import (
     PlanarScanner,
     PlanarWorld,

@@ -8,14 +8,14 @@ import numpy as np
 import pytest
 from lhdmap.localization.agreement import Agreement
 from lhdmap.messages import FloatArray
-from lhdmap.proprioception.wheels import Motion
+from lhdmap.proprioception.wheels import WheelMotion
 
 STEP_NS = 80_000_000
 SPEED_MPS = 3.0
 
 
-def motion(way_m: float, turn_rad: float = 0.0, source: str = "articulated") -> Motion:
-    return Motion(np.array([way_m, 0.0, turn_rad]), np.eye(3) * 1e-6, source)  # type: ignore[arg-type]
+def motion(way_m: float, turn_rad: float = 0.0, source: str = "articulated") -> WheelMotion:
+    return WheelMotion(np.array([way_m, 0.0, turn_rad]), np.eye(3) * 1e-6, source)  # type: ignore[arg-type]
 
 
 def told(

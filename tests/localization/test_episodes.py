@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from lhdmap.localization.episodes import episodes
-from lhdmap.localization.rows import CANDIDATE, LOST, NOWHERE, TRACKING, UNKNOWN, Row
+from lhdmap.localization.rows import CANDIDATE, LOST, NOWHERE, TRACKING, UNKNOWN, LocalizationRow
 
 TENTH_NS = 100_000_000
 
 
-def rows(*parts: tuple[str, int, float]) -> list[Row]:
+def rows(*parts: tuple[str, int, float]) -> list[LocalizationRow]:
     """Rows of a status, so many, with a deviation along."""
-    out: list[Row] = []
+    out: list[LocalizationRow] = []
     for status, count, along in parts:
         for _ in range(count):
             placed = status != UNKNOWN

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 from lhdmap.geometry import se2
-from lhdmap.localization.fixed_lag import Belief, FixedLag, Placed, Step
+from lhdmap.localization.fixed_lag import Belief, FixedLag, LagPlaced, LagStep
 from lhdmap.messages import FloatArray
 
 STEP_M = 0.1
@@ -20,7 +20,9 @@ def _turned(P: FloatArray, heading_rad: float) -> FloatArray:
     return np.asarray(R @ P @ R.T, dtype=float)
 
 
-def _run(seed: int, wrong: range = range(0), turned: bool = False) -> tuple[FloatArray, FloatArray, dict[int, Placed]]:
+def _run(
+    seed: int, wrong: range = range(0), turned: bool = False
+) -> tuple[FloatArray, FloatArray, dict[int, LagPlaced]]:
     """Filter and smooth a drive of 60 m with odometry and scans that see the map; return truth, filtered, smoothed."""
     rng = np.random.default_rng(seed)
     lag, true, odometry = FixedLag(), np.zeros(3), np.array([5.0, -3.0, 1.0])
@@ -46,7 +48,7 @@ def _run(seed: int, wrong: range = range(0), turned: bool = False) -> tuple[Floa
             after = Belief(before.pose + P @ np.linalg.solve(R, z - before.pose), P)
         belief = after
         turn = float(step[2]) if turned else None
-        for one in lag.take(Step(k, odometry, noise, turn), before, after):
+        for one in lag.take(LagStep(k, odometry, noise, turn), before, after):
             out[one.row] = one
         truths.append(true)
         filtered.append(belief.pose)
@@ -55,7 +57,7 @@ def _run(seed: int, wrong: range = range(0), turned: bool = False) -> tuple[Floa
     return np.array(truths), np.array(filtered), out
 
 
-def _errors(truth: FloatArray, found: dict[int, Placed]) -> FloatArray:
+def _errors(truth: FloatArray, found: dict[int, LagPlaced]) -> FloatArray:
     return np.array([se2.between(truth[row], one.pose) for row, one in sorted(found.items())])
 
 

@@ -14,9 +14,10 @@ from lhdmap.geometry import se2
 from lhdmap.landmarks.build import landmarks_of
 from lhdmap.landmarks.scans import NodeScan
 from lhdmap.landmarks.settings import LandmarkSettings
-from lhdmap.localization.rows import TRACKING, Row
+from lhdmap.localization.rows import TRACKING, LocalizationRow
 from lhdmap.messages import FloatArray, Message, Mount
-from lhdmap.pipeline.localize import KnownMap, Localizer
+from lhdmap.pipeline.known_map import KnownMap
+from lhdmap.pipeline.localize import Localizer
 from lhdmap.simulation.planar import PlanarScanner, simulate_scans
 from lhdmap.topology.model import DEAD_END, AccessPoint, Intersection, TopologicalMap, Tunnel
 
@@ -81,7 +82,7 @@ def _tunnel(name: str, line: FloatArray, ends: tuple[str, str]) -> Tunnel:
 class Passed(NamedTuple):
     """A drive: rows, true poses (N, 3), where along the drift (N,)."""
 
-    rows: list[Row]
+    rows: list[LocalizationRow]
     poses: FloatArray
     way_m: FloatArray
 
@@ -188,7 +189,7 @@ def test_a_row_is_the_same_whichever_name_the_nodes_have() -> None:
         assert math.hypot(one.x_m - other.x_m, one.y_m - other.y_m) < 0.01
 
 
-def _in_one_piece() -> list[Row]:
+def _in_one_piece() -> list[LocalizationRow]:
     drive = passed(FORTH)
     scans = simulate_scans(known.world(), drive.poses, PlanarScanner(), RATE_HZ, 3)
     messages: list[tuple[str, Message]] = [("front", scan) for scan in scans]

@@ -9,9 +9,10 @@ import numpy as np
 import pytest
 from lhdmap.config import Settings
 from lhdmap.geometry import se2
-from lhdmap.localization.rows import CANDIDATE, LOST, TRACKING, UNKNOWN, Row
+from lhdmap.localization.rows import CANDIDATE, LOST, TRACKING, UNKNOWN, LocalizationRow
 from lhdmap.messages import FloatArray
-from lhdmap.pipeline.localize import Localizer, Where
+from lhdmap.pipeline.localize import Localizer
+from lhdmap.pipeline.localizer_says import Where
 
 from tests.localization import known
 from tests.settings.streams import RATE_HZ
@@ -21,7 +22,7 @@ class Ran(NamedTuple):
     """A localizer that has taken a whole drive, its rows, the true poses, and what it said while it ran."""
 
     localizer: Localizer
-    rows: list[Row]
+    rows: list[LocalizationRow]
     poses: FloatArray
     now: list[tuple[int, Where]]
 

@@ -15,7 +15,7 @@ from lhdmap.localization.paper import PaperTracker
 from lhdmap.localization.paper_nodes import PaperNodes
 from lhdmap.localization.place_on_map import Placer
 from lhdmap.localization.settings import LocalizationSettings
-from lhdmap.localization.tracker import Tracker
+from lhdmap.localization.tracker import MapTracker
 from lhdmap.localization.walls import MapWalls
 from lhdmap.messages import FloatArray
 from lhdmap.pipeline.localize import Localizer
@@ -26,7 +26,7 @@ from tests.localization import known
 def tracker_at(way_m: float, *, turned: bool = False, off_m: float = 0.0) -> PaperTracker:
     here = known.known_map()
     pose = known.poses_at(np.array([way_m]))[0] + np.array([off_m, 0.0, np.pi if turned else 0.0])
-    start = Tracker(
+    start = MapTracker(
         MapWalls(here.topology, here.landmarks), LocalizationSettings(), pose, np.diag([0.04] * 2 + [1e-3]), 0.0
     )
     return PaperTracker(PaperNodes(here.topology, here.landmarks, LandmarkSettings()), Placer(here.topology), start)

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pyarrow.parquet as pq
-from lhdmap.localization.rows import NOWHERE, TRACKING, UNKNOWN, Row, columns
+from lhdmap.localization.rows import NOWHERE, TRACKING, UNKNOWN, LocalizationRow, columns
 from lhdmap.runfolder import RunFolderWriter
 
 CONTRACT = {
@@ -28,7 +28,7 @@ def test_names_and_types_of_the_file(tmp_path: Path) -> None:
         path = folder.write_table("localization.parquet", columns([NOWHERE, SOMEWHERE]))
         table = pq.read_table(path)
     assert {field.name: str(field.type) for field in table.schema} == CONTRACT
-    assert table.column_names == list(Row._fields)
+    assert table.column_names == list(LocalizationRow._fields)
     assert table["stamp_ns"].to_pylist() == [0, 2**60 + 1]
     assert table["node"].to_pylist() == ["", "t1"]
     assert table["x_m"][1].as_py() == 1.5

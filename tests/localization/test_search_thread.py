@@ -7,12 +7,12 @@ from types import SimpleNamespace
 from typing import cast
 
 import numpy as np
-from lhdmap.localization.recent_way import Window
+from lhdmap.localization.recent_way import RecentWindow
 from lhdmap.localization.search import FIND, GlobalSearch, Question, Search
 from lhdmap.localization.search_thread import SearchThread
 
 _NONE = np.zeros((0, 2))
-WINDOW = Window(_NONE, np.zeros(0), _NONE, (np.zeros(3), np.zeros(3)), 0.0)
+WINDOW = RecentWindow(_NONE, np.zeros(0), _NONE, (np.zeros(3), np.zeros(3)), 0.0)
 DUE_NS = 200_000_000
 
 

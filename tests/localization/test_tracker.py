@@ -10,7 +10,7 @@ import pytest
 from lhdmap.geometry import se2
 from lhdmap.localization.method import Corrected
 from lhdmap.localization.settings import LocalizationSettings
-from lhdmap.localization.tracker import Tracker
+from lhdmap.localization.tracker import MapTracker
 from lhdmap.localization.walls import MapWalls
 from lhdmap.messages import FloatArray
 
@@ -39,8 +39,8 @@ class Driven:
         before = self.world.pose(8.0)
         start = se2.compose(before, np.zeros(3) if off is None else off)
         P = np.diag(START_STD**2)
-        self.tracker = Tracker(walls, LocalizationSettings(), start, P, 0.0)
-        self.blind = Tracker(walls, LocalizationSettings(), start, P, 0.0)
+        self.tracker = MapTracker(walls, LocalizationSettings(), start, P, 0.0)
+        self.blind = MapTracker(walls, LocalizationSettings(), start, P, 0.0)
         errors: list[FloatArray] = []
         self.said: list[Corrected] = []
         for at in np.arange(8.0 + STEP_M, 38.0, STEP_M):
@@ -93,7 +93,7 @@ def test_what_is_not_observed_keeps_the_predictions_variance() -> None:
 def test_perfectly_straight_walls_say_nothing_of_along() -> None:
     """Hits of two lines without any roughness: along them the prediction holds, in pose and in variance."""
     walls = straight_walls(40.0, 2.2)
-    tracker = Tracker(walls, LocalizationSettings(), np.array([20.0, 0.05, 0.0]), np.diag([0.04, 0.04, 1e-3]), 0.0)
+    tracker = MapTracker(walls, LocalizationSettings(), np.array([20.0, 0.05, 0.0]), np.diag([0.04, 0.04, 1e-3]), 0.0)
     x = np.arange(-9.0, 9.0, 0.1)
     points = np.concatenate([np.column_stack([x, np.full(len(x), side * 2.2)]) for side in (1.0, -1.0)])
     for _ in range(10):
@@ -105,7 +105,7 @@ def test_perfectly_straight_walls_say_nothing_of_along() -> None:
 
 def test_without_walls_the_prediction_stays() -> None:
     _, walls = mapped(ROUGH)
-    tracker = Tracker(walls, LocalizationSettings(), np.array([0.0, 900.0, 0.0]), np.eye(3), 0.0)
+    tracker = MapTracker(walls, LocalizationSettings(), np.array([0.0, 900.0, 0.0]), np.eye(3), 0.0)
     said = tracker.correct(np.array([[x, 2.0] for x in np.arange(0.0, 5.0, 0.1)]), 50, walls.quality(""))
     assert said.support == 0.0
     assert tracker.pose == pytest.approx([0.0, 900.0, 0.0])
@@ -116,7 +116,7 @@ def test_a_step_is_carried_on_with_its_covariance() -> None:
     """An uncertain heading becomes an uncertain place across, after a way of 10 m: by hand."""
     _, walls = mapped(ROUGH)
     heading_std = math.radians(1.0)
-    tracker = Tracker(
+    tracker = MapTracker(
         walls, LocalizationSettings(), np.array([1.0, 2.0, 0.5 * math.pi]), np.diag([0, 0, heading_std**2]), 0.0
     )
     tracker.predict(np.array([10.0, 0.0, 0.0]), np.zeros((3, 3)))

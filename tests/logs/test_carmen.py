@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 from lhdmap.errors import InputError
 from lhdmap.logs import LogSource, open_log
-from lhdmap.logs.carmen_lines import flaser, robotlaser, stamp_of
-from lhdmap.logs.carmen_survey import no_return_limit
-from lhdmap.logs.health import examine
+from lhdmap.logs.doctor.health import examine
+from lhdmap.logs.text.carmen_lines import flaser, robotlaser, stamp_of
+from lhdmap.logs.text.carmen_survey import no_return_limit
 from lhdmap.messages import GroundTruth, LaserScan, Mount, WheelPose
 
 

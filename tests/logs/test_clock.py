@@ -9,9 +9,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 from lhdmap.errors import LhdmapError
-from lhdmap.logs.blocks import Block, Loaded
+from lhdmap.logs.blocks import ChunkBlock, Loaded
+from lhdmap.logs.doctor.health import examine
 from lhdmap.logs.formats import open_log
-from lhdmap.logs.health import examine
 from lhdmap.logs.order import clock_was_set_back
 from lhdmap.logs.ros_messages import serialized
 from lhdmap.logs.source import LogSource
@@ -170,10 +170,10 @@ def test_a_clock_set_back_is_told_from_a_file_out_of_order(pieces: list[range], 
 def test_blocks_are_read_ahead_only_where_they_run_back() -> None:
     from lhdmap.logs.blocks import set_back
 
-    def load(_: Block) -> Loaded:
+    def load(_: ChunkBlock) -> Loaded:
         raise LhdmapError("read")
 
-    listed = [Block(k, 1, 1, "", 0, 10**9 * k, 10**9 * (k + 1)) for k in range(9)]
+    listed = [ChunkBlock(k, 1, 1, "", 0, 10**9 * k, 10**9 * (k + 1)) for k in range(9)]
     assert not set_back(listed, load)
     with pytest.raises(LhdmapError):
         set_back(listed[::-1], load)

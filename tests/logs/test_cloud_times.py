@@ -11,7 +11,7 @@ import numpy.typing as npt
 import pytest
 from lhdmap.logs import LogSource, open_log
 from lhdmap.logs.cloud_times import CloudTimes
-from lhdmap.logs.health import examine
+from lhdmap.logs.doctor.health import examine
 from lhdmap.messages import PointCloud
 from lhdmap.pipeline.sweep_times import SweepTimes
 from mcap.writer import Writer

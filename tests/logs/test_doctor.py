@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 import pytest
 from lhdmap.cli.main import main
-from lhdmap.logs.finding import Severity
-from lhdmap.logs.health import Examination, Verdict, examine
+from lhdmap.logs.doctor.finding import Severity
+from lhdmap.logs.doctor.health import Examination, LogVerdict, examine
 from lhdmap.logs.writer import LogWriter
 from lhdmap.messages import Inclination, LaserScan, Message, Mount, Tachometer
 
@@ -52,7 +52,7 @@ def test_a_healthy_log(tmp_path: Path) -> None:
         others.append(("/inclinometer", Inclination(stamp, "front", 0.001 * i, 0.0, None, np.array([0, 0, 9.8]))))
         others.append(("/machine/tachometer", Tachometer(stamp, 0.01 * i)))
     outcome = examine(_write(tmp_path / "log.mcap", _drive(), others))
-    assert outcome.verdict is Verdict.USABLE, outcome.findings
+    assert outcome.verdict is LogVerdict.USABLE, outcome.findings
     assert outcome.inventory is not None
     assert outcome.inventory.topics[FRONT].rate_hz == pytest.approx(50.0)
 
@@ -115,7 +115,7 @@ def test_each_defect_is_found(tmp_path: Path, name: str) -> None:
     change, severity, text = DEFECTS[name]
     outcome = examine(_write(tmp_path / "log.mcap", [change(i, scan) for i, scan in enumerate(_drive())]))
     assert text in _texts(outcome, severity), outcome.findings
-    wanted = Verdict.UNUSABLE if severity is Severity.FATAL else Verdict.REMARKS
+    wanted = LogVerdict.UNUSABLE if severity is Severity.FATAL else LogVerdict.REMARKS
     assert outcome.verdict is wanted
 
 
@@ -203,7 +203,7 @@ TRAPS = {
 @pytest.mark.parametrize("name", TRAPS)
 def test_traps_of_the_real_recordings(shared_data: Path, name: str) -> None:
     outcome = examine(shared_data / name)
-    assert outcome.verdict is Verdict.REMARKS
+    assert outcome.verdict is LogVerdict.REMARKS
     for text in TRAPS[name]:
         assert text in _texts(outcome)
 

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from lhdmap.logs import blocks, open_log
-from lhdmap.logs.blocks import Block, Loaded, in_time_order
+from lhdmap.logs.blocks import ChunkBlock, Loaded, in_time_order
 from lhdmap.logs.ros_messages import definition, serialized
 from lhdmap.messages import Tachometer, Text
 from mcap.writer import CompressionType, IndexType, Writer
@@ -69,11 +69,11 @@ def test_messages_of_one_time_keep_the_order_of_the_file(tmp_path: Path) -> None
 @given(st.lists(st.lists(st.integers(0, 60), max_size=8), max_size=8))
 def test_blocks_that_overlap_in_any_way_are_merged(times_of_blocks: list[list[int]]) -> None:
     content = {
-        Block(i, 1, 1, "", 0, min(times, default=0), max(times, default=0)): times
+        ChunkBlock(i, 1, 1, "", 0, min(times, default=0), max(times, default=0)): times
         for i, times in enumerate(times_of_blocks)
     }
 
-    def load(block: Block) -> Loaded:
+    def load(block: ChunkBlock) -> Loaded:
         return Loaded(b"x", [(time_ns, block.offset, 0, 1) for time_ns in content[block]])
 
     got = [(time_ns, channel) for time_ns, channel, _ in in_time_order(list(content), load)]
@@ -83,9 +83,9 @@ def test_blocks_that_overlap_in_any_way_are_merged(times_of_blocks: list[list[in
 
 def test_blocks_are_loaded_only_when_their_time_comes() -> None:
     loaded: list[int] = []
-    listed = [Block(i, 1, 1, "", 0, 100 * i, 100 * i + 150) for i in range(50)]  # each overlaps the next one
+    listed = [ChunkBlock(i, 1, 1, "", 0, 100 * i, 100 * i + 150) for i in range(50)]  # each overlaps the next one
 
-    def load(block: Block) -> Loaded:
+    def load(block: ChunkBlock) -> Loaded:
         loaded.append(block.offset)
         return Loaded(b"x", [(block.start_ns, 0, 0, 1), (block.end_ns, 0, 0, 1)])
 

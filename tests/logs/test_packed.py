@@ -17,7 +17,7 @@ import pytest
 import zstandard
 from lhdmap.errors import InputError
 from lhdmap.logs import LogSource, open_log
-from lhdmap.logs.health import Verdict, examine
+from lhdmap.logs.doctor.health import LogVerdict, examine
 from mcap.writer import CompressionType
 from tools.fuzz_logs import write_bag, write_db3, write_mcap
 
@@ -91,7 +91,7 @@ def test_a_packed_log_that_is_cut_gives_what_comes_before(tmp_path: Path, room: 
         got = _stamps(packed)
         assert got == _stamps(whole)[: len(got)]
         assert len(got) > 50
-        assert examine(packed).verdict is Verdict.REMARKS
+        assert examine(packed).verdict is LogVerdict.REMARKS
     assert list(room.iterdir()) == []
 
 

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from lhdmap.cli.main import main
 from lhdmap.geometry import se3
-from lhdmap.logs.health import Verdict, examine
+from lhdmap.logs.doctor.health import LogVerdict, examine
 from lhdmap.logs.source import LogSource
 from lhdmap.logs.writer import LogWriter
 from lhdmap.messages import Inclination, Joints, LaserScan, Message, Mount, Tachometer, WheelPose
@@ -57,7 +57,7 @@ def test_scans_that_are_stated_wrongly_are_put_right_and_told(tmp_path: Path, na
     change, told = MEANT[name]
     log = drives.write(tmp_path / "log.mcap", change)
     outcome = examine(log)
-    assert outcome.verdict is Verdict.REMARKS
+    assert outcome.verdict is LogVerdict.REMARKS
     assert any(told in finding.text for finding in outcome.findings), outcome.findings
     found = build_map(BuildRequest([log], tmp_path / "map"))
     assert drives.along_error_m(found.trajectory.positions_m) < 0.05

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from lhdmap.logs import LogSource, open_log
 from lhdmap.logs.base import TopicInfo
-from lhdmap.logs.health import Verdict, examine
+from lhdmap.logs.doctor.health import LogVerdict, examine
 from lhdmap.logs.kinds import of_one_type
 from lhdmap.logs.ros_messages import definition, serialized
 from lhdmap.messages import LaserScan, Message, Text
@@ -86,7 +86,7 @@ def test_the_scans_of_a_topic_that_also_holds_texts(
         assert {type(record.message) for record in reader.records()} == {LaserScan}
         assert reader.stated_end_rad("/scan") == pytest.approx(-1.57 + 180 * 0.0174)
     outcome = examine(path)
-    assert outcome.verdict is not Verdict.UNUSABLE
+    assert outcome.verdict is not LogVerdict.UNUSABLE
     assert any(told in finding.text for finding in outcome.findings)
 
 

@@ -7,8 +7,9 @@ from typing import NamedTuple
 import numpy as np
 from lhdmap.geometry import se3
 from lhdmap.messages import FloatArray, PointCloud
-from lhdmap.odometry.cloud_motion import CloudPrior
-from lhdmap.odometry.cloud_odometry import CloudOdometry, CloudStep
+from lhdmap.odometry.cloud.motion import CloudPrior
+from lhdmap.odometry.cloud.odometry import CloudOdometry
+from lhdmap.odometry.cloud.steps import CloudStep
 from lhdmap.simulation.history import START_NS
 from lhdmap.simulation.scenario import DriftScenario
 from lhdmap.simulation.sections import DriftSettings, DriveSettings

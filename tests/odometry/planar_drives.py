@@ -7,6 +7,7 @@ import math
 from typing import NamedTuple
 
 import numpy as np
+from lhdmap.evaluation.planar_segments import SegmentErrors, planar_segments
 from lhdmap.geometry import se2
 from lhdmap.messages import FloatArray, LaserScan
 from lhdmap.odometry.planar import PlanarOdometry
@@ -37,6 +38,9 @@ class Driven(NamedTuple):
     @property
     def distance_m(self) -> FloatArray:
         return np.hypot(self.errors[:, 0], self.errors[:, 1])
+
+    def segments(self, length_m: float = 10.0) -> SegmentErrors:
+        return planar_segments(self.estimate, self.truth, length_m)
 
 
 @functools.lru_cache(maxsize=4)
@@ -71,18 +75,6 @@ def run(scans: tuple[LaserScan, ...], truth: FloatArray, method: str = "anchored
 
     odometry = make(starting_velocity(make, inputs[:WARM_SCANS]))
     steps = [odometry.update(*one) for one in inputs]
-    move = se2.compose(truth[0], se2.inverse(steps[0].T_odom_base))
-    estimate = np.array([se2.compose(move, step.T_odom_base) for step in steps])
+    move = se2.compose(truth[0], se2.inverse(steps[0].pose_odom_base))
+    estimate = np.array([se2.compose(move, step.pose_odom_base) for step in steps])
     return Driven(estimate, truth, steps)
-
-
-def segment_errors_pct(driven: Driven, length_m: float = 10.0) -> FloatArray:
-    """Return the translation errors of all segments of a length, per cent, shape (M,)."""
-    s = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(driven.truth[:, :2], axis=0).T))])
-    ends = np.searchsorted(s, s + length_m)
-    pairs = [(i, j) for i, j in enumerate(ends) if j < len(s)][::3]
-    errors = [
-        se2.between(se2.between(driven.truth[i], driven.truth[j]), se2.between(driven.estimate[i], driven.estimate[j]))
-        for i, j in pairs
-    ]
-    return np.hypot(*np.array(errors)[:, :2].T) / length_m * 100.0

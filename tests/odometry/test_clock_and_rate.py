@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from lhdmap.odometry.clock import ScanClock
-from lhdmap.odometry.planar import AdaptiveRate
+from lhdmap.odometry.rate import AdaptiveRate
 from lhdmap.odometry.settings import OdometrySettings
 
 START_NS = 1_758_000_000_000_000_000

@@ -11,11 +11,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 from lhdmap.geometry import se3
+from lhdmap.geometry.twist import exp, log
 from lhdmap.messages import Float32Array, FloatArray, PointCloud
-from lhdmap.odometry.cloud_motion import CloudPrior, exp, log
-from lhdmap.odometry.cloud_odometry import CloudOdometry, CloudStep, marginal_information
-from lhdmap.odometry.cloud_settings import CloudOdometrySettings
-from lhdmap.odometry.cloud_sweep import Sweep, sweep_of
+from lhdmap.odometry.cloud.motion import CloudPrior
+from lhdmap.odometry.cloud.odometry import CloudOdometry
+from lhdmap.odometry.cloud.settings import CloudOdometrySettings
+from lhdmap.odometry.cloud.steps import CloudStep, marginal_information
+from lhdmap.odometry.cloud.sweep import CloudSweep, sweep_of
 from lhdmap.simulation.sections import DriftSettings
 
 from tests.odometry.cloud_drives import (
@@ -297,7 +299,7 @@ def test_log_of_half_a_turn() -> None:
 @given(TWISTS.map(lambda twist: twist * [0.4, 0.4, 0.4, 6.0, 6.0, 6.0]), st.floats(-0.06, 0.06))
 def test_sweep_is_undone_by_the_motion(twist: FloatArray, time_s: float) -> None:
     points = np.array([[20.0, 5.0, 1.0], [-3.0, 10.0, 2.0], [0.0, 0.0, 0.0]])
-    undone = Sweep(points, np.full(3, time_s)).undone(twist)
+    undone = CloudSweep(points, np.full(3, time_s)).undone(twist)
     T = exp(time_s * twist)
     np.testing.assert_allclose(undone, points @ T[:3, :3].T + T[:3, 3], atol=1.5e-3)
 

@@ -1,4 +1,4 @@
-"""A slow scanner among people, with wheels: what the wheels foretell is not given up for a chance match."""
+"""A slow scanner among people, with wheels: what the wheels predict is not given up for a chance match."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ def run(scans: list[LaserScan], steps: list[WheelStep | None]) -> list[OdometryS
 
 def errors(found: list[OdometryStep], poses: FloatArray) -> FloatArray:
     """Return the error of each pose relative to the first, shape (N, 3)."""
-    own = [se2.between(found[0].T_odom_base, step.T_odom_base) for step in found]
+    own = [se2.between(found[0].pose_odom_base, step.pose_odom_base) for step in found]
     true = [se2.between(poses[0], pose) for pose in poses]
     return np.array([se2.between(a, b) for a, b in zip(true, own, strict=True)])
 
@@ -72,7 +72,7 @@ def test_a_crowd_does_not_carry_the_pose_away() -> None:
     """Three quarters of the beams hidden over 9 m, other people in each scan: without the wheels' word it ended 6 to 10 m off."""
     poses, scans = drive()
     ends, turns = [], []
-    for seed in range(8):
+    for seed in range(5):
         rng = np.random.default_rng(seed)
         mixed = [crowded(scan, rng, 0.75) if 15 <= k < 45 else scan for k, scan in enumerate(scans)]
         off = errors(run(mixed, wheels(poses, rng)), poses)

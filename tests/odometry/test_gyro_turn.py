@@ -6,18 +6,18 @@ import math
 
 import numpy as np
 import pytest
-from lhdmap.odometry.gyro_turn import GyroTurn
-from lhdmap.odometry.motion import Motion
+from lhdmap.odometry.motion import PlanarMotion
 from lhdmap.odometry.settings import OdometrySettings
+from lhdmap.odometry.wheels.gyro import GyroTurn
 
 DT_S = 0.04
 
 
 def _drive(
     factor: float = 1.0, bias_dps: float = 0.2, seconds: float = 60.0, frozen: bool = False
-) -> tuple[GyroTurn, Motion]:
+) -> tuple[GyroTurn, PlanarMotion]:
     """Drive through bends that walls see; the gyroscope turns `factor` times as far, with a bias."""
-    motion = Motion(OdometrySettings())
+    motion = PlanarMotion(OdometrySettings())
     gyro, pose = GyroTurn(motion), np.zeros(3)
     for k in range(round(seconds / DT_S)):
         turn = (0.25 * math.sin(0.3 * k * DT_S)) * DT_S

@@ -1,4 +1,4 @@
-"""Jumps: what the motion did not foretell is found all around; a pose that wheels speak against must be far better."""
+"""Jumps: what the motion did not predict is found all around; a pose that wheels speak against must be far better."""
 
 from __future__ import annotations
 
@@ -8,10 +8,10 @@ from itertools import pairwise
 import numpy as np
 import pytest
 from lhdmap.messages import FloatArray
-from lhdmap.odometry.jump import jump
-from lhdmap.odometry.motion import FORWARD, TURNING, Motion
+from lhdmap.odometry.anchored.jump import jump
+from lhdmap.odometry.motion import FORWARD, TURNING, PlanarMotion
 from lhdmap.odometry.settings import OdometrySettings, SearchSettings
-from lhdmap.odometry.wheel_model import WheelModel
+from lhdmap.odometry.wheels.model import WheelModel
 from lhdmap.scan_matching.matching import Hits, Match, MatchModel, Prior
 from lhdmap.scan_matching.search import SearchGrid
 from lhdmap.scan_matching.submap import Submap
@@ -44,7 +44,7 @@ def walls() -> Submap:
     return submap
 
 
-def found_from(walls: Submap, predicted: FloatArray, motion: Motion) -> tuple[Match, Match | None]:
+def found_from(walls: Submap, predicted: FloatArray, motion: PlanarMotion) -> tuple[Match, Match | None]:
     """Return the match near a prediction, and the jump from there."""
     hits, prior = Hits(room(TRUE), len(room(TRUE)), layered=False), Prior(predicted, SURE)
     near = walls.align(hits, prior)
@@ -52,7 +52,7 @@ def found_from(walls: Submap, predicted: FloatArray, motion: Motion) -> tuple[Ma
 
 
 def test_a_kidnapped_machine_is_found(walls: Submap) -> None:
-    near, found = found_from(walls, TRUE + np.array([0.25, -0.2, math.radians(15.0)]), Motion(OdometrySettings()))
+    near, found = found_from(walls, TRUE + np.array([0.25, -0.2, math.radians(15.0)]), PlanarMotion(OdometrySettings()))
     assert near.support < 0.4
     assert found is not None
     assert np.hypot(*(found.pose - TRUE)[:2]) < 0.01
@@ -60,12 +60,12 @@ def test_a_kidnapped_machine_is_found(walls: Submap) -> None:
 
 
 def test_a_pose_that_fits_is_left_alone(walls: Submap) -> None:
-    near, found = found_from(walls, TRUE + np.array([0.01, 0.01, 0.0]), Motion(OdometrySettings()))
+    near, found = found_from(walls, TRUE + np.array([0.01, 0.01, 0.0]), PlanarMotion(OdometrySettings()))
     assert near.support > 0.9
     assert found is None
 
 
-def wheeled(gap_s: float = 0.02) -> tuple[Motion, WheelModel]:
+def wheeled(gap_s: float = 0.02) -> tuple[PlanarMotion, WheelModel]:
     """Return a motion whose last step wheels have measured, and the wheels."""
     motion, wheels = unwheeled()
     motion.predict(gap_s)
@@ -75,9 +75,9 @@ def wheeled(gap_s: float = 0.02) -> tuple[Motion, WheelModel]:
     return motion, wheels
 
 
-def unwheeled() -> tuple[Motion, WheelModel]:
+def unwheeled() -> tuple[PlanarMotion, WheelModel]:
     """Return a motion of a machine without wheels."""
-    motion = Motion(OdometrySettings(), np.zeros(3))
+    motion = PlanarMotion(OdometrySettings(), np.zeros(3))
     return motion, WheelModel(OdometrySettings(), motion)
 
 
@@ -101,7 +101,7 @@ def test_a_jump_back_to_where_the_wheels_lead_is_cheap(walls: Submap) -> None:
     close = walls.align(hits, prior)._replace(pose=predicted, support=0.82)
     wide, back = SearchSettings(), TRUE - predicted
     assert jump(walls, hits, close, prior, *wheeled(), wide) is None
-    found = jump(walls, hits, close, prior, *wheeled(), wide, owed=-back)
+    found = jump(walls, hits, close, prior, *wheeled(), wide, offset=-back)
     assert found is not None
     assert np.hypot(*(found.pose - TRUE)[:2]) < 0.01
 
@@ -109,7 +109,7 @@ def test_a_jump_back_to_where_the_wheels_lead_is_cheap(walls: Submap) -> None:
 @pytest.mark.parametrize(("gap_s", "found"), [(0.02, False), (2.0, True)])
 def test_after_a_gap_all_that_the_settings_allow_is_searched(walls: Submap, gap_s: float, found: bool) -> None:
     """Sure of its pose, the filter searches 0.3 m; wheels that hung through a gap are 1.4 m off and as sure."""
-    motion = Motion(OdometrySettings(), np.zeros(3))
+    motion = PlanarMotion(OdometrySettings(), np.zeros(3))
     motion.predict(gap_s)
     motion.P[:3, :3] = np.linalg.inv(SURE)
     _, result = found_from(walls, TRUE + np.array([1.4, 0.0, 0.0]), motion)

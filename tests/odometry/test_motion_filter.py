@@ -10,9 +10,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from lhdmap.messages import FloatArray
 from lhdmap.odometry import motion_filter
-from lhdmap.odometry.motion import FORWARD, TURNING, Motion
+from lhdmap.odometry.motion import FORWARD, TURNING, PlanarMotion
 from lhdmap.odometry.settings import OdometrySettings
-from lhdmap.odometry.wheel_gate import WheelGate
+from lhdmap.odometry.wheels.gate import WheelGate
 
 ACCELERATION = np.array([0.7, 0.1, 1.0])
 
@@ -85,7 +85,7 @@ def test_a_measured_way_is_kalmans(scaled: bool) -> None:
     S = h @ joint @ h + 0.02**2
     K = joint @ h / S
     expected, wanted = np.concatenate([state, way]) + K * 0.1, (np.eye(10) - np.outer(K, h)) @ joint
-    nis = motion_filter.update_way(
+    nis = motion_filter.update_displacement(
         state, joint, way, direction, float(scale * direction @ way) + 0.1, 0.02**2, scaled, 9.0
     )
     assert nis == pytest.approx(0.01 / S)
@@ -96,7 +96,7 @@ def test_a_measured_way_is_kalmans(scaled: bool) -> None:
 @pytest.mark.parametrize("dt_s", [0.2, 0.6, 0.9, 5.0])
 def test_wheels_tell_where_the_machine_has_come_to_however_long_it_took(dt_s: float) -> None:
     """Their mean speed was taken for the speed at the start of the step: after 0.6 s the heading was known to 20 deg only."""
-    motion = Motion(OdometrySettings())
+    motion = PlanarMotion(OdometrySettings())
     gate = WheelGate(motion)
     motion.predict(dt_s)
     gate.waited(dt_s)
@@ -111,7 +111,7 @@ def test_wheels_tell_where_the_machine_has_come_to_however_long_it_took(dt_s: fl
 
 def test_one_axis_does_not_undo_what_the_other_did() -> None:
     """Wheels that disagree for long are believed: the turn that is fused after them took the old covariance back."""
-    motion = Motion(OdometrySettings(), np.array([3.0, 0.0, 0.0]))
+    motion = PlanarMotion(OdometrySettings(), np.array([3.0, 0.0, 0.0]))
     gate = WheelGate(motion)
     for _ in range(40):
         motion.predict(0.04)
@@ -128,7 +128,7 @@ def test_one_axis_does_not_undo_what_the_other_did() -> None:
 
 def test_wheels_that_are_believed_against_the_motion_set_the_way_too() -> None:
     """Stamps 20 ms apart for scans of 0.6 s made 8 m/s; the wheels' word set the speed right and left the pose 5 m ahead."""
-    motion = Motion(OdometrySettings(), np.array([0.3, 0.0, 0.0]))
+    motion = PlanarMotion(OdometrySettings(), np.array([0.3, 0.0, 0.0]))
     gate = WheelGate(motion)
     motion.distrust_velocity(np.array([8.0, 0.0, 0.0]))
     motion.P[3:6, 3:6] = np.diag([0.3**2, 0.01, 0.01])
@@ -144,7 +144,7 @@ def test_wheels_that_are_believed_against_the_motion_set_the_way_too() -> None:
 
 def test_wheels_that_slipped_must_agree_well_to_be_believed_again() -> None:
     """Without them the speed becomes uncertain, and wheels that still slip come within four deviations."""
-    motion = Motion(OdometrySettings(), np.array([2.5, 0.0, 0.0]))
+    motion = PlanarMotion(OdometrySettings(), np.array([2.5, 0.0, 0.0]))
     gate = WheelGate(motion)
     motion.P[3:6, 3:6] = np.diag([0.05**2, 0.01, 0.01])
     taken = []
@@ -161,7 +161,7 @@ def test_wheels_that_slipped_must_agree_well_to_be_believed_again() -> None:
 
 def test_wheels_with_a_scale_of_their_own_come_back_after_a_spike() -> None:
     """Compared with the speed itself, not with what such wheels show at it, they would never have agreed again."""
-    motion = Motion(OdometrySettings(), np.array([3.0, 0.0, 0.0]))
+    motion = PlanarMotion(OdometrySettings(), np.array([3.0, 0.0, 0.0]))
     gate = WheelGate(motion)
     motion.P[3:6, 3:6] = np.diag([0.02**2, 0.01, 0.01])
     motion.state[6], motion.P[6, 6] = 0.9, 1e-6
@@ -174,7 +174,7 @@ def test_wheels_with_a_scale_of_their_own_come_back_after_a_spike() -> None:
 
 
 def test_after_a_gap_what_was_not_measured_is_uncertain() -> None:
-    motion = Motion(OdometrySettings(), np.array([1.0, 0.0, 0.0]))
+    motion = PlanarMotion(OdometrySettings(), np.array([1.0, 0.0, 0.0]))
     gate = WheelGate(motion)
     motion.predict(5.0)
     gate.waited(5.0)
@@ -225,7 +225,7 @@ def test_a_pose_update_is_bayes() -> None:
     st.lists(st.tuples(st.sampled_from("psm"), st.floats(0.001, 2.0), st.floats(-1.0, 1.0)), min_size=1, max_size=30)
 )
 def test_the_covariance_stays_symmetric_and_positive(steps: list[tuple[str, float, float]]) -> None:
-    motion = Motion(OdometrySettings())
+    motion = PlanarMotion(OdometrySettings())
     gate = WheelGate(motion)
     for kind, size, value in steps:
         if kind == "p":

@@ -21,7 +21,6 @@ from tests.odometry.planar_drives import (
     drive,
     run,
     scans_at,
-    segment_errors_pct,
     world,
 )
 
@@ -36,7 +35,7 @@ def rough() -> Driven:
 
 def test_default_over_ten_metres(rough: Driven) -> None:
     """The figure over three worlds of 180 m is in evaluation/odometry.md: 0.02 %."""
-    assert segment_errors_pct(rough).mean() < 0.05
+    assert rough.segments().translation_pct < 0.05
     assert rough.distance_m[-1] < 0.05
     assert abs(math.degrees(rough.errors[-1, 2])) < 0.1
     assert np.mean([step.degenerate for step in rough.steps if step.processed]) < 0.1
@@ -45,7 +44,7 @@ def test_default_over_ten_metres(rough: Driven) -> None:
 
 def test_range_flow_over_ten_metres() -> None:
     poses, scans = drive()
-    assert segment_errors_pct(run(scans, poses, "range_flow")).mean() < 0.15
+    assert run(scans, poses, "range_flow").segments().translation_pct < 0.15
 
 
 def test_a_smooth_drive_is_flagged_and_bounded() -> None:
@@ -54,7 +53,7 @@ def test_a_smooth_drive_is_flagged_and_bounded() -> None:
     processed = [step for step in driven.steps if step.processed]
     assert np.mean([step.degenerate for step in processed]) > 0.2  # the ends of this short drift are in sight
     assert {step.substitute for step in processed if step.degenerate} == {"motion"}
-    assert segment_errors_pct(driven).max() < 5.0
+    assert driven.segments().worst_pct < 5.0
 
 
 def test_a_step_says_what_it_stands_for(rough: Driven) -> None:
@@ -77,7 +76,7 @@ def test_the_pose_of_a_sweep_is_that_of_its_middle() -> None:
 def test_same_input_same_output(rough: Driven) -> None:
     poses, scans = drive()
     again = run(scans[:200], poses[:200])
-    assert all((a.T_odom_base == b.T_odom_base).all() for a, b in zip(again.steps, rough.steps, strict=False))
+    assert all((a.pose_odom_base == b.pose_odom_base).all() for a, b in zip(again.steps, rough.steps, strict=False))
 
 
 def unharmed(driven: Driven, far_m: float, *, turned_deg: float = 1.0) -> None:
@@ -159,7 +158,7 @@ def test_half_of_the_beams_behind_a_person(first: int) -> None:
     assert not (grown & ~doubtful).any()
     assert driven.distance_m.max() <= 1.2 * 75 * 3.3 / RATE_HZ  # never further off than what was driven meanwhile
     after = driven._replace(estimate=driven.estimate[first + 85 :], truth=driven.truth[first + 85 :])
-    assert segment_errors_pct(after, 4.0).mean() < 0.5
+    assert np.median(after.segments(4.0).translations_m) < 0.02
 
 
 def test_a_jump_of_what_the_log_left_out() -> None:
@@ -179,7 +178,7 @@ def test_the_second_scan_far_from_the_first(motion: tuple[float, float, float]) 
         scans = scans_at(np.array([place, se2.compose(place, np.array(motion))]))
         stage = PlanarOdometry()
         steps = [stage.update(scan._replace(stamp_ns=10**18 + k * 10**8), LEVEL) for k, scan in enumerate(scans)]
-        error = se2.between(np.array(motion), se2.between(steps[0].T_odom_base, steps[1].T_odom_base))
+        error = se2.between(np.array(motion), se2.between(steps[0].pose_odom_base, steps[1].pose_odom_base))
         found.append(np.hypot(error[0], error[1]) < 0.05 and abs(math.degrees(error[2])) < 1.0)
     assert sum(found) >= 5
 

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from lhdmap.geometry import se2
 from lhdmap.messages import FloatArray, LaserScan
-from lhdmap.odometry.flow_scan import BEND, SLOPE, WALL, Pyramid, Y
-from lhdmap.odometry.range_flow import Flow, flow
+from lhdmap.odometry.range_flow.flow import Flow, flow
+from lhdmap.odometry.range_flow.scan import BEND, SLOPE, WALL, Pyramid, Y
 from lhdmap.odometry.settings import RangeFlowSettings
 from lhdmap.scan_matching.scan_points import planar_points
 from lhdmap.simulation.planar import PlanarScanner, drive_along, simulate_scans
@@ -44,7 +44,7 @@ EXACT = PlanarScanner(noise_m=0.0)
 )
 def test_each_axis_has_its_sign_and_size(motion: tuple[float, float, float]) -> None:
     first, second = scan_at(PLACE, EXACT), scan_at(se2.compose(PLACE, np.array(motion)), EXACT)
-    found = between(first, second).T_reference_current
+    found = between(first, second).pose_reference_current
     assert found[:2] == pytest.approx(motion[:2], abs=0.002)
     assert found[2] == pytest.approx(motion[2], abs=3e-4)
 
@@ -80,22 +80,24 @@ def spoilt(scan: LaserScan, seed: int) -> LaserScan:
 )
 def test_any_field_of_view_gives_the_motion(scanner: PlanarScanner) -> None:
     first, second = scan_at(PLACE, scanner), scan_at(se2.compose(PLACE, MOTION), scanner)
-    error = se2.between(MOTION, between(first, second).T_reference_current)
+    error = se2.between(MOTION, between(first, second).pose_reference_current)
     assert np.abs(error[:2]).max() < 0.004
     assert abs(error[2]) < 0.001
 
 
 def test_negative_increment_is_the_same_scan() -> None:
     first, second = scan_at(PLACE, PlanarScanner()), scan_at(se2.compose(PLACE, MOTION), PlanarScanner(), 2)
-    plain = between(first, second).T_reference_current
-    assert between(reversed_order(first), reversed_order(second)).T_reference_current == pytest.approx(plain, abs=1e-6)
+    plain = between(first, second).pose_reference_current
+    assert between(reversed_order(first), reversed_order(second)).pose_reference_current == pytest.approx(
+        plain, abs=1e-6
+    )
 
 
 @pytest.mark.parametrize("offset_deg", [-90.0, 35.0, 170.0])
 def test_an_angle_offset_turns_the_motion_with_it(offset_deg: float) -> None:
     offset = math.radians(offset_deg)
     first, second = (turned_sensor(scan_at(p, EXACT), offset) for p in (PLACE, se2.compose(PLACE, MOTION)))
-    found = between(first, second).T_reference_current
+    found = between(first, second).pose_reference_current
     c, s = math.cos(offset), math.sin(offset)
     expected = [c * MOTION[0] - s * MOTION[1], s * MOTION[0] + c * MOTION[1], MOTION[2]]
     assert found[:2] == pytest.approx(expected[:2], abs=0.004)
@@ -107,7 +109,7 @@ def test_invalid_beams_are_left_out_one_by_one() -> None:
     second = spoilt(scan_at(se2.compose(PLACE, MOTION), PlanarScanner(), 2), 4)
     found = between(first, second)
     assert np.isfinite(found.information).all()
-    error = se2.between(MOTION, found.T_reference_current)
+    error = se2.between(MOTION, found.pose_reference_current)
     assert np.hypot(error[0], error[1]) < 0.01
     assert abs(error[2]) < math.radians(0.1)
 
@@ -118,7 +120,7 @@ def test_a_scan_without_returns_gives_the_guess_and_no_information(value: float)
     blind = first._replace(ranges_m=np.full_like(first.ranges_m, value))
     for pair in ((first, blind), (blind, first), (blind, blind)):
         found = between(*pair, guess=MOTION)
-        assert found.T_reference_current == pytest.approx(MOTION)
+        assert found.pose_reference_current == pytest.approx(MOTION)
         assert not found.information.any()
         assert found.support == 0.0
 
@@ -172,15 +174,15 @@ def test_converges_from_no_motion(motion: tuple[float, float, float]) -> None:
         place = drive_along(world().centre_line_m, 1.0, 1.0)[metre]
         first = scan_at(place, PlanarScanner())
         second = scan_at(se2.compose(place, np.array(motion)), PlanarScanner(), 2)
-        error = se2.between(np.array(motion), between(first, second).T_reference_current)
+        error = se2.between(np.array(motion), between(first, second).pose_reference_current)
         found.append(np.hypot(error[0], error[1]) < 0.02 and abs(error[2]) < math.radians(0.3))
     assert sum(found) >= 3
 
 
 def test_back_is_the_inverse_of_forth() -> None:
     first, second = scan_at(PLACE, PlanarScanner()), scan_at(se2.compose(PLACE, MOTION), PlanarScanner(), 2)
-    forth = between(first, second).T_reference_current
-    back = between(second, first).T_reference_current
+    forth = between(first, second).pose_reference_current
+    back = between(second, first).pose_reference_current
     assert se2.compose(forth, back) == pytest.approx([0.0, 0.0, 0.0], abs=2e-4)
 
 

@@ -9,14 +9,15 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 from lhdmap.config import Settings
+from lhdmap.evaluation.planar_segments import planar_segments
 from lhdmap.geometry import se2, se3
 from lhdmap.kinematics import T_base_rear
 from lhdmap.logs.source import LogSource
 from lhdmap.machine import Machine
 from lhdmap.messages import FloatArray, Joints, LaserScan
-from lhdmap.odometry.rear_view import Behind, JointOffset, RearView, behind
+from lhdmap.odometry.anchored.rear_view import Behind, JointOffset, RearView, behind
 from lhdmap.pipeline.mapping import MappingPipeline
-from lhdmap.pipeline.track import Rows, resample
+from lhdmap.pipeline.track import TrackRows, resample
 from lhdmap.scan_matching.matching import Hits, MatchModel, Prior, match
 from lhdmap.scan_matching.surface_map import empty_map, insert_all
 from lhdmap.simulation.drive import simulate_drift
@@ -102,21 +103,18 @@ def errors(log: Path, *, rear: bool, joint_deg: float = 0.0) -> Errors:
     pipeline.finish()
     truth = read_tum(log.with_suffix(".truth.tum"))
     heading = np.unwrap(se3.rpy_from_quaternions(truth.quaternions_xyzw)[:, 2])
-    true = Rows(truth.stamps_ns, np.column_stack([truth.positions_m, np.zeros((len(heading), 2)), heading]))
+    true = TrackRows(truth.stamps_ns, np.column_stack([truth.positions_m, np.zeros((len(heading), 2)), heading]))
     found = [segment_errors(path.rows(), true) for path in (pipeline.track, pipeline.path.final)]
     ends = [rows.poses[[0, -1]][:, [0, 1, 5]] for rows in (true, pipeline.track.rows())]
     end = se2.between(*(se2.between(*pair) for pair in ends))
     return Errors(*found[0], *found[1], float(np.hypot(end[0], end[1])), abs(math.degrees(float(end[2]))))
 
 
-def segment_errors(rows: Rows, truth: Rows) -> tuple[float, float]:
+def segment_errors(rows: TrackRows, truth: TrackRows) -> tuple[float, float]:
+    """Return the mean errors over 10 m, in metres and degrees."""
     estimate, true = rows.poses[:, [0, 1, 5]], resample(truth, rows.times_ns).poses[:, [0, 1, 5]]
-    way_m = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(true[:, :2], axis=0).T))])
-    ends = [
-        (np.searchsorted(way_m, at), np.searchsorted(way_m, at + 10.0)) for at in np.arange(0.0, way_m[-1] - 10.0, 0.5)
-    ]
-    off = np.array([se2.between(se2.between(true[a], true[b]), se2.between(estimate[a], estimate[b])) for a, b in ends])
-    return float(np.hypot(off[:, 0], off[:, 1]).mean()), float(np.degrees(np.abs(off[:, 2])).mean())
+    found = planar_segments(estimate, true)
+    return float(found.translations_m.mean()), 10.0 * found.rotation_deg_per_m
 
 
 def test_a_tilted_drive_gets_better_by_the_rear_scanner_and_survives_a_wrong_joint(log: Path) -> None:

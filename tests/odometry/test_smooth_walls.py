@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 import math
 from typing import NamedTuple
 
@@ -16,7 +15,7 @@ from lhdmap.odometry.start import ScanInput, starting_velocity
 from lhdmap.odometry.steps import WheelStep
 from lhdmap.simulation.planar import PlanarScanner, drift_world, drive_along, poses_along, simulate_scans, way_from_rest
 
-from tests.odometry.planar_drives import LEVEL, WARM_SCANS, Driven, segment_errors_pct
+from tests.odometry.planar_drives import LEVEL, WARM_SCANS, Driven
 
 SPEED_MPS, RATE_HZ = 12.0 / 3.6, 25.0
 
@@ -27,7 +26,7 @@ def scale_error_pct(seed: int) -> float:
     poses = drive_along(world.centre_line_m, SPEED_MPS, RATE_HZ)
     scans = simulate_scans(world, poses, PlanarScanner(noise_m=0.012), RATE_HZ, seed)
     stage = PlanarOdometry(OdometrySettings(), AnchorSettings(), None, None, np.array([SPEED_MPS, 0.0, 0.0]))
-    found = np.array([stage.update(scan, LEVEL).T_odom_base for scan in scans])
+    found = np.array([stage.update(scan, LEVEL).pose_odom_base for scan in scans])
     return 100.0 * (_length_m(found) / _length_m(poses) - 1.0)
 
 
@@ -78,7 +77,7 @@ def smooth_drive(seed: int) -> Driven:
     inputs = [ScanInput(scan, LEVEL) for scan in scans]
     stage = begun(starting_velocity(begun, inputs[:WARM_SCANS]))
     steps = [stage.update(*one) for one in inputs]
-    return Driven(np.array([step.T_odom_base for step in steps]), poses, steps)
+    return Driven(np.array([step.pose_odom_base for step in steps]), poses, steps)
 
 
 def _standing_scans(noise_m: float, wheels: WheelStep | None = None) -> list[ScanInput]:
@@ -140,7 +139,7 @@ def straight_drive(kind: Straight, seed: int, slips: bool = False) -> Driven:
     inputs = [ScanInput(scan, LEVEL, step) for scan, step in zip(scans, wheels, strict=True)]
     stage = begun(starting_velocity(begun, inputs[:WARM_SCANS]))
     steps = [stage.update(*one) for one in inputs]
-    return Driven(np.array([step.T_odom_base for step in steps]), poses - poses[0], steps)
+    return Driven(np.array([step.pose_odom_base for step in steps]), poses - poses[0], steps)
 
 
 STRAIGHT = (
@@ -150,17 +149,16 @@ STRAIGHT = (
 )
 
 
-def test_straight_smooth_drifts_are_measured() -> None:
-    """A drive may still lose a metre at its start, and which one does hangs on the last digit: one of nine may."""
-    missed = []
-    for kind, seed in itertools.product(STRAIGHT, (501, 502, 503)):
+@pytest.mark.parametrize("kind", STRAIGHT)
+def test_straight_smooth_drifts_are_measured(kind: Straight) -> None:
+    """Of 18 such drives the worst ended 0.33 m off, the worst segment of 10 m was 2.8 % off."""
+    for seed in (501, 502, 503):
         driven = straight_drive(kind, seed)
         assert np.mean([step.degenerate for step in driven.steps if step.processed]) > 0.5
         unseen = np.mean([step.unseen for step in driven.steps if step.processed])
         assert unseen > 0.8 if kind.max_range_m < 80.0 else unseen < 0.6  # the end face tells the way, weakly
-        if driven.distance_m[-1] > 0.01 * 60.0 or segment_errors_pct(driven).max() > 7.0:
-            missed.append((kind, seed))
-    assert len(missed) <= 1
+        assert driven.distance_m[-1] < 0.01 * 60.0
+        assert driven.segments().worst_pct < 4.0
 
 
 def test_wheels_that_slip_are_not_believed_as_the_speed_becomes_uncertain() -> None:

@@ -9,8 +9,8 @@ import numpy as np
 from lhdmap.geometry import se2
 from lhdmap.odometry.planar import PlanarOdometry
 from lhdmap.odometry.settings import OdometrySettings
-from lhdmap.odometry.stale import StaleWheels
 from lhdmap.odometry.steps import WheelStep
+from lhdmap.odometry.wheels.stale import StaleWheels
 from lhdmap.simulation.planar import PlanarScanner, simulate_scans
 
 from tests.odometry.planar_drives import LEVEL, along, world
@@ -59,7 +59,7 @@ def test_a_drive_with_wheels_that_hang() -> None:
         found.append(odometry.update(scan, LEVEL, WheelStep(float(moved[0]), sigma[0], float(moved[2]), sigma[1])))
     off = np.array(
         [
-            se2.between(se2.between(poses[0], pose), se2.between(found[0].T_odom_base, one.T_odom_base))
+            se2.between(se2.between(poses[0], pose), se2.between(found[0].pose_odom_base, one.pose_odom_base))
             for pose, one in zip(poses, found, strict=True)
         ]
     )

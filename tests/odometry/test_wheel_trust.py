@@ -12,8 +12,8 @@ from lhdmap.messages import FloatArray
 from lhdmap.odometry.planar import PlanarOdometry
 from lhdmap.odometry.start import ScanInput, starting_velocity
 from lhdmap.odometry.steps import WheelStep
-from lhdmap.odometry.stretch import Compared
-from lhdmap.odometry.wheel_trust import WheelTrust
+from lhdmap.odometry.wheels.stretch import Compared
+from lhdmap.odometry.wheels.trust import WheelTrust
 
 from tests.odometry.planar_drives import LEVEL, WARM_SCANS, Driven, along, drive, scans_at
 
@@ -71,7 +71,7 @@ def _with_wheels(poses: FloatArray, wheels: Callable[[float], float]) -> tuple[D
 
     odometry = make(starting_velocity(make, inputs[:WARM_SCANS]))
     out = [odometry.update(*one) for one in inputs]
-    estimate = np.array([se2.compose(poses[0], step.T_odom_base) for step in out])
+    estimate = np.array([se2.compose(poses[0], step.pose_odom_base) for step in out])
     return Driven(estimate, poses, out), odometry
 
 

@@ -14,8 +14,8 @@ from lhdmap.messages import FloatArray
 from lhdmap.odometry.planar import PlanarOdometry
 from lhdmap.odometry.settings import OdometrySettings
 from lhdmap.odometry.steps import WheelStep
-from lhdmap.odometry.stretch import Compared, Stretch
-from lhdmap.odometry.wheel_turn import WheelTurn
+from lhdmap.odometry.wheels.stretch import Compared, WheelStretch
+from lhdmap.odometry.wheels.turn import WheelTurn
 
 from tests.odometry.planar_drives import LEVEL, RATE_HZ, drive
 
@@ -30,7 +30,7 @@ def _turns(count: int, seed: int = 0) -> FloatArray:
 
 
 def _driven(turn: WheelTurn, true_rad: FloatArray, wheels_rad: FloatArray) -> WheelTurn:
-    pose, stretch = np.zeros(3), Stretch()
+    pose, stretch = np.zeros(3), WheelStretch()
     stretch.matched(pose)
     for true, wheels in zip(true_rad, wheels_rad, strict=True):
         pose = se2.compose(pose, np.array([STEP_M, 0.0, true]))
@@ -71,7 +71,7 @@ def test_what_is_known_to_be_right_is_left() -> None:
 
 
 def test_a_stretch_that_was_not_seen_whole_is_not_compared() -> None:
-    stretch, pose = Stretch(), np.zeros(3)
+    stretch, pose = WheelStretch(), np.zeros(3)
     for _ in range(20):
         assert stretch.matched(pose) is None
         stretch.missed()  # the wheels slipped
@@ -80,7 +80,7 @@ def test_a_stretch_that_was_not_seen_whole_is_not_compared() -> None:
 
 
 def test_a_stretch_is_what_was_driven_in_it() -> None:
-    stretch = Stretch()
+    stretch = WheelStretch()
     stretch.matched(np.array([3.0, 1.0, 0.5]))
     stretch.measured(0.6, 0.1, 0.02)
     middle = se2.compose(np.array([3.0, 1.0, 0.5]), np.array([0.7, 0.0, 0.2]))
@@ -109,7 +109,7 @@ def test_wheels_that_turn_on_their_own_hold_the_heading_where_nothing_is_seen() 
         for k, (scan, step) in enumerate(zip(scans, steps, strict=True)):
             wheels = WheelStep(float(step[0]), 0.01, float(step[2] + 0.06 * step[0]), 0.001)
             seen = scan._replace(ranges_m=np.full_like(scan.ranges_m, np.inf)) if k in blind else scan
-            pose = odometry.update(seen, LEVEL, wheels).T_odom_base
+            pose = odometry.update(seen, LEVEL, wheels).pose_odom_base
             if k == blind[-1]:
                 error = math.degrees(se2.wrap(float(pose[2] - (poses[k, 2] - poses[0, 2]))))
         return abs(error)

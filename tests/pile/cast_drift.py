@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from lhdmap.geometry.se3 import from_rpy
 from lhdmap.messages import FloatArray
-from lhdmap.pile.face import Registration
+from lhdmap.pile.face import FaceRegistration
 from lhdmap.pile.result import PileReport, Snapshot
 from lhdmap.pile.settings import PileSettings
 from lhdmap.pile.stage import PileStage, ScanHits
@@ -20,7 +20,7 @@ SCANNER_M = (1.5, 0.0, 1.8)
 TILT_RAD = math.radians(2.5)
 BEAMS_RAD = np.radians(np.arange(-95.0, 95.01, 0.5))
 REACH_M = 45.0
-EXACT = Registration(2e-4, math.radians(0.05))
+EXACT = FaceRegistration(2e-4, math.radians(0.05))
 Segments = tuple[tuple[float, float, float, float], ...]
 
 
@@ -101,7 +101,7 @@ class CastDrift:
         return nearest
 
 
-def drive(drift: CastDrift, to_m: float = 28.0, registration: Registration = EXACT) -> PileReport:
+def drive(drift: CastDrift, to_m: float = 28.0, registration: FaceRegistration = EXACT) -> PileReport:
     """Return what the stage says at the end of a drive."""
     stage = PileStage(PileSettings(), registration)
     for scan in drift.scans(to_m=to_m):

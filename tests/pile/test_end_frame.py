@@ -7,16 +7,16 @@ import math
 import numpy as np
 import pytest
 from lhdmap.messages import FloatArray
-from lhdmap.pile.corridor import BIN_M, Corridor
+from lhdmap.pile.corridor import BIN_M, DriftCorridor
 from lhdmap.pile.end_frame import end_of, floor_before
 
 FACE_M = 16.0
 
 
-def _corridor(slope: float, half: FloatArray | float, bend_x_m: float = 0.0) -> Corridor:
+def _corridor(slope: float, half: FloatArray | float, bend_x_m: float = 0.0) -> DriftCorridor:
     x = 2.0 + (np.arange(40, dtype=np.float64) + 0.5) * BIN_M
     centre = slope * np.maximum(x - bend_x_m, 0.0)
-    return Corridor(x, centre, centre + half, centre - half)
+    return DriftCorridor(x, centre, centre + half, centre - half)
 
 
 @pytest.mark.parametrize("slope", [-0.2, -0.11, 0.0, 0.11, 0.2])

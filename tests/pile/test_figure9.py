@@ -11,8 +11,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from lhdmap.geometry.se3 import from_rpy
 from lhdmap.messages import FloatArray
-from lhdmap.pile import figure9_stage
-from lhdmap.pile.figure9 import (
+from lhdmap.pile.figure9 import stage as figure9_stage
+from lhdmap.pile.figure9.fit import largest_cluster, plane_inclination_deg, voxelised
+from lhdmap.pile.figure9.method import (
     distance_to_center_m,
     drift_heading_rad,
     figure9,
@@ -20,8 +21,7 @@ from lhdmap.pile.figure9 import (
     mean_normal_inclination_deg,
     segment,
 )
-from lhdmap.pile.figure9_fit import largest_cluster, plane_inclination_deg, voxelised
-from lhdmap.pile.figure9_settings import Figure9Constants, RepairedConstants
+from lhdmap.pile.figure9.settings import Figure9Constants, RepairedConstants
 from lhdmap.pile.result import PileEstimate
 from lhdmap.pile.settings import PileSettings
 from lhdmap.pile.slope_status import status_of, status_probabilities
@@ -233,18 +233,18 @@ def test_a_stage_judges_what_is_near_the_machine_however_long_the_drive(monkeypa
 
 
 def test_status_by_thresholds() -> None:
-    said = [status_of(-slope, PRINTED) for slope in (10.0, 27.9, 28.0, 60.0, 70.0, 81.0, 98.0, 99.0)]
+    said = [status_of(-slope, PRINTED.bounds) for slope in (10.0, 27.9, 28.0, 60.0, 70.0, 81.0, 98.0, 99.0)]
     assert said == ["too_shallow", "too_shallow", "loadable", "loadable", "hang_up", "wall", "wall", "hang_up"]
 
 
 @given(st.floats(0.0, 130.0), st.floats(0.0, 20.0))
 def test_probabilities_of_statuses_add_up_and_favour_the_one_by_threshold(slope_deg: float, std_deg: float) -> None:
-    share = status_probabilities(-slope_deg, std_deg, PRINTED)
+    share = status_probabilities(-slope_deg, std_deg, PRINTED.bounds)
     assert sum(share.values()) == pytest.approx(1.0)
     assert min(share.values()) >= -1e-12
     bounds = np.array([PRINTED.shallow_deg, PRINTED.steep_deg, PRINTED.wall_deg, PRINTED.overhang_deg])
     if np.abs(bounds - slope_deg).min() > 3.0 and std_deg < 1.0:
-        assert max(share, key=lambda name: share[name]) == status_of(-slope_deg, PRINTED)
+        assert max(share, key=lambda name: share[name]) == status_of(-slope_deg, PRINTED.bounds)
 
 
 @pytest.mark.parametrize("constants", [PRINTED, REPAIRED])

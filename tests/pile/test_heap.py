@@ -10,11 +10,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from lhdmap.errors import InputError, UsageError
-from lhdmap.integration.cloud import Cloud
+from lhdmap.integration.cloud import GridCloud
 from lhdmap.integration.cloud_io import write_cloud
 from lhdmap.messages import FloatArray
-from lhdmap.pile.heap import CloudPile, measure_cloud, run_cloud
-from lhdmap.pile.heap_axes import AXES, isolated, rotation_to_up
+from lhdmap.pile.clouds.axes import AXES, isolated, rotation_to_up
+from lhdmap.pile.clouds.heap import CloudPile, measure_cloud, run_cloud
 from lhdmap.pile.result import estimate_json
 from lhdmap.rockbreaker.machine import Rockbreaker
 from lhdmap.simulation.grizzly import simulate_grizzly
@@ -198,7 +198,7 @@ def test_faults_are_told(tmp_path: Path) -> None:
         measure_cloud(points, "up")
     with pytest.raises(InputError, match="at least 200"):
         measure_cloud(points[:50], "z")
-    write_cloud(tmp_path / "few.ply", Cloud(points[:50].astype(np.float32)))
+    write_cloud(tmp_path / "few.ply", GridCloud(points[:50].astype(np.float32)))
     with pytest.raises(InputError, match=r"few\.ply: 50 points"):
         run_cloud(tmp_path / "few.ply", "z")
     with pytest.raises(InputError, match=r"no\.pcd"):
@@ -252,7 +252,7 @@ def test_a_national_grid_changes_only_the_places(suffix: str, tmp_path: Path) ->
     shift = np.array([412_345.0, 6_743_210.0, 312.0])
     path = tmp_path / f"wedge{suffix}"
     if suffix in (".las", ".laz"):
-        write_cloud(path, Cloud(points.astype(np.float32), origin_m=(412_345.0, 6_743_210.0, 312.0)))
+        write_cloud(path, GridCloud(points.astype(np.float32), origin_m=(412_345.0, 6_743_210.0, 312.0)))
     elif suffix == ".ply":
         o3d.io.write_point_cloud(path, o3d.geometry.PointCloud(o3d.utility.Vector3dVector(points + shift)))
     else:
@@ -274,7 +274,7 @@ def test_isolated_points_are_those_far_from_all() -> None:
 @pytest.mark.parametrize("suffix", [".ply", ".pcd", ".las", ".laz"])
 def test_files_give_what_arrays_give(suffix: str, tmp_path: Path) -> None:
     points, _ = _cone(33.0, n=10_000)
-    write_cloud(tmp_path / f"cone{suffix}", Cloud(points.astype(np.float32)))
+    write_cloud(tmp_path / f"cone{suffix}", GridCloud(points.astype(np.float32)))
     found = run_cloud(tmp_path / f"cone{suffix}", "z")
     assert found.estimate.inclination_deg == pytest.approx(
         measure_cloud(points, "z").estimate.inclination_deg, abs=0.05

@@ -7,15 +7,15 @@ import math
 import numpy as np
 import pytest
 from lhdmap.messages import FloatArray
-from lhdmap.pile.face import Face
-from lhdmap.pile.limits import _VISIBLE, Limits, limits_of
+from lhdmap.pile.face import PileFace
+from lhdmap.pile.limits import _VISIBLE, FaceLimits, limits_of
 
 
-def _face(slope: float = 1.0, askew: float = 0.0) -> Face:
-    return Face(0.0, askew, slope, 0.0, 1e-6 * np.eye(4), 0.05, 50)
+def _face(slope: float = 1.0, askew: float = 0.0) -> PileFace:
+    return PileFace(0.0, askew, slope, 0.0, 1e-6 * np.eye(4), 0.05, 50)
 
 
-def _walls(face: Face, left: FloatArray, right: FloatArray, rough_m: float = 0.0) -> FloatArray:
+def _walls(face: PileFace, left: FloatArray, right: FloatArray, rough_m: float = 0.0) -> FloatArray:
     """Return hits on both walls up to the face; distances from the middle (K,) at x = -8 … 2, waves over the height."""
     x, z = (a.ravel() for a in np.meshgrid(np.arange(-8.0, 2.0, 0.03), np.arange(0.1, 1.7, 0.05)))
     bump = rough_m * np.sin(9.0 * z)
@@ -64,7 +64,7 @@ def test_wall_that_was_not_seen_stands_as_the_other_one() -> None:
 
 
 def test_doubt_between_mouth_and_wall_is_part_of_the_deviation() -> None:
-    sure, open_, torn = (Limits(2.0, -2.0, 0.05, 0.05, chance, 0.4, 0.1) for chance in (0.0, 1.0, 0.5))
+    sure, open_, torn = (FaceLimits(2.0, -2.0, 0.05, 0.05, chance, 0.4, 0.1) for chance in (0.0, 1.0, 0.5))
     assert sure.width_m(0.0) == pytest.approx((4.0, 0.05 * math.sqrt(2.0)))
     assert open_.width_m(0.7) == pytest.approx((4.0, 0.05 * math.sqrt(2.0)))
     width, std = torn.width_m(0.0)

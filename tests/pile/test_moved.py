@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from lhdmap.pile.moved import moved_report
-from lhdmap.pile.result import Approach, AttackPoint, Boulder, PileEstimate, PileReport, Snapshot
+from lhdmap.pile.result import AttackPoint, Boulder, PileApproach, PileEstimate, PileReport, Snapshot
 
 T = np.array([1.0, 2.0, math.pi / 2])  # a quarter turn to the left, then the shift
 PLACE, MOVED = np.array([3.0, 1.0, 0.5]), np.array([0.0, 5.0, 0.5])
@@ -28,7 +28,7 @@ def report() -> PileReport:
         face_m=np.stack([PLACE, PLACE]),
     )
     last = Snapshot(7, 9.0, pile)
-    return PileReport(last, last, (last,), around_m=PLACE[None], piles=(Approach(last, last),))
+    return PileReport(last, last, (last,), around_m=PLACE[None], piles=(PileApproach(last, last),))
 
 
 def test_all_places_move_and_nothing_else() -> None:
@@ -59,7 +59,7 @@ def test_all_places_move_and_nothing_else() -> None:
 def test_each_pile_moves_by_its_own_motion() -> None:
     """A loop that was closed later moves what was seen before it more than what was seen after it."""
     one = report().piles[0]
-    later = Approach(one.decision, one.last._replace(stamp_ns=8))
+    later = PileApproach(one.decision, one.last._replace(stamp_ns=8))
     both = replace(report(), piles=(one, later))
     moved = moved_report(both, lambda stamp_ns: T if stamp_ns == 7 else np.zeros(3))
     assert moved.piles[0].last.estimate.center_m == pytest.approx(MOVED)

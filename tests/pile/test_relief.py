@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from lhdmap.geometry.frame import UprightFrame
 from lhdmap.messages import FloatArray
-from lhdmap.pile.end_frame import Frame2
-from lhdmap.pile.face import Face
+from lhdmap.pile.face import PileFace
 from lhdmap.pile.judge import _ROCK_M, _RUBBLE_M
-from lhdmap.pile.limits import Limits
+from lhdmap.pile.limits import FaceLimits
 from lhdmap.pile.relief import CELL_M, boulders, grain_m, relief
-from lhdmap.pile.surface import Scene
+from lhdmap.pile.surface import PileScene
 
 HALF_M = 2.0
 SHALLOW, STEEP = 4.0, 1.0  # dx/dz of the face
@@ -48,12 +48,12 @@ def _seen(points: FloatArray) -> FloatArray:
     return points[~near | (points[:, 0] < front[cell] + 0.02)]
 
 
-def _scene(slope: float, *parts: FloatArray) -> Scene:
+def _scene(slope: float, *parts: FloatArray) -> PileScene:
     points = _seen(np.concatenate([_plane(slope), *parts]))
-    face = Face(0.0, 0.0, slope, 0.0, 1e-6 * np.eye(4), 0.05, 50)
-    limits = Limits(HALF_M, -HALF_M, 0.05, 0.05, 0.0, 0.0, 0.1)
+    face = PileFace(0.0, 0.0, slope, 0.0, 1e-6 * np.eye(4), 0.05, 50)
+    limits = FaceLimits(HALF_M, -HALF_M, 0.05, 0.05, 0.0, 0.0, 0.1)
     on = (points[:, 2] > 0.2) & (points[:, 2] < 1.6)
-    return Scene(Frame2(np.zeros(3), 0.0), points, face, on, 0.0, True, limits)
+    return PileScene(UprightFrame(np.zeros(3), 0.0), points, face, on, 0.0, True, limits)
 
 
 @pytest.mark.parametrize("size_m", [1.0, 1.3, 1.5])
@@ -93,7 +93,7 @@ def test_bulge_over_most_of_the_width_is_no_boulder() -> None:
     assert boulders(scene, relief(scene)) == ()
 
 
-def _grain(flat: Scene, bump_m: FloatArray) -> float:
+def _grain(flat: PileScene, bump_m: FloatArray) -> float:
     rough = flat._replace(points=flat.points + np.outer(bump_m, [1.0, 0.0, 0.0, 0.0]))
     return grain_m(relief(rough), 0.2, 1.6)
 

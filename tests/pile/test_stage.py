@@ -13,8 +13,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from lhdmap.messages import FloatArray
 from lhdmap.pile.approach import Approaches
-from lhdmap.pile.face import Registration
-from lhdmap.pile.result import Approach, PileEstimate, PileReport, Snapshot, estimate_json
+from lhdmap.pile.face import FaceRegistration
+from lhdmap.pile.result import PileApproach, PileEstimate, PileReport, Snapshot, estimate_json
 from lhdmap.pile.settings import PileSettings
 from lhdmap.pile.stage import PileStage
 
@@ -158,7 +158,7 @@ def test_result_does_not_depend_on_where_north_is(turn_rad: float, shift_m: floa
 def test_tilt_error_is_found_and_undone() -> None:
     """The scanner looks 0.3 deg lower than its mount says: the floor tells, once the machine drives over what it saw."""
     drift = CastDrift(45.0, tilt_error_rad=math.radians(0.3))
-    stage = PileStage(PileSettings(), Registration(2e-4, math.radians(0.3)))
+    stage = PileStage(PileSettings(), FaceRegistration(2e-4, math.radians(0.3)))
     for scan in drift.scans(from_m=-28.0):
         stage.update(scan)
     pile = last_of(stage.report()).estimate
@@ -212,7 +212,7 @@ def test_a_warning_is_said_once_in_json() -> None:
         status="loadable", probabilities={"loadable": 1.0}, width_m=4.0, inclination_deg=-40.0, warnings=("w",)
     )
     last = Snapshot(0, 12.0, estimate)
-    report = PileReport(last, last, (last,), warnings=("w", "log"), piles=(Approach(last, last),))
+    report = PileReport(last, last, (last,), warnings=("w", "log"), piles=(PileApproach(last, last),))
     assert json.dumps(report.to_json()).count('"w"') == 1
     assert report.to_json()["warnings"] == ["w", "log"]
 
@@ -239,8 +239,8 @@ def test_what_does_not_close_the_drift_is_not_measured_as_a_pile() -> None:
     assert table["warnings"] == ["said"]
 
 
-DRIFTING = Registration(0.01, math.radians(0.2))
-LOST = Registration(0.015, math.radians(0.3))
+DRIFTING = FaceRegistration(0.01, math.radians(0.2))
+LOST = FaceRegistration(0.015, math.radians(0.3))
 
 
 @pytest.mark.parametrize("short_m", [0.0, 0.1, 0.2, 0.3, 0.4])

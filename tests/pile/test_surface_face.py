@@ -10,8 +10,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from lhdmap.messages import FloatArray
-from lhdmap.pile.face import Face, Registration, find, fit
-from lhdmap.pile.judge import Evidence, probabilities
+from lhdmap.pile.face import FaceRegistration, PileFace, find, fit
+from lhdmap.pile.judge import StatusEvidence, probabilities
 from lhdmap.pile.measure import _unseen_deg
 from lhdmap.pile.result import STATUSES
 from lhdmap.pile.surface import _on_face
@@ -19,8 +19,8 @@ from lhdmap.pile.tilt import TiltCheck
 from lhdmap.pile.window import HitWindow
 
 FACE = np.array([0.4, 0.15, 0.9])
-EXACT = Registration(1e-6, 1e-6)
-DRIFTING = Registration(0.003, math.radians(0.2))
+EXACT = FaceRegistration(1e-6, 1e-6)
+DRIFTING = FaceRegistration(0.003, math.radians(0.2))
 
 
 def _face_hits(noise_m: float, climb: float = 0.0, wander_m: float = 1.0, seed: int = 1) -> FloatArray:
@@ -83,7 +83,7 @@ def test_find_prefers_the_large_plane_and_says_none_for_nothing() -> None:
 
 
 evidence = st.builds(
-    Evidence,
+    StatusEvidence,
     inclination_deg=st.floats(-175.0, 0.0),
     std_deg=st.floats(0.0, 90.0),
     grain_m=st.floats(0.0, 2.0),
@@ -96,7 +96,7 @@ evidence = st.builds(
 
 @settings(max_examples=200, deadline=None)
 @given(evidence)
-def test_probabilities_are_a_distribution(seen: Evidence) -> None:
+def test_probabilities_are_a_distribution(seen: StatusEvidence) -> None:
     found = probabilities(seen)
     assert set(found) == set(STATUSES)
     assert all(-1e-12 <= value <= 1.0 + 1e-12 for value in found.values())
@@ -116,13 +116,13 @@ def test_probabilities_are_a_distribution(seen: Evidence) -> None:
     ],
 )
 def test_each_status_owns_its_range(inclination_deg: float, grain_m: float, status: str) -> None:
-    found = probabilities(Evidence(inclination_deg, 0.5, grain_m, 1.0, 0.0, 0.0))
+    found = probabilities(StatusEvidence(inclination_deg, 0.5, grain_m, 1.0, 0.0, 0.0))
     assert max(found, key=lambda name: found[name]) == status
     assert found[status] > 0.95
 
 
 def test_half_a_face_closes_nothing() -> None:
-    found = probabilities(Evidence(-45.0, 0.5, 0.1, 0.35, 0.0, 0.0))
+    found = probabilities(StatusEvidence(-45.0, 0.5, 0.1, 0.35, 0.0, 0.0))
     assert found["none"] == pytest.approx(1.0)
 
 
@@ -179,7 +179,7 @@ def test_window_takes_nothing_twice_while_the_machine_stands() -> None:
 
 
 def test_height_that_was_not_seen_is_as_unsure_as_the_face_is_rough() -> None:
-    smooth, rough = (Face(0.0, 0.0, 1.0, 0.0, np.eye(4), spread, 50) for spread in (0.07, 0.14))
+    smooth, rough = (PileFace(0.0, 0.0, 1.0, 0.0, np.eye(4), spread, 50) for spread in (0.07, 0.14))
     z = np.linspace(0.2, 1.6, 57)  # the heights that the inclination is defined over, floor at 0
     assert _unseen_deg(smooth, 0.0, z) == pytest.approx(0.0, abs=1e-9)
     assert _unseen_deg(smooth, 0.0, z[:20]) > _unseen_deg(smooth, 0.0, z[:36]) > 0.0
@@ -203,6 +203,6 @@ def test_a_face_that_is_only_seen_high_up_is_measured_there(lowest_m: float) -> 
 
 @pytest.mark.parametrize("std_deg", [4.0, 8.0])
 def test_probabilities_do_not_jump_with_the_slope(std_deg: float) -> None:
-    at = [Evidence(angle, std_deg, 0.1, 1.0, 0.0, 0.2, std_deg) for angle in np.arange(-100.0, 0.0, 0.25)]
+    at = [StatusEvidence(angle, std_deg, 0.1, 1.0, 0.0, 0.2, std_deg) for angle in np.arange(-100.0, 0.0, 0.25)]
     steps = np.diff([[probabilities(one)[name] for name in STATUSES] for one in at], axis=0)
     assert np.abs(steps).max() < 0.05

@@ -15,7 +15,7 @@ import pytest
 from lhdmap.errors import InputError
 from lhdmap.messages import Message
 from lhdmap.pipeline import build
-from lhdmap.pipeline.beside import Beside, HelperDied, Here
+from lhdmap.pipeline.beside import HelperDied, Here, ProcessBeside
 from lhdmap.pipeline.build import BuildRequest, BuildResult, build_map
 
 
@@ -65,7 +65,7 @@ class Notebook:
         self._path.write_text(json.dumps(self._numbers), encoding="utf-8")
 
 
-@pytest.mark.parametrize("kind", [Here, Beside])
+@pytest.mark.parametrize("kind", [Here, ProcessBeside])
 def test_what_is_told_is_done_in_order_and_closed(kind: Any, tmp_path: Path) -> None:
     with kind(Notebook, tmp_path / "kept", first=7) as notebook:
         for number in range(100, 400):
@@ -78,7 +78,7 @@ def test_what_is_told_is_done_in_order_and_closed(kind: Any, tmp_path: Path) -> 
 
 
 def test_several_threads_tell(tmp_path: Path) -> None:
-    with Beside(Notebook, tmp_path / "kept") as notebook:
+    with ProcessBeside(Notebook, tmp_path / "kept") as notebook:
 
         def tell(start: int) -> None:
             for number in range(start, start + 500):
@@ -95,7 +95,7 @@ def test_several_threads_tell(tmp_path: Path) -> None:
 
 
 def test_an_error_there_comes_out_of_the_next_question(tmp_path: Path) -> None:
-    with Beside(Notebook, tmp_path / "kept") as notebook:
+    with ProcessBeside(Notebook, tmp_path / "kept") as notebook:
         notebook.tell(Notebook.add, 13)
         notebook.tell(Notebook.add, 14)
         with pytest.raises(InputError, match="13 is refused") as caught:
@@ -106,18 +106,21 @@ def test_an_error_there_comes_out_of_the_next_question(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("kind", [Unsendable, NeedsTwo])
 def test_an_error_that_cannot_be_sent_is_told_in_words(kind: Any, tmp_path: Path) -> None:
-    with Beside(Notebook, tmp_path / "kept") as notebook, pytest.raises(RuntimeError, match=kind.__name__) as caught:
+    with (
+        ProcessBeside(Notebook, tmp_path / "kept") as notebook,
+        pytest.raises(RuntimeError, match=kind.__name__) as caught,
+    ):
         notebook.ask(Notebook.fail, kind)
     assert "in fail" in caught.value.__notes__[0]
 
 
 def test_an_object_that_cannot_be_made(tmp_path: Path) -> None:
-    with Beside(Notebook, tmp_path / "kept", -1) as notebook, pytest.raises(InputError, match="wanted"):
+    with ProcessBeside(Notebook, tmp_path / "kept", -1) as notebook, pytest.raises(InputError, match="wanted"):
         notebook.ask(Notebook.numbers)
 
 
 def test_a_process_that_is_killed_is_told_of(tmp_path: Path) -> None:
-    with Beside(Notebook, tmp_path / "kept") as notebook:
+    with ProcessBeside(Notebook, tmp_path / "kept") as notebook:
         os.kill(notebook.ask(Notebook.process), signal.SIGKILL)
 
         for _ in range(200):  # more than the pipe and the queue hold: nothing may wait for the dead
@@ -127,7 +130,7 @@ def test_a_process_that_is_killed_is_told_of(tmp_path: Path) -> None:
 
 
 def test_ctrl_c_is_left_to_the_side_that_tells(tmp_path: Path) -> None:
-    with Beside(Notebook, tmp_path / "kept") as notebook:
+    with ProcessBeside(Notebook, tmp_path / "kept") as notebook:
         os.kill(notebook.ask(Notebook.process), signal.SIGINT)
         notebook.tell(Notebook.add, 5)
     assert json.loads((tmp_path / "kept").read_text(encoding="utf-8")) == [0, 5]

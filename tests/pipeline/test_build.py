@@ -17,7 +17,7 @@ from lhdmap.logs.source import LogSource
 from lhdmap.logs.writer import LogWriter
 from lhdmap.messages import LaserScan, Mount
 from lhdmap.pipeline.build import BuildRequest, BuildResult, build_map
-from lhdmap.pipeline.outcome import ROLES_READ
+from lhdmap.pipeline.inputs import ROLES_READ
 from lhdmap.provenance import sha256_of
 from lhdmap.simulation.drive import SimulatedDrive
 from lhdmap.trajectory import read_tum

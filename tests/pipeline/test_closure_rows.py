@@ -7,18 +7,18 @@ import math
 import numpy as np
 import pytest
 from lhdmap.pipeline.closures import closure_rows
-from lhdmap.pipeline.track import Rows
+from lhdmap.pipeline.track import TrackRows
 from lhdmap.smoothing.evidence import Evidence
 
 
-def circle() -> Rows:
+def circle() -> TrackRows:
     """Round a circle of 10 m once, a second for each degree; the heading is along it, the height rises by 1 m."""
     degrees = np.arange(361)
     angle = np.radians(degrees)
     poses = np.zeros((361, 6))
     poses[:, 0], poses[:, 1], poses[:, 2] = 10.0 * np.cos(angle), 10.0 * np.sin(angle), degrees / 360.0
     poses[:, 5] = angle + math.pi / 2
-    return Rows(degrees.astype(np.int64) * 1_000_000_000, poses)
+    return TrackRows(degrees.astype(np.int64) * 1_000_000_000, poses)
 
 
 def evidence(offset: list[float], *, accepted: bool = True, reason: str = "") -> Evidence:

@@ -10,7 +10,7 @@ from lhdmap.errors import InputError
 from lhdmap.logs.source import LogSource
 from lhdmap.logs.writer import LogWriter
 from lhdmap.messages import FloatArray, LaserScan, Tachometer
-from lhdmap.pipeline.drives import Drive, drives_of, same_place
+from lhdmap.pipeline.drives import LogDrive, drives_of, same_place
 from lhdmap.simulation.planar import PlanarScanner, simulate_scans
 
 from tests.update.drives import RATE_HZ, first_way, mine
@@ -39,22 +39,22 @@ def way() -> FloatArray:
 
 def test_parts_that_follow_each_other_are_one(tmp_path: Path, way: FloatArray) -> None:
     one, other = write(tmp_path / "1.mcap", scans(way[:50], 0.0)), write(tmp_path / "2.mcap", scans(way[50:], 6.0))
-    assert drives_of([other, one], {}) == [Drive((one, other))]
+    assert drives_of([other, one], {}) == [LogDrive((one, other))]
 
 
 def test_drives_of_one_time_are_two(tmp_path: Path, way: FloatArray) -> None:
     logs = [write(tmp_path / f"{k}.mcap", scans(way[:50], 0.0, k)) for k in (1, 2)]
-    assert drives_of(logs, {}) == [Drive((log,)) for log in logs]
+    assert drives_of(logs, {}) == [LogDrive((log,)) for log in logs]
 
 
 def test_another_place_after_a_pause_is_another_drive(tmp_path: Path, way: FloatArray) -> None:
     one, other = write(tmp_path / "1.mcap", scans(way[:50], 500.0)), write(tmp_path / "2.mcap", scans(way[90:], 0.0))
-    assert drives_of([one, other], {}) == [Drive((one,)), Drive((other,))]  # in the order they were named
+    assert drives_of([one, other], {}) == [LogDrive((one,)), LogDrive((other,))]  # in the order they were named
 
 
 def test_the_same_place_after_a_pause_is_the_same_drive(tmp_path: Path, way: FloatArray) -> None:
     one, other = write(tmp_path / "1.mcap", scans(way[:50], 0.0)), write(tmp_path / "2.mcap", scans(way[50:], 90.0))
-    assert drives_of([one, other], {}) == [Drive((one, other))]
+    assert drives_of([one, other], {}) == [LogDrive((one, other))]
 
 
 def test_a_log_is_parted_where_the_machine_was_moved(tmp_path: Path, way: FloatArray) -> None:
@@ -74,7 +74,7 @@ def test_a_log_is_parted_where_the_machine_was_moved(tmp_path: Path, way: FloatA
 
 def test_a_log_with_a_pause_at_one_place_is_whole(tmp_path: Path, way: FloatArray) -> None:
     log = write(tmp_path / "1.mcap", scans(way[:50], 0.0), scans(way[50:], 60.0))
-    assert drives_of([log], {}) == [Drive((log,))]
+    assert drives_of([log], {}) == [LogDrive((log,))]
 
 
 def test_sensors_in_a_file_of_their_own_are_of_the_drive_of_their_time(tmp_path: Path, way: FloatArray) -> None:
@@ -84,7 +84,7 @@ def test_sensors_in_a_file_of_their_own_are_of_the_drive_of_their_time(tmp_path:
         for k in range(40):
             writer.write("/machine/tachometer", Tachometer(round((1_700_000_900.0 + 0.1 * k) * 1e9), 1.0))
     first, second = drives_of([*fronts, wheels], {})
-    assert first == Drive((fronts[0],))
+    assert first == LogDrive((fronts[0],))
     assert set(second.logs) == {fronts[1], wheels}
 
 

@@ -12,15 +12,16 @@ import pytest
 from lhdmap.cli.main import main
 from lhdmap.config import settings_from
 from lhdmap.errors import InputError, UsageError
-from lhdmap.localization.rows import TRACKING, UNKNOWN, Row
+from lhdmap.localization.rows import TRACKING, UNKNOWN, LocalizationRow
 from lhdmap.logs.source import LogSource
 from lhdmap.logs.writer import LogWriter
 from lhdmap.machine import Machine
 from lhdmap.messages import Tachometer
 from lhdmap.pipeline.build import BuildRequest, build_map
-from lhdmap.pipeline.localize import KnownMap, Localizer
+from lhdmap.pipeline.inputs import ROLES_READ
+from lhdmap.pipeline.known_map import KnownMap
+from lhdmap.pipeline.localize import Localizer
 from lhdmap.pipeline.localize_run import LocalizeRequest, LocalizeResult, localize
-from lhdmap.pipeline.outcome import ROLES_READ
 from lhdmap.runfolder import RunFolder
 from lhdmap.simulation.mine_drive import MineDriveSettings, SimulatedMineDrive, simulate_mine
 from lhdmap.simulation.sensing.sections import ScannerSettings, SensorSettings
@@ -92,7 +93,7 @@ def test_the_folder_is_whole(found: LocalizeResult, capsys: pytest.CaptureFixtur
     folder = RunFolder.open(found.folder, ["localization"])
     assert {one.name for one in found.folder.iterdir()} >= {"localization.parquet", "localization.tum", "report.html"}
     table = pq.read_table(found.folder / "localization.parquet")
-    assert table.column_names == list(Row._fields)
+    assert table.column_names == list(LocalizationRow._fields)
     assert table["stamp_ns"].to_pylist() == [row.stamp_ns for row in found.rows]
     tracked = [row for row in found.rows if row.status == TRACKING]
     path = read_tum(found.folder / "localization.tum")

@@ -14,12 +14,14 @@ from lhdmap.config import Settings
 from lhdmap.logs.survey import Survey
 from lhdmap.messages import LaserScan
 from lhdmap.pipeline import outcome
+from lhdmap.pipeline.again import integrate_again
 from lhdmap.pipeline.build import BuildRequest, build_map
 from lhdmap.pipeline.given import GROUND_TRUTH
+from lhdmap.pipeline.inputs import Inputs
 from lhdmap.pipeline.mapping import MappingPipeline
 from lhdmap.pipeline.records import ScanRecords
 from lhdmap.pipeline.sweeps import SweepIntegration
-from lhdmap.pipeline.track import Rows, Track
+from lhdmap.pipeline.track import Track, TrackRows
 from lhdmap.simulation.drive import SimulatedDrive
 from lhdmap.simulation.planar import PlanarScanner, drift_world, drive_along, simulate_scans
 from lhdmap.smoothing import smoother
@@ -85,11 +87,9 @@ def test_the_pipeline_grows_with_the_map_alone() -> None:
 def test_both_clouds_are_not_held_at_a_time(
     drive: SimulatedDrive, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    left, again = [], outcome.integrate_again
+    left, again = [], integrate_again
 
-    def watched(
-        inputs: outcome.Inputs, pipeline: MappingPipeline, rows: Rows, survey: Survey | None
-    ) -> SweepIntegration:
+    def watched(inputs: Inputs, pipeline: MappingPipeline, rows: TrackRows, survey: Survey | None) -> SweepIntegration:
         left.append(len(pipeline.sweeps.integrator.grid))
         return again(inputs, pipeline, rows, survey)
 

@@ -14,14 +14,14 @@ from lhdmap.logs.writer import LogWriter
 from lhdmap.machine import Machine
 from lhdmap.messages import Inclination, Joints, LaserScan, Mount, PointCloud
 from lhdmap.pipeline.mapping import MappingPipeline
-from lhdmap.pipeline.mounts import Mounts, level_sensor, machine_of
+from lhdmap.pipeline.mounts import SensorMounts, level_sensor, machine_of
 
 T_BASE_MAST = se3.from_rpy(0.0, 0.0, 0.3, (1.0, 0.2, 0.5))
 T_MAST_SCANNER = se3.from_rpy(0.02, -0.05, -0.1, (0.1, 0.0, 1.5))
 
 
 def test_a_chain_of_transforms_is_followed_whatever_its_order() -> None:
-    mounts = Mounts(None)
+    mounts = SensorMounts(None)
     mounts.update(Mount(0, "mast", "scanner", T_MAST_SCANNER))
     assert not mounts.known("scanner")
     mounts.update(Mount(0, "base_link", "mast", T_BASE_MAST))
@@ -33,21 +33,21 @@ def test_a_chain_of_transforms_is_followed_whatever_its_order() -> None:
 
 
 def test_the_rear_body_is_a_body() -> None:
-    mounts = Mounts(None)
+    mounts = SensorMounts(None)
     mounts.update(Mount(0, "rear_link", "back", T_MAST_SCANNER))
     assert mounts.of("back", "rear").parent_frame == "rear_link"
 
 
 def test_without_a_chain_the_machine_file_is_taken() -> None:
     machine = Machine()
-    mounts = Mounts(machine)
+    mounts = SensorMounts(machine)
     found = mounts.of("unknown", "front")
     assert found.T_parent_child == pytest.approx(machine.mounts["lidar_front"].T_parent_sensor)
     assert "unknown" in mounts.warnings[0]
 
 
 def test_without_a_machine_it_is_a_level_sensor() -> None:
-    mounts = Mounts(None)
+    mounts = SensorMounts(None)
     assert mounts.of("laser", "front").T_parent_child == pytest.approx(np.eye(4))
     assert mounts.of("back", "rear").T_parent_child[:2, 0] == pytest.approx([-1.0, 0.0])
     assert len(mounts.warnings) == 2
@@ -57,7 +57,7 @@ def test_without_a_machine_it_is_a_level_sensor() -> None:
 
 @pytest.mark.parametrize("edges", [[("a", "b"), ("b", "a")], [("elsewhere", "a")]])
 def test_transforms_that_lead_nowhere(edges: list[tuple[str, str]]) -> None:
-    mounts = Mounts(None)
+    mounts = SensorMounts(None)
     for parent, child in edges:
         mounts.update(Mount(0, parent, child, np.eye(4)))
     assert not mounts.known("a")
@@ -65,7 +65,7 @@ def test_transforms_that_lead_nowhere(edges: list[tuple[str, str]]) -> None:
 
 
 def test_a_transform_that_is_not_a_number_is_none() -> None:
-    mounts = Mounts(None)
+    mounts = SensorMounts(None)
     mounts.update(Mount(0, "base_link", "a", np.full((4, 4), np.nan)))
     assert not mounts.known("a")
 
@@ -104,7 +104,7 @@ def test_only_an_articulated_machine_is_taken_for_a_loader(joint: str, is_loader
 
 
 def test_a_scanner_on_the_rear_body_is_known_as_such() -> None:
-    mounts = Mounts(None)
+    mounts = SensorMounts(None)
     mounts.update(Mount(0, "rear_link", "scanner", T_MAST_SCANNER))
     assert not mounts.on_rear_body("front")
     mounts.of("scanner", "front")

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 from lhdmap.geometry import se3
-from lhdmap.pipeline.track import FinalTrack, Rows, Track, resample, trajectory_of
+from lhdmap.pipeline.track import FinalTrack, Track, TrackRows, resample, trajectory_of
 from lhdmap.smoothing.smoother import Correction, corrected
 
 START_NS = 1_758_000_000_123_456_789
@@ -16,7 +16,7 @@ START_NS = 1_758_000_000_123_456_789
 def test_times_a_nanosecond_apart_keep_their_poses() -> None:
     """A float holds 16 digits: stamps of 19 must not be told apart by one."""
     times = START_NS + np.array([0, 1, 2, 3], dtype=np.int64)
-    rows = Rows(times, np.column_stack([np.arange(4.0), *[np.zeros(4)] * 5]))
+    rows = TrackRows(times, np.column_stack([np.arange(4.0), *[np.zeros(4)] * 5]))
     found = resample(rows, times)
     assert found.poses[:, 0] == pytest.approx([0.0, 1.0, 2.0, 3.0])
     assert (found.times_ns == times).all()
@@ -24,7 +24,7 @@ def test_times_a_nanosecond_apart_keep_their_poses() -> None:
 
 def test_resampling_is_linear_between_and_bounded_beyond() -> None:
     times = START_NS + np.array([0, 10**8], dtype=np.int64)
-    rows = Rows(times, np.array([[0.0] * 6, [0.4, 0, 0, 0, 0, 0.1]]))
+    rows = TrackRows(times, np.array([[0.0] * 6, [0.4, 0, 0, 0, 0, 0.1]]))
     at = START_NS + np.array([-(10**10), -(10**7), 25 * 10**6, 10**8, 11 * 10**7, 10**10], dtype=np.int64)
     x = resample(rows, at).poses[:, 0]
     assert x[1:5] == pytest.approx([-0.04, 0.1, 0.4, 0.44])
@@ -33,7 +33,7 @@ def test_resampling_is_linear_between_and_bounded_beyond() -> None:
 
 
 def test_one_pose_is_held() -> None:
-    rows = Rows(np.array([START_NS], dtype=np.int64), np.ones((1, 6)))
+    rows = TrackRows(np.array([START_NS], dtype=np.int64), np.ones((1, 6)))
     assert (resample(rows, START_NS + np.array([-5, 0, 5], dtype=np.int64)).poses == 1.0).all()
 
 
@@ -99,7 +99,7 @@ def test_matrices_are_those_of_roll_pitch_and_heading() -> None:
 
 
 def test_a_trajectory_carries_stamps_and_attitude() -> None:
-    rows = Rows(np.array([START_NS], dtype=np.int64), np.array([[1.0, 2.0, 3.0, 0.1, -0.2, 0.7]]))
+    rows = TrackRows(np.array([START_NS], dtype=np.int64), np.array([[1.0, 2.0, 3.0, 0.1, -0.2, 0.7]]))
     found = trajectory_of(rows, rows.times_ns - 7)
     assert found.stamps_ns[0] == START_NS - 7
     assert se3.rpy_from_quaternions(found.quaternions_xyzw)[0] == pytest.approx([0.1, -0.2, 0.7])

@@ -14,6 +14,7 @@ from lhdmap.replay.processes.film import Film
 from lhdmap.replay.processes.plant import COMMAND_LIMIT_NS
 from lhdmap.simulation.drift import Mesh
 from lhdmap.simulation.history import START_NS
+from lhdmap.simulation.sensing.faults import FaultSettings
 
 from tests.replay.doubles import Corridor, Straight, parts
 from tests.replay.runs import go, scenario
@@ -46,6 +47,24 @@ def test_a_fault_begins_at_its_place() -> None:
     began = run.faults.all[0].told()["began_s"]
     assert began == pytest.approx((12.0 - 3.0) / 2.0 + 1.0, abs=0.05)  # 2 m/s after 2 s at 1 m/s²; 3 m before it
     assert (listener.got[-1].sent_ns - START_NS) / S == pytest.approx(began, abs=0.02)
+
+
+def test_a_fault_begun_in_a_run_under_way_is_that_of_a_scenario_at_this_time() -> None:
+    """Until it begins, and after it has ended, all is as without it; the verdict tells it like the others."""
+    listener, whole = Listener("/inclinometer"), parts(Straight(10.0), scans=False)
+    journal = Journal()
+    run = assemble(scenario(), whole, journal, Watchers(Film(whole.machine), more=[listener]))
+    for now_ns in run.engine.run(START_NS + 5 * S):
+        if now_ns >= START_NS + 2 * S and not run.faults.all:
+            run.faults.inject(FaultSettings(kind="dead", target="/inclinometer", duration_s=1.5), now_ns)
+    run.engine.finish()
+    began_s = run.faults.all[0].told()["began_s"]
+    assert began_s == pytest.approx(2.0, abs=0.1)
+    assert run.faults.all[0].told()["ended_s"] == pytest.approx(began_s + 1.5)
+    sent_s = [(one.sent_ns - START_NS) / S for one in listener.got]
+    assert [at for at in sent_s if at < began_s - 0.02]
+    assert not [at for at in sent_s if began_s + 0.02 <= at < began_s + 1.48]
+    assert [at for at in sent_s if at >= began_s + 1.52]
 
 
 def test_a_fault_of_a_sensor_by_time_is_that_of_a_log() -> None:

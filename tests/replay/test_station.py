@@ -86,3 +86,12 @@ def test_who_does_not_know_the_place_is_not_driven_by_hand() -> None:
     said = words(station(), HEALTHY._replace(asks=UNKNOWN), 0.0, 5.0)
     assert not any(word.mode for _, word in said)
     assert said[-1][1].go_on
+
+
+def test_on_a_surface_site_it_says_go_on_and_does_not_drive() -> None:
+    one = Station((ModeAt(),), 5.0, 3.0, Journal().of("station"), 1, backs_up=False)
+    said = words(one, HEALTHY._replace(asks="no way to the dock"), 0.0, 5.0)
+    assert next(at for at, word in said if word.go_on) == 3.0
+    assert {word.mode for _, word in said} == {""}
+    words(one, HEALTHY, 5.0, 5.2)
+    assert next(word.gave_up for _, word in words(one, HEALTHY._replace(asks="again"), 5.2, 6.0) if word.gave_up)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from lhdmap.evaluation.trajectory import evaluate_trajectory
 from lhdmap.geometry.se3 import quaternions_from_rpy
-from lhdmap.integration.cloud import Cloud
+from lhdmap.integration.cloud import GridCloud
 from lhdmap.mapfolder import Diagnostics
 from lhdmap.report.data import AngleSeries, ReportData, SpeedSeries, Summary, TopicRow
 from lhdmap.trajectory import Trajectory
@@ -27,7 +27,7 @@ def drive(scans: int = 9000, speed_mps: float = 2.0, scale: float = 1.0, heading
     return Trajectory(stamps, positions, quaternions)
 
 
-def tunnel_cloud(path: Trajectory, points: int, seed: int = 0) -> Cloud:
+def tunnel_cloud(path: Trajectory, points: int, seed: int = 0) -> GridCloud:
     """Return points on walls, floor and roof of a tunnel round the path, with normals and curvature."""
     rng = np.random.default_rng(seed)
     rows = rng.integers(0, len(path.stamps_ns), points)
@@ -41,7 +41,7 @@ def tunnel_cloud(path: Trajectory, points: int, seed: int = 0) -> Cloud:
     rough = 0.15 * np.sin(rows / 90.0) + rng.normal(0, 0.05, points)
     xy = path.positions_m[rows, :2] + left * (across + np.sign(across) * rough)[:, None]
     cloud = np.column_stack([xy, path.positions_m[rows, 2] + up + 0.3 * rough]).astype(np.float32)
-    return Cloud(cloud, np.zeros_like(cloud), np.zeros(points, np.float32), path.stamps_ns[rows])
+    return GridCloud(cloud, np.zeros_like(cloud), np.zeros(points, np.float32), path.stamps_ns[rows])
 
 
 def diagnostics(path: Trajectory, seed: int = 0) -> Diagnostics:

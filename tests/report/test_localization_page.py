@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from lhdmap.localization.changes import CAME, Change
 from lhdmap.localization.episodes import Episode
-from lhdmap.localization.rows import NOWHERE, TRACKING, Row
-from lhdmap.localization.search import FIND, Candidate, Search
+from lhdmap.localization.rows import NOWHERE, TRACKING, LocalizationRow
+from lhdmap.localization.search import FIND, PlaceCandidate, Search
 from lhdmap.machine import Machine
 from lhdmap.report.localization_data import LocalizationData
 from lhdmap.report.localization_page import write_localization_report
@@ -41,13 +41,13 @@ UNKNOWN_ROWS = [NOWHERE._replace(stamp_ns=k * 100_000_000, latency_ms=0.1) for k
 NODE = ladder().tunnels[0].id
 
 
-def candidate(x_m: float, probability: float) -> Candidate:
+def candidate(x_m: float, probability: float) -> PlaceCandidate:
     told = {"pose": np.array([x_m, 0.0, 0.1]), "node": NODE, "probability": probability}
-    return Candidate(**dict.fromkeys(Candidate._fields, 0.0) | told)  # type: ignore[arg-type]
+    return PlaceCandidate(**dict.fromkeys(PlaceCandidate._fields, 0.0) | told)  # type: ignore[arg-type]
 
 
 def data(
-    rows: list[Row], summary: dict[str, Any], warnings: list[str] | None = None, *, full: bool = True
+    rows: list[LocalizationRow], summary: dict[str, Any], warnings: list[str] | None = None, *, full: bool = True
 ) -> LocalizationData:
     places = candidate(5.0, 0.7), candidate(9.0, 0.3)
     change = Change(CAME, NODE, "left", 12.0, 18.0, 6.0, 0.7, (15.0, 1.0, 0.0), 3_000_000_000, 9_000_000_000, 9)

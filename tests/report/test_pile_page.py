@@ -12,7 +12,7 @@ from xml.etree import ElementTree as ET
 import numpy as np
 import pytest
 from lhdmap.messages import FloatArray
-from lhdmap.pile.result import Approach, AttackPoint, Boulder, PileEstimate, PileReport, Snapshot
+from lhdmap.pile.result import AttackPoint, Boulder, PileApproach, PileEstimate, PileReport, Snapshot
 from lhdmap.report.page import render_report
 from lhdmap.report.pile_charts import Ahead
 from lhdmap.report.pile_page import pile_sections, write_pile_report
@@ -185,7 +185,7 @@ def test_all_that_was_decided_is_listed(report: PileReport) -> None:
     """Two piles on one drive: the page draws one, and lists both."""
     assert report.last is not None
     other = report.last._replace(estimate=replace(report.last.estimate, status="wall", width_m=3.21))
-    both = replace(report, piles=(Approach(other, other), Approach(report.last, report.last)))
+    both = replace(report, piles=(PileApproach(other, other), PileApproach(report.last, report.last)))
     page = pile_sections(both)
     assert "All that was decided on this drive" in page
     assert "3.21" in page

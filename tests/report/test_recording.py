@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 from lhdmap.errors import InputError
-from lhdmap.integration.cloud import Cloud
+from lhdmap.integration.cloud import GridCloud
 from lhdmap.machine import Machine
 from lhdmap.messages import Joints, LaserScan, Mount, Tachometer
 from lhdmap.report.log_recording import LogRecorder
@@ -85,7 +85,7 @@ def test_the_machine_moves_along_the_trajectory(tmp_path: Path) -> None:
 
 def test_points_appear_when_they_were_first_measured(tmp_path: Path) -> None:
     stamps = START_NS + np.array([5, 1, 3]) * 1_000_000_000
-    cloud = Cloud(np.array([[5, 0, 0], [1, 0, 0], [3, 0, 0]], np.float32), stamps_ns=stamps)
+    cloud = GridCloud(np.array([[5, 0, 0], [1, 0, 0], [3, 0, 0]], np.float32), stamps_ns=stamps)
     with RecordingWriter(tmp_path / "r.rrd", "drive", START_NS, RecordingSettings(cloud_parts=3)) as writer:
         writer.add_cloud(cloud)
     found = read(tmp_path / "r.rrd")

@@ -11,7 +11,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from lhdmap.errors import ConfigError, InputError
-from lhdmap.rockbreaker import kinematics
+from lhdmap.rockbreaker import cylinders, kinematics
 from lhdmap.rockbreaker.machine import Rockbreaker, load_rockbreaker, rockbreaker_toml
 from lhdmap.rockbreaker.orientation import candidates, nearest_vertical, phi_intervals, phi_range, planar_position
 from lhdmap.rockbreaker.reach import workspace_json
@@ -43,15 +43,15 @@ def test_inverse_kinematics_of_the_corners(
 ) -> None:
     theta = kinematics.theta_of_pose(MACHINE, pose)
     assert np.degrees(theta) == pytest.approx(np.array(theta_deg), abs=6e-5)
-    assert kinematics.rho_of_theta(MACHINE, theta) == pytest.approx(np.array(rho_m), abs=6e-6)
+    assert cylinders.rho_of_theta(MACHINE, theta) == pytest.approx(np.array(rho_m), abs=6e-6)
 
 
 @given(SHARES)
 def test_round_trips(shares: list[float]) -> None:
     low, high = MACHINE.theta_limits
     theta = low + np.array(shares) * (high - low)
-    rho = kinematics.rho_of_theta(MACHINE, theta)
-    assert np.abs(kinematics.theta_of_rho(MACHINE, rho) - theta).max() <= 1e-9
+    rho = cylinders.rho_of_theta(MACHINE, theta)
+    assert np.abs(cylinders.theta_of_rho(MACHINE, rho) - theta).max() <= 1e-9
     pose = kinematics.pose_of_theta(MACHINE, theta)
     if abs(math.atan2(pose[1], pose[0]) - theta[0]) < 1e-6:  # else the arm reaches back over its post
         back = kinematics.theta_of_pose(MACHINE, pose)
@@ -64,8 +64,8 @@ def test_both_swing_cylinders_give_the_same_angle(shares: list[float]) -> None:
     low, high = MACHINE.theta_limits
     theta = low + np.array(shares) * (high - low)
     mirrored = theta * np.array([-1.0, 1.0, 1.0, 1.0])
-    assert kinematics.rho_of_theta(MACHINE, theta)[0] == pytest.approx(
-        kinematics.rho_of_theta(MACHINE, mirrored)[1], abs=1e-12
+    assert cylinders.rho_of_theta(MACHINE, theta)[0] == pytest.approx(
+        cylinders.rho_of_theta(MACHINE, mirrored)[1], abs=1e-12
     )
 
 
@@ -86,7 +86,7 @@ def test_jacobians_are_the_derivatives(shares: list[float]) -> None:
         return np.append(found[:3], angles[1:].sum())
 
     def rho(angles: np.ndarray) -> np.ndarray:
-        return kinematics.rho_of_theta(MACHINE, angles)
+        return cylinders.rho_of_theta(MACHINE, angles)
 
     assert np.abs(kinematics.jacobian_theta(MACHINE, theta) - _differences(pose, theta)).max() <= 1e-6
     assert np.abs(kinematics.jacobian_rho(MACHINE, theta) - _differences(rho, theta)).max() <= 1e-6
@@ -99,7 +99,7 @@ def test_the_jacobian_from_pose_to_cylinders_is_the_derivative() -> None:
             continue
 
         def rho(at: np.ndarray) -> np.ndarray:
-            return kinematics.rho_of_theta(MACHINE, kinematics.theta_of_pose(MACHINE, at))
+            return cylinders.rho_of_theta(MACHINE, kinematics.theta_of_pose(MACHINE, at))
 
         assert np.abs(kinematics.jacobian_pose(MACHINE, theta) - _differences(rho, pose)).max() <= 1e-6
 

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from lhdmap.evaluation.rockbreaker import regenerate
-from lhdmap.rockbreaker import kinematics
+from lhdmap.rockbreaker import cylinders, kinematics
 from lhdmap.rockbreaker.flow import flow_curve
 from lhdmap.rockbreaker.machine import Rockbreaker
 from lhdmap.rockbreaker.paths import KINDS, Kind
@@ -38,7 +38,7 @@ def loads(trajectory: Trajectory, samples: int = 20_000) -> np.ndarray:
     t = np.linspace(0.0, trajectory.law.duration_s, samples)
     sigma, _ = trajectory.law(t)
     poses = np.column_stack([trajectory.path.tip(sigma), trajectory.path.turning(sigma)[0]])
-    rho = kinematics.rho_of_theta(MACHINE, kinematics.theta_of_pose(MACHINE, poses))
+    rho = cylinders.rho_of_theta(MACHINE, kinematics.theta_of_pose(MACHINE, poses))
     rates = np.diff(rho, axis=0) / np.diff(t)[:, None]
     flows = np.where(rates > 0.0, _BLIND, _ROD) * np.abs(rates)
     valves = np.column_stack([flows[:, 0] + flows[:, 1], flows[:, 2:]])
@@ -58,7 +58,7 @@ def assert_sound(trajectory: Trajectory) -> None:
     low, high = MACHINE.theta_limits
     assert (theta >= low - 1e-6).all()
     assert (theta <= high + 1e-6).all()
-    rho = kinematics.rho_of_theta(MACHINE, theta)
+    rho = cylinders.rho_of_theta(MACHINE, theta)
     assert (rho >= np.array([1.07, 1.07, 1.54, 1.54, 1.54]) - 1e-6).all()
     assert (rho <= np.array([1.5, 1.5, 2.65, 2.65, 2.65]) + 1e-6).all()
     assert trajectory.law.duration_s >= trajectory.bound_s - 1e-9
@@ -287,7 +287,7 @@ def test_the_bound_is_the_net_stroke_over_the_flow_limit() -> None:
     """T6 turns the swing alone: one cylinder extends on its blind side as the other retracts on its rod side."""
     trajectory = planned(*ENDS["T6"], "dsjm", "paper").trajectory
     assert trajectory is not None
-    rho = [kinematics.rho_of_theta(MACHINE, kinematics.theta_of_pose(MACHINE, pose)) for pose in ENDS["T6"]]
+    rho = [cylinders.rho_of_theta(MACHINE, kinematics.theta_of_pose(MACHINE, pose)) for pose in ENDS["T6"]]
     stroke = rho[1] - rho[0]
     volume = 1.03e-2 * stroke[stroke > 1e-9].sum() + 7.16e-3 * np.abs(stroke[stroke < -1e-9]).sum()
     assert trajectory.bound_s == pytest.approx(volume / (24.0 / 60_000.0), abs=1e-9)
@@ -326,7 +326,7 @@ def test_a_limit_of_the_cylinders_speed_is_kept() -> None:
     assert trajectory is not None
     t = np.linspace(0.0, trajectory.law.duration_s, 20_000)
     theta = trajectory.path.theta(trajectory.law(t)[0])
-    speed = np.abs(np.diff(kinematics.rho_of_theta(slow, theta)[:, 3])) / t[1]
+    speed = np.abs(np.diff(cylinders.rho_of_theta(slow, theta)[:, 3])) / t[1]
     assert speed.max() == pytest.approx(0.02, rel=1e-3)
 
 

@@ -9,11 +9,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 from lhdmap.errors import ConfigError, InputError, LhdmapError
-from lhdmap.integration.cloud import Cloud
+from lhdmap.integration.cloud import GridCloud
 from lhdmap.integration.cloud_io import write_cloud
 from lhdmap.rockbreaker.collision import Obstacles, axis_points, without_arm
+from lhdmap.rockbreaker.cylinders import rho_of_theta
 from lhdmap.rockbreaker.environment import cloud_in_base, read_boxes
-from lhdmap.rockbreaker.kinematics import rho_of_theta
 from lhdmap.rockbreaker.machine import Rockbreaker
 from lhdmap.rockbreaker.plan import Planner, Request, Trajectory, start_joints
 from lhdmap.rockbreaker.rocks import find_rocks
@@ -53,8 +53,8 @@ def test_a_cloud_in_a_national_grid_is_placed_to_the_millimetre(tmp_path: Path) 
     place = (412_345.0, 6_743_210.0, 312.0)
     machine = replace(MACHINE, base=replace(MACHINE.base, position_m=place))
     points = simulate_grizzly(MACHINE, 3).points_m
-    write_cloud(tmp_path / "utm.laz", Cloud(points.astype(np.float32), origin_m=place))
-    write_cloud(tmp_path / "local.laz", Cloud(points.astype(np.float32)))
+    write_cloud(tmp_path / "utm.laz", GridCloud(points.astype(np.float32), origin_m=place))
+    write_cloud(tmp_path / "local.laz", GridCloud(points.astype(np.float32)))
     found, local = cloud_in_base(tmp_path / "utm.laz", machine), cloud_in_base(tmp_path / "local.laz", MACHINE)
     assert len(found) == len(local)
     assert np.abs(found - local).max() < 0.0005

@@ -10,7 +10,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from lhdmap.geometry import se2
 from lhdmap.messages import FloatArray
-from lhdmap.scan_matching.matching import NO_SLANTS, Hits, MatchModel, Prior, match, normal_equations, solve3
+from lhdmap.scan_matching.equations import normal_equations, solve3
+from lhdmap.scan_matching.matching import NO_SLANTS, Hits, MatchModel, Prior, match
 from lhdmap.scan_matching.scan_points import planar_points
 from lhdmap.scan_matching.search import SearchGrid, search
 from lhdmap.scan_matching.surface_map import LINE, SurfaceMap, empty_map, insert_all

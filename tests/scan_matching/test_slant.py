@@ -14,8 +14,8 @@ from lhdmap.config import Settings
 from lhdmap.geometry.se3 import from_rpy
 from lhdmap.logs.source import LogSource
 from lhdmap.messages import FloatArray
+from lhdmap.pipeline.inputs import ROLES_READ
 from lhdmap.pipeline.mapping import MappingPipeline, feed
-from lhdmap.pipeline.outcome import ROLES_READ
 from lhdmap.pipeline.track import resample
 from lhdmap.scan_matching.slant import rise_of, slants
 from lhdmap.simulation.drive import simulate_drift

@@ -68,10 +68,10 @@ def test_a_clot_of_hits_has_no_direction() -> None:
     """Few hits on a far face, scattered by noise along the beams, look like a line anywhere between; a true wall stays one."""
     noise_m, at = 0.012, (0.0, 0.0, 0.01)
     rng = np.random.default_rng(4)
-    clot = np.column_stack([rng.normal(0.0, 2.0 * noise_m, 12), rng.normal(0.0, noise_m, 12), np.full(12, 0.01)])
+    cluster = np.column_stack([rng.normal(0.0, 2.0 * noise_m, 12), rng.normal(0.0, noise_m, 12), np.full(12, 0.01)])
     line, plain = np.zeros(LINE), np.zeros(LINE)
-    assert fit_line(mapped(clot).fine, at, False, (3.0, 0.0), ROOM, plain)
-    assert fit_line(mapped(clot).fine, at, False, (3.0, (1.5 * noise_m) ** 2), ROOM, line)
+    assert fit_line(mapped(cluster).fine, at, False, (3.0, 0.0), ROOM, plain)
+    assert fit_line(mapped(cluster).fine, at, False, (3.0, (1.5 * noise_m) ** 2), ROOM, line)
     assert plain[4] < noise_m**2
     assert line[4] > (4.0 * noise_m) ** 2
     straight = mapped(wall((0.0, 0.0), 0.0))

@@ -65,6 +65,7 @@ _SECTIONS = {
     "movement": Case("route"),
     "recording": Case("recording"),
     "rockbreaker": Case("plan"),
+    "console": Case("attended"),
     "topology": Case("topology"),
 }
 
@@ -116,6 +117,7 @@ _LOADING_CYCLE = (
 _SETTINGS = {
     **{f"loading.{key}": Case("loading_cycle") for key in _LOADING_CYCLE},
     "loading.press_most_bar": Case("loading_cycle", 28.0),
+    "loading.follows_s": Case("loading_cycle", 0.2),
     "loading.rack_s": Case("loading_cycle", 0.5),
     "loading.align_deg": Case("loading_limits", 5.0),
     "loading.landing_m": Case("loading_limits", 0.7),

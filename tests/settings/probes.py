@@ -19,7 +19,7 @@ from typing import Any, Literal, cast
 import numpy as np
 from lhdmap.cli.main import main
 from lhdmap.config import Settings, settings_toml
-from lhdmap.integration.cloud import Cloud
+from lhdmap.integration.cloud import GridCloud
 from lhdmap.integration.cloud_io import write_cloud
 from lhdmap.landmarks.build import landmarks_of
 from lhdmap.landmarks.scans import NodeScan
@@ -28,7 +28,7 @@ from lhdmap.messages import FloatArray
 from lhdmap.movement.check import topology_findings
 from lhdmap.movement.route import route_json
 from lhdmap.movement.routes import RouteOptions, route
-from lhdmap.odometry.cloud_odometry import CloudStep
+from lhdmap.odometry.cloud.steps import CloudStep
 from lhdmap.odometry.steps import OdometryStep
 from lhdmap.pile.stage import ScanHits
 from lhdmap.pipeline.heading import gyro_correction
@@ -36,7 +36,7 @@ from lhdmap.pipeline.inspection import Inspection
 from lhdmap.pipeline.localize import Localizer
 from lhdmap.pipeline.mapping import MappingPipeline
 from lhdmap.pipeline.pile import PileWatch, PlacedScan
-from lhdmap.pipeline.track import Rows
+from lhdmap.pipeline.track import TrackRows
 from lhdmap.rockbreaker.machine import Rockbreaker
 from lhdmap.simulation.grizzly import simulate_grizzly
 from lhdmap.smoothing.trust import expected_error
@@ -50,6 +50,7 @@ from tests.movement.mines import fast_ladder
 from tests.report.synthetic import START_NS, report_data
 from tests.report.test_recording import read
 from tests.settings import loading, streams
+from tests.settings.consoled import operated
 from tests.settings.digs import charges, decisions, digs, weighings
 from tests.settings.guided import barred, plans, remembered, stops, trips
 from tests.settings.hauled import asked, fleet, tried
@@ -128,7 +129,7 @@ def turning(settings: Settings) -> str:
     heading = 0.4 * (1.0 - np.cos(0.5 * t)) + 1e-3 * np.cumsum(np.random.default_rng(9).standard_normal(len(t)))
     x, y = 0.3 * np.cumsum(np.cos(heading)), 0.3 * np.cumsum(np.sin(heading))
     zero = np.zeros(len(t))
-    rows = Rows(np.round(t * 1e9).astype(np.int64), np.column_stack([x, y, zero, zero, zero, heading]))
+    rows = TrackRows(np.round(t * 1e9).astype(np.int64), np.column_stack([x, y, zero, zero, zero, heading]))
     return digest(gyro_correction(pipeline, rows))
 
 
@@ -194,7 +195,7 @@ def rock(settings: Settings) -> str:
     """Return the digest of the plan to the largest rock on a grizzly."""
     with tempfile.TemporaryDirectory() as folder:
         cloud = Path(folder) / "grizzly.ply"
-        write_cloud(cloud, Cloud(simulate_grizzly(Rockbreaker(), 3).points_m.astype(np.float32)))
+        write_cloud(cloud, GridCloud(simulate_grizzly(Rockbreaker(), 3).points_m.astype(np.float32)))
         return _planned(settings, ["--cloud", str(cloud)])
 
 
@@ -337,6 +338,11 @@ def tracked(settings: Settings) -> str:
     return digest(tracks(settings.tracking))
 
 
+def attended(settings: Settings) -> str:
+    """Return the digest of when a silent or slow operator stops a machine, of sessions, tries and alarms."""
+    return digest(operated(settings.console))
+
+
 def docked(settings: Settings) -> str:
     """Return the digest of ways to a dock on wide and tight aprons, or why there is none."""
     return digest(docks(settings.docking))
@@ -385,6 +391,7 @@ PROBES: dict[str, Probe] = {
     "loading_limits": loading_limits,
     "tracked": tracked,
     "docked": docked,
+    "attended": attended,
     "hauled": hauled,
     "shared": shared,
     "landmarks": landmarks,

@@ -15,7 +15,7 @@ from lhdmap.simulation.drift import Mesh
 from lhdmap.simulation.pile_facts import PileTruth, fit_face
 from lhdmap.simulation.pile_rocks import cylinder, extent, rock
 from lhdmap.simulation.pile_scenes import scene
-from lhdmap.simulation.pile_sections import VARIANTS, MountingSettings, PileSettings
+from lhdmap.simulation.pile_sections import VARIANTS, MountingSettings, SimulatedPileSettings
 from lhdmap.simulation.pile_truth import off_walls, pile_truth, plane_over
 from lhdmap.simulation.raycast import Surface
 from lhdmap.simulation.scenario import DriftScenario, scenario_from, scenario_toml
@@ -32,7 +32,7 @@ CLEAN = DriftSettings(
     floor_roughness_m=0.0,
     mesh_m=0.1,
 )
-PLANE = PileSettings(toe_m=20.0, back_m=6.0, d50_m=0.0, roughness_m=0.0)
+PLANE = SimulatedPileSettings(toe_m=20.0, back_m=6.0, d50_m=0.0, roughness_m=0.0)
 DRIVE = DriveSettings(distance_m=12.0, wander_m=0.0, vibration_deg=0.0)
 
 

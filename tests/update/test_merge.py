@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 import pytest
-from lhdmap.integration.cloud import Cloud
+from lhdmap.integration.cloud import GridCloud
 from lhdmap.smoothing.smoother import Correction
 from lhdmap.topology.views import Fan, View
 from lhdmap.trajectory import Trajectory
@@ -31,7 +31,7 @@ def test_a_trajectory_moves_rigidly_where_the_correction_is_one_motion() -> None
 
 
 def test_a_cloud_moves_with_its_normals() -> None:
-    cloud = Cloud(
+    cloud = GridCloud(
         np.array([[1.0, 0.0, 2.0]], np.float32), np.array([[1.0, 0.0, 0.0]], np.float32), stamps_ns=STAMPS[1:2]
     )
     moved = moved_cloud(cloud, TURN)
@@ -46,8 +46,8 @@ def test_walls_that_went_leave_the_cloud_and_new_points_come_in() -> None:
     side = np.array([[x, 2.5, 1.0] for x in np.linspace(0.0, 20.0, 81)], np.float32)
     floor = np.array([[10.0, y, 0.02] for y in np.linspace(-2.0, 2.0, 21)], np.float32)
     known, drive = (
-        Cloud(np.vstack([wall, side, floor])),
-        Cloud(np.vstack([side + 0.001, [[19.0, -2.5, 1.0]]]).astype(np.float32)),
+        GridCloud(np.vstack([wall, side, floor])),
+        GridCloud(np.vstack([side + 0.001, [[19.0, -2.5, 1.0]]]).astype(np.float32)),
     )
     joined = joined_clouds(known, drive, wall[::5, :2].astype(float), path).points_m
     across = (np.abs(joined[:, 0] - 10.0) < 0.05) & (np.abs(joined[:, 1]) < 2.2)

@@ -19,9 +19,9 @@ from lhdmap.integration.project import SweepPoses
 from lhdmap.logs.source import LogSource
 from lhdmap.machine import Machine
 from lhdmap.messages import FloatArray, LaserScan, Mount
-from lhdmap.odometry.flow_scan import Pyramid
 from lhdmap.odometry.planar import PlanarOdometry
-from lhdmap.odometry.range_flow import Flow, flow
+from lhdmap.odometry.range_flow.flow import Flow, flow
+from lhdmap.odometry.range_flow.scan import Pyramid
 from lhdmap.odometry.settings import OdometrySettings, RangeFlowSettings
 from lhdmap.scan_matching.matching import Hits
 from lhdmap.scan_matching.scan_points import planar_points

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from lhdmap.geometry import se2
 from lhdmap.messages import FloatArray
-from lhdmap.pipeline.track import Rows
+from lhdmap.pipeline.track import TrackRows
 from lhdmap.proprioception.gyro import GyroSettings
 from lhdmap.smoothing.heading import GyroNoise, Heading, fused_heading
 from lhdmap.smoothing.heading import Path as PlanarPath
@@ -85,19 +85,19 @@ def error_deg(one: Driven, bad: Bad | None, seed: int) -> float:
     return float(np.degrees(error[-1] - error[0]))
 
 
-def drift_deg_per_km(path: Rows, truth: Rows) -> float:
+def drift_deg_per_km(path: TrackRows, truth: TrackRows) -> float:
     """Return the heading's error at the end against the start, per kilometre."""
     error = path.poses[:, 5] - truth.poses[:, 5]
     return float(np.degrees(error[-1] - error[0]) / way_m(truth) * 1e3)
 
 
-def end_m(path: Rows, truth: Rows) -> float:
+def end_m(path: TrackRows, truth: TrackRows) -> float:
     """Return how far the end is off in the plane, both paths from the same start."""
     own, true = (se2.between(rows.poses[0, _PLANAR], rows.poses[-1, _PLANAR]) for rows in (path, truth))
     return float(np.hypot(*(own - true)[:2]))
 
 
-def way_m(path: Rows) -> float:
+def way_m(path: TrackRows) -> float:
     """Return the length of a path in the plane."""
     return float(np.hypot(*np.diff(path.poses[:, :2], axis=0).T).sum())
 

@@ -11,10 +11,10 @@ from lhdmap.config import settings_from
 from lhdmap.geometry import se3
 from lhdmap.logs.source import LogSource
 from lhdmap.messages import FloatArray, GroundTruth, LaserScan, PointCloud
+from lhdmap.pipeline.inputs import ROLES_READ
 from lhdmap.pipeline.mapping import MappingPipeline
 from lhdmap.pipeline.mounts import machine_of
-from lhdmap.pipeline.outcome import ROLES_READ
-from lhdmap.pipeline.track import Rows, resample
+from lhdmap.pipeline.track import TrackRows, resample
 
 from tools.evaluate.heading_drives import drive_of
 
@@ -24,9 +24,9 @@ _SETTINGS = {"pile.method": "off", "topology.method": "off"}
 class Driven(NamedTuple):
     """What is kept of a drive: paths at the processed scans by odometry, realigned, and true, key scans, the gyroscope's turn."""
 
-    odometry: Rows
-    final: Rows
-    truth: Rows
+    odometry: TrackRows
+    final: TrackRows
+    truth: TrackRows
     keys: Any
     gyro: FloatArray
 
@@ -52,7 +52,7 @@ def driven(log: Path, changes: dict[str, Any] | None = None) -> Driven:
     odometry = pipeline.track.rows()
     rpy = se3.rpy_from_quaternions(np.array([one.quaternion_xyzw for one in truth]))
     rpy[:, 2] = np.unwrap(rpy[:, 2])
-    true = Rows(
+    true = TrackRows(
         np.array([one.stamp_ns for one in truth], dtype=np.int64),
         np.column_stack([np.array([one.position_m for one in truth]), rpy]),
     )

@@ -21,9 +21,10 @@ from lhdmap.geometry import se3
 from lhdmap.logs.source import LogSource
 from lhdmap.machine import Machine
 from lhdmap.messages import FloatArray
+from lhdmap.pipeline.again import integrate_again
+from lhdmap.pipeline.inputs import ROLES_READ, Inputs
 from lhdmap.pipeline.mapping import MappingPipeline, feed
-from lhdmap.pipeline.outcome import ROLES_READ, Inputs, integrate_again
-from lhdmap.pipeline.track import Rows, resample, trajectory_of
+from lhdmap.pipeline.track import TrackRows, resample, trajectory_of
 from lhdmap.simulation.drive import SimulatedDrive, simulate_drift
 from lhdmap.simulation.scenario import DriftScenario
 from lhdmap.simulation.sections import DriftSettings, DriveSettings
@@ -83,11 +84,11 @@ def mapped(log: Path) -> MappingPipeline:
         return feed(pipeline, source.messages([role for role in ROLES_READ if role in source.roles]))
 
 
-def rows_of(trajectory: Trajectory) -> Rows:
+def rows_of(trajectory: Trajectory) -> TrackRows:
     """Return a trajectory as rows of x, y, z, roll, pitch, heading."""
     rpy = se3.rpy_from_quaternions(trajectory.quaternions_xyzw)
     rpy[:, 2] = np.unwrap(rpy[:, 2])
-    return Rows(trajectory.stamps_ns, np.column_stack([trajectory.positions_m, rpy]))
+    return TrackRows(trajectory.stamps_ns, np.column_stack([trajectory.positions_m, rpy]))
 
 
 def in_truth_frame(points_m: FloatArray, estimate: Trajectory, truth: Trajectory) -> FloatArray:

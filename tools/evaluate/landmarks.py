@@ -23,7 +23,7 @@ from lhdmap.geometry import se2
 from lhdmap.landmarks.build import landmarks_of, node_surface
 from lhdmap.landmarks.icp import align, best_of
 from lhdmap.landmarks.model import Landmarks
-from lhdmap.landmarks.scans import Cloud, along_tunnel
+from lhdmap.landmarks.scans import NodeCloud, along_tunnel
 from lhdmap.landmarks.settings import LandmarkSettings
 from lhdmap.landmarks.similarity import icp_model
 from lhdmap.landmarks.store import write_landmarks
@@ -88,7 +88,7 @@ def found_in(seed: int, rms_m: float, length_m: float, settings: LandmarkSetting
 
 
 def _looked_for(
-    made: Landmarks, other: list[Cloud], j: int, settings: LandmarkSettings
+    made: Landmarks, other: list[NodeCloud], j: int, settings: LandmarkSettings
 ) -> Iterator[tuple[tuple[float, float], bool, bool]]:
     """Yield for each cloud of the other drive: its error (m, degrees) on landmark `j`, whether it is near it, whether it fits."""
     model = icp_model(settings)

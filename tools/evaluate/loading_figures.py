@@ -17,6 +17,7 @@ from lhdmap.loading.weighing_settings import AttemptSettings, WeighingSettings
 from lhdmap.resources import resource
 from lhdmap.simulation.ground.sections import load_ground
 
+from tools.evaluate.loading_bounds import bounds
 from tools.evaluate.loading_charges import MIX, Charges, charge_all
 from tools.evaluate.loading_loads import Dug, Plan, run_load, with_common, with_paper
 from tools.evaluate.loading_weighed import weigh_in_loop
@@ -277,4 +278,5 @@ def _rate(loads: Digs, stops: Sequence[int], haul_s: float) -> list[float]:
 
 PARTS: dict[str, Callable[[int], dict[str, Any]]] = {
     "weighing": weighing, "detection": detection, "tables": tables, "methods": methods, "errata": errata, "attempts": attempts,
+    "bounds": bounds,
 }  # fmt: skip

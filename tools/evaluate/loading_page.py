@@ -7,6 +7,7 @@ from typing import Any
 
 from lhdmap.evaluation.loading.paper import printed_3, printed_5
 
+from tools.evaluate.loading_bounds import section
 from tools.evaluate.loading_charges import MIX
 
 Found = Mapping[str, Any]
@@ -36,6 +37,7 @@ def page(found: Found) -> str:
     count = found.get("methods", {}).get("default", {}).get("rows", {}).get("paper", {}).get("n", 0)
     texts = [_HEAD.format(loads=f"{count} loads a method on the default mine")]
     texts += [write(found[name]) for name, write in parts.items() if name in found]
+    texts += [section(found["bounds"], found["tables"]["default"])] if "bounds" in found and "tables" in found else []
     return "\n".join(texts)
 
 

@@ -20,7 +20,8 @@ from lhdmap.machine import Machine
 from lhdmap.mapfolder import MapFolder
 from lhdmap.messages import FloatArray, Joints, LaserScan, Message, Mount, Tachometer
 from lhdmap.pipeline.build import BuildRequest, build_map
-from lhdmap.pipeline.localize import KnownMap, Localizer
+from lhdmap.pipeline.known_map import KnownMap
+from lhdmap.pipeline.localize import Localizer
 from lhdmap.roles import ROLES
 from lhdmap.simulation.planar import PlanarWorld, world_from_polylines
 from lhdmap.trajectory import Trajectory

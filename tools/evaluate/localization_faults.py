@@ -21,8 +21,9 @@ from lhdmap.messages import FloatArray, Joints, LaserScan, Message, Tachometer
 from lhdmap.mine.network import make_network
 from lhdmap.mine.plan import load_plan
 from lhdmap.pipeline.build import BuildRequest, build_map
-from lhdmap.pipeline.localize import KnownMap, Localizer
-from lhdmap.pipeline.outcome import ROLES_READ
+from lhdmap.pipeline.inputs import ROLES_READ
+from lhdmap.pipeline.known_map import KnownMap
+from lhdmap.pipeline.localize import Localizer
 from lhdmap.simulation.mine_drive import MineDriveSettings, simulate_mine
 from lhdmap.simulation.operator import OperatorSettings
 from lhdmap.simulation.sensing.sections import ScannerSettings, SensorSettings

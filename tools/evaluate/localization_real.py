@@ -11,15 +11,16 @@ from lhdmap.config import settings_from
 from lhdmap.errors import InputError
 from lhdmap.evaluation.localization import planar
 from lhdmap.evaluation.relations import Relations, evaluate_relations, read_relations
-from lhdmap.localization.rows import LOST, TRACKING, Row
+from lhdmap.localization.rows import LOST, TRACKING, LocalizationRow
 from lhdmap.logs.source import LogSource
 from lhdmap.logs.writer import LogWriter
 from lhdmap.mapfolder import MapFolder
 from lhdmap.messages import Mount
 from lhdmap.pipeline.build import BuildRequest, build_map
-from lhdmap.pipeline.localize import KnownMap, Localizer
+from lhdmap.pipeline.inputs import ROLES_READ
+from lhdmap.pipeline.known_map import KnownMap
+from lhdmap.pipeline.localize import Localizer
 from lhdmap.pipeline.localize_run import trajectory_of
-from lhdmap.pipeline.outcome import ROLES_READ
 from lhdmap.roles import ROLES
 from lhdmap.trajectory import Trajectory
 
@@ -109,7 +110,7 @@ def _write(log: Path, messages: Messages) -> None:
             writer.write(ROLES[role].topic, [message] if isinstance(message, Mount) else message)
 
 
-def _agreement(taught: Trajectory, rows: list[Row], relations: Relations) -> tuple[str, str]:
+def _agreement(taught: Trajectory, rows: list[LocalizationRow], relations: Relations) -> tuple[str, str]:
     """Return how many relations join both parts, and by how much these are off."""
     found = trajectory_of(rows)
     stamps = np.concatenate([taught.stamps_ns, found.stamps_ns])

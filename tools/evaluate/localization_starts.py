@@ -21,7 +21,8 @@ from lhdmap.localization.search import GlobalSearch
 from lhdmap.localization.walls import MapWalls
 from lhdmap.messages import FloatArray
 from lhdmap.odometry.steps import OdometryStep
-from lhdmap.pipeline.localize import KnownMap, Localizer
+from lhdmap.pipeline.known_map import KnownMap
+from lhdmap.pipeline.localize import Localizer
 
 from tools.evaluate.localization_worlds import KINDS, SCAN_EVERY_M, TUNNELS, LiveScan, Taught, drive_through, taught
 

@@ -14,7 +14,7 @@ from lhdmap.landmarks.model import Landmarks
 from lhdmap.landmarks.scans import NodeScan
 from lhdmap.landmarks.settings import LandmarkSettings
 from lhdmap.messages import FloatArray
-from lhdmap.pipeline.localize import KnownMap
+from lhdmap.pipeline.known_map import KnownMap
 from lhdmap.topology.model import UNEXPLORED, TopologicalMap, Tunnel
 from tests.landmarks.worlds import MODERATE, ROUGH, SMOOTH, TunnelWorld, seen, tunnel
 

@@ -6,10 +6,11 @@ import time
 from collections.abc import Iterator, Sequence
 
 import numpy as np
+from lhdmap.evaluation.planar_segments import planar_segments
 from lhdmap.geometry import se2
 from lhdmap.messages import FloatArray, LaserScan
-from lhdmap.odometry.flow_scan import Pyramid
-from lhdmap.odometry.range_flow import flow
+from lhdmap.odometry.range_flow.flow import flow
+from lhdmap.odometry.range_flow.scan import Pyramid
 from lhdmap.odometry.settings import RangeFlowSettings
 from lhdmap.scan_matching.scan_points import planar_points
 from lhdmap.simulation.planar import PlanarScanner, PlanarWorld, drive_along, simulate_scans
@@ -26,7 +27,6 @@ from tools.evaluate.worlds import (
     odometry,
     run,
     scans_of,
-    segments,
     world_of,
 )
 
@@ -44,7 +44,7 @@ def levels_of(scan: LaserScan) -> Pyramid:
 def motion_between(first: Pyramid, second: Pyramid, noise_m: float = 0.012) -> FloatArray:
     """Return the motion (3,) by range flow from no motion, coarse to fine."""
     found = flow(first, second, np.zeros(3), _NO_PRIOR, noise_m, coarsest=FLOW.levels - 1, iterations=FLOW.iterations)
-    return found.T_reference_current
+    return found.pose_reference_current
 
 
 def pairs(seeds: Sequence[int]) -> Iterator[Figure]:
@@ -63,7 +63,7 @@ def pairs(seeds: Sequence[int]) -> Iterator[Figure]:
             finest = Pyramid(planar_points(scans[k], LEVEL, np.zeros(3)), FLOW.width_m, 1)
             found = flow(before, finest, guess, _NO_PRIOR, 0.012, iterations=FLOW.iterations)
             cpu.append(time.thread_time() - started)
-            predicted.append(se2.between(true, found.T_reference_current))
+            predicted.append(se2.between(true, found.pose_reference_current))
             now = levels_of(scans[k])
             from_rest.append(se2.between(true, motion_between(before, now)))
             before = now
@@ -159,7 +159,7 @@ def _found(world: PlanarWorld, place: FloatArray, motion: FloatArray, dt_s: floa
     scans = simulate_scans(world, poses, PlanarScanner(), 1.0 / dt_s, 5)
     stage = odometry()
     first = stage.update(scans[0], LEVEL)
-    error = se2.between(motion, se2.between(first.T_odom_base, stage.update(scans[1], LEVEL).T_odom_base))
+    error = se2.between(motion, se2.between(first.pose_odom_base, stage.update(scans[1], LEVEL).pose_odom_base))
     return bool(np.hypot(error[0], error[1]) < 0.05 and abs(np.degrees(error[2])) < 1.0)
 
 
@@ -182,7 +182,7 @@ def peer_rows(seeds: Sequence[int]) -> Iterator[Figure]:
             errors = []
             for seed in seeds:
                 truth, scans = scans_of(Drive(seed, rms_m=rms_m))
-                found = segments(aligned(method(scans), truth), truth)
+                found = planar_segments(aligned(method(scans), truth), truth)
                 errors.append(found.translation_pct)
             yield Figure(
                 group, f"{name}, {walls}", float(np.mean(errors)), "%", note=", ".join(f"{e:.3f}" for e in errors)

@@ -6,6 +6,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
+from lhdmap.evaluation.planar_segments import SegmentErrors, planar_segments
 from lhdmap.messages import FloatArray
 from lhdmap.odometry.planar import PlanarOdometry
 
@@ -16,12 +17,10 @@ from tools.evaluate.worlds import (
     SMOOTH_M,
     Drive,
     Run,
-    SegmentErrors,
     end_pct,
     odometry,
     run,
     scans_of,
-    segments,
     wheels_of,
 )
 
@@ -42,7 +41,7 @@ def drive_run(drive: Drive, method: str = "anchored", *, wheels: bool = False, r
 
 def ten_metres(run_: Run) -> SegmentErrors:
     """Return the errors over 10 m."""
-    return segments(run_.estimate, run_.truth)
+    return planar_segments(run_.estimate, run_.truth)
 
 
 def range_flow(seeds: Sequence[int]) -> Iterator[Figure]:
@@ -75,7 +74,7 @@ def anchored(seeds: Sequence[int], streams: Sequence[tuple[float, float]]) -> It
 
 def _anchored_figures(group: str, name: str, runs: list[Run]) -> Iterator[Figure]:
     short = [ten_metres(one) for one in runs]
-    long = [segments(one.estimate, one.truth, 100.0) for one in runs]
+    long = [planar_segments(one.estimate, one.truth, 100.0) for one in runs]
     ends = [end_pct(one) for one in runs]
     each = ", ".join(f"{one.translation_pct:.4f}" for one in short)
     yield Figure(group, f"{name}: 10 m", _mean(one.translation_pct for one in short), "%", 0.025, each)

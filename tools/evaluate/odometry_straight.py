@@ -6,12 +6,13 @@ from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
+from lhdmap.evaluation.planar_segments import planar_segments
 from lhdmap.messages import FloatArray
 from lhdmap.odometry.planar import PlanarOdometry
 from lhdmap.simulation.planar import PlanarScanner, drift_world, poses_along, simulate_scans, way_from_rest
 
 from tools.evaluate.figures import Figure
-from tools.evaluate.worlds import SMOOTH_M, Run, end_pct, odometry, run, segments, wheels_of
+from tools.evaluate.worlds import SMOOTH_M, Run, end_pct, odometry, run, wheels_of
 
 GROUP = "Straight drifts of smooth walls (5 mm), 100 m driven"
 SEEDS = (701, 702, 703, 704, 705, 706)  # worlds that nothing was chosen on
@@ -43,7 +44,7 @@ def straight(seeds: Sequence[int]) -> Iterator[Figure]:
     """Each kind: mean over 10 m, the worst 10 m of all, the end."""
     for name, kind in KINDS.items():
         runs = [straight_run(kind, seed) for seed in seeds]
-        errors = [segments(one.estimate, one.truth) for one in runs]
+        errors = [planar_segments(one.estimate, one.truth) for one in runs]
         means = [one.translation_pct for one in errors]
         each = ", ".join(f"{mean:.2f}" for mean in means)
         yield Figure(GROUP, f"{name}: 10 m", float(np.mean(means)), "%", 0.5, each)

@@ -20,7 +20,7 @@ from lhdmap.machine import Machine
 from lhdmap.messages import FloatArray
 from lhdmap.pipeline.mapping import MappingPipeline
 from lhdmap.pipeline.pose_now import PoseNow
-from lhdmap.pipeline.track import FinalTrack, Rows
+from lhdmap.pipeline.track import FinalTrack, TrackRows
 from lhdmap.simulation.drive import simulate_drift
 from lhdmap.simulation.scenario import DriftScenario
 from lhdmap.simulation.sections import DriftSettings, DriveSettings
@@ -49,7 +49,7 @@ class Asked(NamedTuple):
     pose: PoseNow
 
 
-def answers(log: Path, *, wheels: bool) -> tuple[list[Asked], Rows]:
+def answers(log: Path, *, wheels: bool) -> tuple[list[Asked], TrackRows]:
     """Drive through a log and ask at each new pose; return the answers, and the path that was known in the end."""
     pipeline, asked, newest_ns = MappingPipeline(Settings(), Machine(), cloud=False), [], 0
     roles = ["front", "inclinometer", "tf_static", *(["joints", "tachometer"] if wheels else [])]
@@ -65,7 +65,7 @@ def answers(log: Path, *, wheels: bool) -> tuple[list[Asked], Rows]:
     return asked, pipeline.track.rows()
 
 
-def errors(asked: list[Asked], known: Rows) -> FloatArray:
+def errors(asked: list[Asked], known: TrackRows) -> FloatArray:
     """Return along, across, height (m), heading (rad) and whether the planar error is within 2 sigma, shape (N, 5)."""
     path, end_ns = FinalTrack(known), known.times_ns[-1]
     rows = []

@@ -15,7 +15,7 @@ from lhdmap.geometry import se2, se3
 from lhdmap.logs.source import LogSource
 from lhdmap.messages import FloatArray, LaserScan, WheelPose
 from lhdmap.pipeline.mapping import MappingPipeline, feed
-from lhdmap.pipeline.track import Rows, resample, trajectory_of
+from lhdmap.pipeline.track import TrackRows, resample, trajectory_of
 from lhdmap.trajectory import Trajectory
 
 _TOLERANCE_NS = 2_000_000
@@ -92,4 +92,4 @@ def wheels_alone(log: Path) -> Trajectory | None:
     table = np.zeros((len(times), 6))
     table[:, [0, 1]], table[:, 5] = poses[:, :2], np.unwrap(poses[:, 2])
     scans = np.array(stamps, dtype=np.int64)
-    return trajectory_of(resample(Rows(times, table), scans), scans)
+    return trajectory_of(resample(TrackRows(times, table), scans), scans)

@@ -132,7 +132,7 @@ def run(scenario: Scenario, folder: Path) -> Outcome:
     return Outcome(tally.reason, missed, float(tally.min_clearance_m or 0.0), worst, stops, tally.assists)
 
 
-def told_at(events: list[Event], event: str, after: str) -> list[float]:
+def told_at(events: Sequence[Event], event: str, after: str) -> list[float]:
     """Return when (s) the executor noted something; refusals to arm are none."""
     return [
         (one.t_ns - START_NS) / SECOND_NS
@@ -141,7 +141,7 @@ def told_at(events: list[Event], event: str, after: str) -> list[float]:
     ]
 
 
-def stops_missed(rows: FloatArray, events: list[Event], model: DriveModel) -> tuple[list[str], float]:
+def stops_missed(rows: FloatArray, events: Sequence[Event], model: DriveModel) -> tuple[list[str], float]:
     """Return what was missed at stops of the watchdog, and the worst share of the stopping distance."""
     missed, worst = [], 0.0
     armed = [*told_at(events, "watchdog: armed", "armed"), rows[-1, 0] + 1.0]

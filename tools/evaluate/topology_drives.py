@@ -21,10 +21,11 @@ from lhdmap.messages import GroundTruth, LaserScan, Message, PointCloud
 from lhdmap.mine.network import make_network
 from lhdmap.mine.plan import MinePlan, find_plan, load_plan
 from lhdmap.mine.topology import topology_json
+from lhdmap.pipeline.driven import ways_of
+from lhdmap.pipeline.inputs import ROLES_READ
 from lhdmap.pipeline.mapping import MappingPipeline, feed
-from lhdmap.pipeline.outcome import ROLES_READ, ways_of
 from lhdmap.pipeline.topology import seen_of
-from lhdmap.pipeline.track import Rows
+from lhdmap.pipeline.track import TrackRows
 from lhdmap.roles import ROLES
 from lhdmap.simulation.mine_drive import MineDrive, MineDriveSettings
 from lhdmap.simulation.sensing.sections import ScannerSettings, SensorSettings
@@ -123,8 +124,8 @@ def _message(message: Any) -> Message:
     return found
 
 
-def _rows(truth: list[GroundTruth]) -> Rows:
+def _rows(truth: list[GroundTruth]) -> TrackRows:
     rpy = se3.rpy_from_quaternions(np.array([one.quaternion_xyzw for one in truth]))
     rpy[:, 2] = np.unwrap(rpy[:, 2])
     positions = np.array([one.position_m for one in truth])
-    return Rows(np.array([one.stamp_ns for one in truth], dtype=np.int64), np.column_stack([positions, rpy]))
+    return TrackRows(np.array([one.stamp_ns for one in truth], dtype=np.int64), np.column_stack([positions, rpy]))

@@ -18,11 +18,11 @@ os.environ.setdefault("OMP_NUM_THREADS", "1")
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import numpy as np
+from lhdmap.evaluation.planar_segments import planar_segments
 from lhdmap.geometry import se2
 from lhdmap.messages import FloatArray
 
 from tools.evaluate.trust_drives import COURSES, WALLS, Driven, Sensors, in_space, planar
-from tools.evaluate.worlds import segments
 
 RESULT = Path(__file__).resolve().parents[2] / "evaluation" / "trust.md"
 # Worlds that nothing was chosen on: constants on 201 to 208 and 411 to 415, in space on 301 to 310 and 461 to 466; when the error
@@ -102,7 +102,7 @@ def measure(case: Case) -> Measured:
 
 def ratios(driven: Driven, length_m: float) -> FloatArray:
     """Return the errors (M, 3) of all steps of a length over their stated standard deviations."""
-    found = segments(driven.estimate, driven.truth, length_m)
+    found = planar_segments(driven.estimate, driven.truth, length_m)
     from_start = _WayErrors(driven)
     stated = [from_start.variances(int(first), int(last)) for first, last in found.spans]
     return np.asarray(found.vectors / np.sqrt(np.array(stated)), dtype=np.float64)

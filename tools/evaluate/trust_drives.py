@@ -15,9 +15,9 @@ from lhdmap.machine import Machine
 from lhdmap.messages import FloatArray
 from lhdmap.odometry.planar import PlanarOdometry
 from lhdmap.odometry.steps import OdometryStep
+from lhdmap.pipeline.inputs import ROLES_READ
 from lhdmap.pipeline.mapping import MappingPipeline, feed
-from lhdmap.pipeline.outcome import ROLES_READ
-from lhdmap.pipeline.track import Rows, resample
+from lhdmap.pipeline.track import TrackRows, resample
 from lhdmap.simulation.drive import simulate_drift
 from lhdmap.simulation.planar import PlanarScanner, drift_world, drive_along, simulate_scans
 from lhdmap.simulation.scenario import DriftScenario
@@ -71,10 +71,10 @@ def planar(walls: str, course: str, seed: int, *, wheels: bool = False) -> Drive
     steps = [driven.steps[k] for k in used]
     keys = KeyScans(SmoothingSettings())
     for step in steps:
-        keys.update(step.time_ns, step.T_odom_base, _HIT, step.error, unseen=step.unseen)
+        keys.update(step.time_ns, step.pose_odom_base, _HIT, step.error, unseen=step.unseen)
     expected = expected_error(keys, None)
     assert expected is not None
-    true, estimate = truth[used], np.array([step.T_odom_base for step in steps])
+    true, estimate = truth[used], np.array([step.pose_odom_base for step in steps])
     return Driven(true, estimate, steps, expected, (*_end_error(true, estimate), None))
 
 
@@ -119,7 +119,7 @@ def _scenario(walls: str, seed: int) -> DriftScenario:
     )
 
 
-def _mapped(log: Path, truth: Rows, sensors: Sensors) -> Driven:
+def _mapped(log: Path, truth: TrackRows, sensors: Sensors) -> Driven:
     pipeline = MappingPipeline(Settings(), Machine(), cloud=sensors.rear)
     with LogSource([log]) as source:
         feed(pipeline, source.messages([role for role in sensors.roles if role in source.roles]))

@@ -16,7 +16,7 @@ from lhdmap.odometry.planar import PlanarOdometry
 from lhdmap.odometry.settings import AnchorSettings, OdometrySettings, RangeFlowSettings, SearchSettings
 from lhdmap.odometry.start import Maker, ScanInput, starting_velocity
 from lhdmap.odometry.steps import OdometryStep, WheelStep
-from lhdmap.pipeline.track import Rows, resample
+from lhdmap.pipeline.track import TrackRows, resample
 from lhdmap.simulation.planar import PlanarScanner, PlanarWorld, drift_world, drive_along, simulate_scans
 
 BoolArray = npt.NDArray[np.bool_]
@@ -24,7 +24,6 @@ LEVEL = np.eye(4)
 ROUGH_M, MODERATE_M, SMOOTH_M = 0.12, 0.03, 0.005
 SEEDS = (101, 102, 103)  # worlds that no setting was chosen on
 WARM_SCANS = 50  # of the dry run at the start, as the pipeline takes
-_STEP_START_M = 0.5
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,29 +48,6 @@ class Run(NamedTuple):
     estimate: FloatArray
     steps: list[OdometryStep]
     cpu_ms: FloatArray
-
-
-class SegmentErrors(NamedTuple):
-    """Errors of all segments of one length: `vectors` (M, 3) in the end's frame (m, m, rad), the scans they span (M, 2)."""
-
-    vectors: FloatArray
-    spans: FloatArray
-    length_m: float
-
-    @property
-    def translation_pct(self) -> float:
-        """Mean translation error, per cent of the length."""
-        return float(np.hypot(self.vectors[:, 0], self.vectors[:, 1]).mean() / self.length_m * 100.0)
-
-    @property
-    def worst_pct(self) -> float:
-        """Largest translation error, per cent of the length."""
-        return float(np.hypot(self.vectors[:, 0], self.vectors[:, 1]).max() / self.length_m * 100.0)
-
-    @property
-    def rotation_deg_per_m(self) -> float:
-        """Mean rotation error per metre."""
-        return float(np.degrees(np.abs(self.vectors[:, 2])).mean() / self.length_m)
 
 
 @functools.lru_cache(maxsize=6)
@@ -164,31 +140,18 @@ def run(
 def interpolated(steps: list[OdometryStep]) -> FloatArray:
     """Return a pose (N, 3) at every scan's stamp, heading unwrapped; the odometry's are those of the sweeps' middles."""
     used = [step for step in steps if step.processed]
-    planar = np.array([step.T_odom_base for step in used])
+    planar = np.array([step.pose_odom_base for step in used])
     rows = np.zeros((len(used), 6))
     rows[:, [0, 1]], rows[:, 5] = planar[:, :2], np.unwrap(planar[:, 2])
     known = np.array([step.time_ns for step in used], dtype=np.int64)
     at = np.array([step.stamp_ns for step in steps], dtype=np.int64)
-    return resample(Rows(known, rows), at).poses[:, [0, 1, 5]]
+    return resample(TrackRows(known, rows), at).poses[:, [0, 1, 5]]
 
 
 def aligned(estimate: FloatArray, truth: FloatArray) -> FloatArray:
     """Return the estimate (N, 3) moved so that its first pose is the true one."""
     move = se2.compose(truth[0], se2.inverse(estimate[0]))
     return np.array([se2.compose(move, pose) for pose in estimate])
-
-
-def segments(estimate: FloatArray, truth: FloatArray, length_m: float = 10.0) -> SegmentErrors:
-    """Return the errors over all segments of a length; they start each half metre."""
-    s = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(truth[:, :2], axis=0).T))])
-    starts = np.unique(np.searchsorted(s, np.arange(0.0, s[-1] - length_m, _STEP_START_M)))
-    ends = np.searchsorted(s, s[starts] + length_m)
-    keep = ends < len(s)
-    vectors = [
-        se2.between(se2.between(truth[i], truth[j]), se2.between(estimate[i], estimate[j]))
-        for i, j in zip(starts[keep], ends[keep], strict=True)
-    ]
-    return SegmentErrors(np.array(vectors), np.column_stack([starts[keep], ends[keep]]), length_m)
 
 
 def end_pct(run_: Run) -> float:

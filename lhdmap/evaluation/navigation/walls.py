@@ -16,7 +16,8 @@ import numpy as np
 
 from lhdmap.evaluation.navigation.drive import STANDING_MPS
 from lhdmap.evaluation.navigation.path import Moment, WheelPath
-from lhdmap.integration.self_filter import Rig, body_poses, in_boxes, rear_to_base, rig_of
+from lhdmap.geometry.articulated import T_rear_base
+from lhdmap.integration.self_filter import Rig, body_poses, in_boxes, rig_of
 from lhdmap.machine import Machine
 from lhdmap.messages import Float32Array, FloatArray, LaserScan, Mount
 from lhdmap.scan_matching.scan_points import half_sweep_ns
@@ -182,7 +183,7 @@ def _seen(ranges_m, first_rad, step_rad, limits_m, rig, articulation_rad, pose, 
 @nb.njit(cache=True, nogil=True)
 def _beside(points, pose, joint, boxes, on_rear, begins):  # type: ignore[no-untyped-def]
     """Return the distance on the left and on the right, and which bins (2, `_BINS`) of each side have a hit beside them."""
-    T = rear_to_base(joint[0], joint[1], joint[2])
+    T = T_rear_base(joint[0], joint[1], joint[2])
     c, s = np.cos(pose[2]), np.sin(pose[2])
     nearest = np.full((2, _SUPPORT), np.inf)
     bins = np.zeros((2, 2, _BINS), dtype=np.bool_)

@@ -161,6 +161,8 @@ class Execute(Process):
         control.watchdog.saw(OPERATOR, word.stamp_ns, now_ns)
         if word.emergency:
             control.emergency(word.emergency)
+        if word.stop:
+            control.watchdog.trip((word.stop,))
         if word.release:
             control.release("station")
         if word.rearm:

@@ -3,33 +3,29 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
 
-from lhdmap.haulage.mission import MissionTask
 from lhdmap.haulage.mission_io import Buckets, MissionInput, MissionOutput, Navigation, Report
 from lhdmap.loading.states import ASSISTANCE, State
-from lhdmap.messages import FloatArray, Text
+from lhdmap.messages import FloatArray
 from lhdmap.navigation.along import Located
-from lhdmap.production.journal import cycle_values
 from lhdmap.replay.journal import Scribe
 from lhdmap.replay.process import (
-    CYCLE,
     DUMPING,
     LOADING,
     LOCATED,
     MACHINE_SAYS,
     MILLISECOND_NS,
-    MISSION,
     NAVIGATING,
-    ORDERS,
     POSE,
     STATION_SAYS,
     Outgoing,
     Process,
     Received,
 )
+from lhdmap.replay.processes.order_book import OrderBook, Task
 from lhdmap.replay.processes.told import DumpingNow, Health, LoadingNow, Navigating, Orders
 from lhdmap.topology.model import TopologicalMap
 
@@ -50,9 +46,17 @@ class Executive(Process):
     reads = (POSE, LOCATED, NAVIGATING, LOADING, DUMPING, MACHINE_SAYS, STATION_SAYS)
 
     def __init__(
-        self, task: MissionTask, orders: Sequence[Buckets], topology: TopologicalMap, full_t: float, scribe: Scribe
+        self,
+        task: Task,
+        orders: Sequence[Buckets],
+        topology: TopologicalMap,
+        full_t: float,
+        scribe: Scribe,
+        *,
+        free: Callable[[], frozenset[str]] | None = None,
     ) -> None:
-        self.task, self._buckets, self._scribe = task, tuple(orders), scribe
+        """`free`: of a machine among others tells which nodes of the map it may be in."""
+        self.task, self._buckets, self._book, self._free = task, tuple(orders), OrderBook(scribe), free
         self._topology, self._full_t = topology, full_t
         self._located: Located | None = None
         self._navigating: Navigating | None = None
@@ -61,7 +65,7 @@ class Executive(Process):
         self._health: Health | None = None
         self._orders, self._key, self._loads = Orders(0, 0, "", loaded=False), ("", False, 0), 0
         self._emergency = self._go_on = self._gave_up = False
-        self._mission, self._task = "", 0
+        self._task = 0
         self._odometer_m, self._place = 0.0, np.full(2, np.nan)
 
     def step(self, now_ns: int, inbox: Sequence[Received]) -> Iterator[Outgoing]:
@@ -72,16 +76,8 @@ class Executive(Process):
             return
         out = self.task.update(self._told(now_ns))
         self._task = out.task
-        self._note(out)
         self._orders = self._ordered(now_ns, out)
-        yield Outgoing(ORDERS, self._orders)
-        if out.cycle is not None:
-            yield Outgoing(CYCLE, out.cycle)
-        mission = self._said(out)
-        if mission != self._mission:
-            self._mission = mission
-            self._scribe.event("mission", mission)
-            yield Outgoing(MISSION, Text(now_ns, mission))
+        yield from self._book.say(now_ns, out, self._orders, self._odometer_m)
 
     def _told(self, now_ns: int) -> MissionInput:
         located = self._located
@@ -149,29 +145,13 @@ class Executive(Process):
             self._loads += 1
         runs = out.begin == "load" or (not out.loaded and (begins or bool(self._orders.loading)))
         goal = out.goal or (self._orders.goal if out.begin == "load" else "")
-        return Orders(
-            now_ns, number, goal, out.loaded, self._loads if runs else 0, out.task if out.begin == "dump" else 0
-        )
+        loading, dumping = self._loads if runs else 0, out.task if out.begin == "dump" else 0
+        free = None if self._free is None else self._free()
+        return Orders(now_ns, number, goal, out.loaded, loading, dumping, free)
 
     def _draws(self, goal: str) -> bool:
         found = self._topology.called(goal) if goal else None
         return getattr(found, "purpose", "") == "draw_point"
-
-    def _note(self, out: MissionOutput) -> None:
-        for event in out.events:
-            self._scribe.event("event", event.value, task=out.task, left=out.left)
-        values = {"place": out.goal, "odometer_m": self._odometer_m, "at": out.state.value, "left": out.left}
-        self._scribe.goes(out.phase.value, out.asks or ", ".join(event.value for event in out.events), **values)
-        if out.cycle is not None:
-            self._scribe.event("cycle", "", **cycle_values(out.cycle))
-
-    @staticmethod
-    def _said(out: MissionOutput) -> str:
-        if out.asks:
-            return f"assistance: {out.asks}"
-        if out.state.value == "aborted":
-            return "aborted: mission"
-        return "done" if out.left == 0 and out.state.value == "idle" and not out.goal else "driving"
 
     def _drive(self, place_m: FloatArray) -> None:
         """Count the way, by steps that are no noise."""

@@ -16,10 +16,12 @@ _WAITS = "place not known"
 class Help:
     """Answers requests one after the other; `done`: what is left is to say that the machine is to go on.
 
+    `backs_up`: where it drives the machine by hand first; on a surface site it only says that the way is clear.
     Of more than `most` requests none is answered any more: `gave_up` says so.
     """
 
-    def __init__(self, assist_s: float, scribe: Scribe, most: int) -> None:
+    def __init__(self, assist_s: float, scribe: Scribe, most: int, *, backs_up: bool = True) -> None:
+        self._backs_up = backs_up
         self._assist_ns, self._scribe = round(assist_s * SECOND_NS), scribe
         self._asked_ns: int | None = None
         self._backs_until_ns: int | None = None
@@ -37,7 +39,11 @@ class Help:
             return self._give_up(health.asks)
         if now_ns - self._asked_ns < self._assist_ns:
             return script
-        if _WAITS in health.asks or (self._backs_until_ns is not None and now_ns > self._backs_until_ns):
+        if (
+            not self._backs_up
+            or _WAITS in health.asks
+            or (self._backs_until_ns is not None and now_ns > self._backs_until_ns)
+        ):
             self._say("go on", health.asks)
             self.done = True
             return script

@@ -16,7 +16,8 @@ from lhdmap.messages import FloatArray
 from lhdmap.navigation.along import Located
 from lhdmap.odometry.planar import PlanarOdometry
 from lhdmap.odometry.steps import OdometryStep
-from lhdmap.pipeline.localize import KnownMap, Localizer
+from lhdmap.pipeline.known_map import KnownMap
+from lhdmap.pipeline.localize import Localizer, LocalizerOptions
 from lhdmap.replay.journal import Scribe
 from lhdmap.replay.process import LOADING, LOCATED, MILLISECOND_NS, PILE, POSE, SEEN, Outgoing, Process, Received
 from lhdmap.replay.processes.perception import PERCEPTION
@@ -49,7 +50,9 @@ class Locating(Process):
         """`pile`: looks for piles on the way; each new estimate is told."""
         self._scribe, self._pile, self._told_ns = scribe, pile, 0
         self._seen: list[Seen] = []
-        self.localizer = Localizer(known, live(settings), machine, start, listener=self._listen, pile=pile)
+        self.localizer = Localizer(
+            known, live(settings), machine, start, LocalizerOptions(listener=self._listen, pile=pile)
+        )
         self._agreement = Agreement(self.localizer.pipeline.front_end.wheels.motion_between)
         scribe.goes("waiting", "no scan yet")
 
@@ -93,11 +96,11 @@ class Locating(Process):
         if not step.processed:
             return
         points = np.concatenate([part[:, :2] for part in (odometry.points, odometry.points_behind)])
-        self._seen.append(Seen(stamp_ns, step.T_odom_base.copy(), points, *self._apart(step), len(odometry.points)))
+        self._seen.append(Seen(stamp_ns, step.pose_odom_base.copy(), points, *self._apart(step), len(odometry.points)))
 
     def _apart(self, step: OdometryStep) -> tuple[float, float]:
         """Return by how much pose and scan disagree; infinite where the scan does not fit at all."""
-        by_wheels = self._agreement.of_motion(step.time_ns, step.T_odom_base)
+        by_wheels = self._agreement.of_motion(step.time_ns, step.pose_odom_base)
         fix = self.localizer.fix
         by_map = (0.0, 0.0)
         if fix is not None:

@@ -95,7 +95,7 @@ class OrderedNavigation(Process):
         if topic == LOCATED:
             self._located = message
         elif topic == ORDERS:
-            self._orders = message
+            self._orders, self.control.free = message, message.free
         elif topic == MACHINE_SAYS:
             self._mode = message.mode
             self.control.may_move = message.armed and message.mode == _AUTONOMOUS

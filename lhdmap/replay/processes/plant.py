@@ -40,7 +40,7 @@ class Plant(Process):
         self.history = History(SECOND_NS // STEP_NS)
         self._state = parts.start
         _check(faults, parts)
-        by_time = [one.settings for one in faults.all if one.settings.of_sensor and not one.waits_for_place]
+        by_time = [one.settings for one in faults.all if one.settings.of_sensor and one.known_time]
         self._sensors = with_faults(parts.sensors, by_time, seed=seed)
         self._due = Due(self._sensors)
         self._command: Command | None = None
@@ -103,7 +103,7 @@ class Plant(Process):
                 self._parts.changing.appear(name, thing_at(fault.settings, place_m))
             else:
                 self._parts.changing.vanish(name)
-        elif fault.settings.of_sensor and fault.waits_for_place and begins and fault.began_ns is not None:
+        elif fault.settings.of_sensor and not fault.known_time and begins and fault.began_ns is not None:
             one = replace(fault.settings, at="", at_s=(fault.began_ns - START_NS) / SECOND_NS)
             self._sensors = with_faults(self._sensors, [one], seed=self._seed + fault.number)
             self._due = Due(self._sensors)

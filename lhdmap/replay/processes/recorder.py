@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 
 from lhdmap.logs.writer import LogWriter
+from lhdmap.replay.namespace import topic_of
 from lhdmap.replay.process import EVERYWHERE, MILLISECOND_NS, TRUTH, Outgoing, Process, Received
 from lhdmap.roles import ROLES
 
@@ -18,8 +19,10 @@ class Recorder(Process):
     name, period_ns, priority, site = RECORDER, 50 * MILLISECOND_NS, 95, EVERYWHERE
     inbox_size = 100_000
 
-    def __init__(self, writer: LogWriter, *, truth: bool) -> None:
-        self.reads = tuple(topic for topic in _TOPICS if truth or not topic.startswith(TRUTH))
+    def __init__(self, writer: LogWriter, *, truth: bool, machines: Sequence[str] = ("",)) -> None:
+        """`machines`: namespaces of those whose topics are written."""
+        wanted = [topic for topic in _TOPICS if truth or not topic.startswith(TRUTH)]
+        self.reads = tuple(topic_of(machine, topic) for machine in machines for topic in wanted)
         self._writer = writer
         self.messages = 0
 

@@ -97,7 +97,7 @@ class Scouting(Process):
         if not step.processed:
             return
         points = np.concatenate([part[:, :2] for part in (odometry.points, odometry.points_behind)])
-        apart = self._agreement.of_motion(step.time_ns, step.T_odom_base)
+        apart = self._agreement.of_motion(step.time_ns, step.pose_odom_base)
         if self.pipeline.records.lost_now:
             apart = math.inf, math.inf
-        self._seen.append(Seen(stamp_ns, step.T_odom_base.copy(), points, *apart, len(odometry.points)))
+        self._seen.append(Seen(stamp_ns, step.pose_odom_base.copy(), points, *apart, len(odometry.points)))

@@ -5,43 +5,45 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 
-from lhdmap.haulage.mission import MissionTask
 from lhdmap.haulage.mission_io import Buckets, MissionInput, MissionOutput, Navigation, Report
-from lhdmap.messages import Text
-from lhdmap.production.journal import cycle_values
 from lhdmap.replay.journal import Scribe
 from lhdmap.replay.process import (
-    CYCLE,
+    MACHINE_SAYS,
     MILLISECOND_NS,
-    MISSION,
     NAVIGATING,
-    ORDERS,
     SITE_POSE,
+    STATION_SAYS,
     WORK,
     Outgoing,
     Process,
     Received,
 )
 from lhdmap.replay.processes.executive import EXECUTIVE
+from lhdmap.replay.processes.order_book import OrderBook, Task
 from lhdmap.replay.processes.site_driver import BLOCKED
-from lhdmap.replay.processes.told import Navigating, Orders, WorkNow
+from lhdmap.replay.processes.told import Health, Navigating, Orders, WorkNow
 
+_MODE = "autonomous"
 _STEP_M = 0.5  # of the odometer: less is noise of the pose
 
 
 class SiteExecutive(Process):
-    """Each 100 ms the mission task is told what is, and its outputs become orders."""
+    """Each 100 ms the mission task is told what is, and its outputs become orders.
+
+    The station hears what help is asked for, and answers; after a `go on` the drive is begun anew from where the machine is.
+    """
 
     name, period_ns, latency_ns, priority = EXECUTIVE, 100 * MILLISECOND_NS, 5 * MILLISECOND_NS, 15
-    reads = (SITE_POSE, NAVIGATING, WORK)
+    reads = (SITE_POSE, NAVIGATING, WORK, STATION_SAYS)
 
-    def __init__(self, task: MissionTask, orders: Sequence[Buckets], full_t: float, scribe: Scribe) -> None:
-        self.task, self._buckets, self._full_t, self._scribe = task, tuple(orders), full_t, scribe
+    def __init__(self, task: Task, orders: Sequence[Buckets], full_t: float, scribe: Scribe) -> None:
+        self.task, self._buckets, self._full_t, self._book = task, tuple(orders), full_t, OrderBook(scribe)
         self._pose: tuple[float, float, float] | None = None
         self._counted_m, self._odometer_m = (math.nan, math.nan), 0.0
         self._navigating: Navigating | None = None
         self._work: WorkNow | None = None
-        self._orders, self._key, self._mission = Orders(0, 0, "", loaded=False), ("", False), ""
+        self._orders, self._key = Orders(0, 0, "", loaded=False), ("", False)
+        self._go_on = self._gave_up = False
 
     def step(self, now_ns: int, inbox: Sequence[Received]) -> Iterator[Outgoing]:
         """Take what has come; give orders, and each cycle that has ended."""
@@ -50,16 +52,12 @@ class SiteExecutive(Process):
         if self._pose is None:
             return
         out = self.task.update(self._told(now_ns))
-        self._note(out)
+        if self._go_on and out.asks:
+            self._key = ("", out.loaded)
+        self._go_on = False
         self._orders = self._ordered(now_ns, out)
-        yield Outgoing(ORDERS, self._orders)
-        if out.cycle is not None:
-            yield Outgoing(CYCLE, out.cycle)
-        mission = self._said(out)
-        if mission != self._mission:
-            self._mission = mission
-            self._scribe.event("mission", mission)
-            yield Outgoing(MISSION, Text(now_ns, mission))
+        yield from self._book.say(now_ns, out, self._orders, self._odometer_m)
+        yield Outgoing(MACHINE_SAYS, Health(now_ns, True, _MODE, bool(out.asks), (), out.asks))
 
     def _told(self, now_ns: int) -> MissionInput:
         told, orders, work = self._navigating, self._orders, self._work
@@ -83,6 +81,8 @@ class SiteExecutive(Process):
             dumping=dumping,
             obstacle=blocked,
             orders=self._buckets,
+            abort=self._gave_up,
+            answer="go_on" if self._go_on else "",
         )
 
     def _ordered(self, now_ns: int, out: MissionOutput) -> Orders:
@@ -96,25 +96,12 @@ class SiteExecutive(Process):
         loading, dumping = (out.task if out.begin == one else 0 for one in ("load", "dump"))
         return Orders(now_ns, number, out.goal, out.loaded, loading, dumping)
 
-    def _note(self, out: MissionOutput) -> None:
-        for event in out.events:
-            self._scribe.event("event", event.value, task=out.task, left=out.left)
-        values = {"place": out.place, "odometer_m": self._odometer_m, "at": out.state.value, "stage": out.stage}
-        self._scribe.goes(out.phase.value, out.cause, **values, left=out.left)
-        if out.cycle is not None:
-            self._scribe.event("cycle", "", odometer_m=self._odometer_m, **cycle_values(out.cycle))
-
-    @staticmethod
-    def _said(out: MissionOutput) -> str:
-        if out.asks:
-            return f"assistance: {out.asks}"
-        if out.state.value == "aborted":
-            return "aborted: mission"
-        return "done" if out.left == 0 and out.state.value == "idle" and not out.goal else "driving"
-
     def _take(self, received: Received) -> None:
         topic, _, message = received
-        if topic == NAVIGATING:
+        if topic == STATION_SAYS:
+            self._go_on |= bool(message.go_on)
+            self._gave_up |= bool(message.gave_up)
+        elif topic == NAVIGATING:
             self._navigating = message
         elif topic == WORK:
             self._work = message

@@ -18,18 +18,25 @@ _FIRST_NS = SECOND_NS
 class Station(Process):
     """Sees no truth. `modes`: what is wanted from when on, the first one from the start; `rearm_s`: how long it looks at a stop.
 
-    `assist_s`: how long it takes to answer a request for help; `assists`: how many it answers.
+    `assist_s`: how long it takes to answer a request for help; `assists`: how many it answers; `backs_up`: whether it drives then.
     """
 
     name, period_ns, priority, site = "station", 100 * MILLISECOND_NS, 50, STATION
     reads = (MACHINE_SAYS,)
 
     def __init__(
-        self, modes: Sequence[ModeAt], rearm_s: float, assist_s: float, scribe: Scribe, assists: int = 5
+        self,
+        modes: Sequence[ModeAt],
+        rearm_s: float,
+        assist_s: float,
+        scribe: Scribe,
+        assists: int = 5,
+        *,
+        backs_up: bool = True,
     ) -> None:
         self._modes, self._rearm_ns, self._scribe = list(modes), round(rearm_s * SECOND_NS), scribe
         self._wanted = self._modes.pop(0)
-        self._help = Help(assist_s, scribe, assists)
+        self._help = Help(assist_s, scribe, assists, backs_up=backs_up)
         self._health: Health | None = None
         self._since_ns: int | None = None
         self._asked_ns = 0

@@ -46,7 +46,8 @@ class Orders(NamedTuple):
     """What the executive of a mission asks for.
 
     `number` counts what is asked of navigation: another one is another drive; no goal: stand. `loading`, `dumping`: number of the
-    task that is to run, 0: none; while one of loading runs, what navigation drives goes through the loading task.
+    task that is to run, 0: none; while one of loading runs, what navigation drives goes through the loading task. `free`: nodes
+    (ids of the map) that the machine may be in, None: all.
     """
 
     stamp_ns: int
@@ -55,6 +56,7 @@ class Orders(NamedTuple):
     loaded: bool
     loading: int = 0
     dumping: int = 0
+    free: frozenset[str] | None = None
 
 
 class Navigating(NamedTuple):
@@ -116,13 +118,14 @@ class Idle(NamedTuple):
 class Word(NamedTuple):
     """What the station says: always a sign of life; a mode, arming, a stop, the joystick where they are wanted.
 
-    `gave_up`: it helps no more, and why.
+    `gave_up`: it helps no more, and why. `stop`: why the machine is to stop and disarm; armed again, it may go on.
     """
 
     stamp_ns: int
     mode: str = ""
     rearm: bool = False
     emergency: str = ""
+    stop: str = ""
     release: bool = False
     speed_mps: float | None = None
     steering_rate_rps: float = 0.0

@@ -10,6 +10,7 @@ import numpy.typing as npt
 from scipy.spatial import KDTree
 
 from lhdmap.errors import ConfigError, InputError
+from lhdmap.extras import library
 from lhdmap.integration.cloud_io import READERS, read_cloud
 from lhdmap.messages import FloatArray
 from lhdmap.mine.network import Network
@@ -102,8 +103,7 @@ def read_surface(plan: SurfacePlan) -> Mesh:
 
 
 def _read_mesh(path: Path) -> Mesh:
-    import open3d as o3d
-
+    o3d = library("open3d")
     with o3d.utility.VerbosityContextManager(o3d.utility.VerbosityLevel.Error):
         found = o3d.io.read_triangle_mesh(path)
     return Mesh(np.asarray(found.vertices, dtype=float), np.asarray(found.triangles).astype(np.uint32))
@@ -111,9 +111,7 @@ def _read_mesh(path: Path) -> Mesh:
 
 def meshed(points_m: FloatArray, cell_m: float) -> Mesh:
     """Return a mesh through the points (N, 3) of a survey: Poisson's, without what no point is near."""
-    import open3d as o3d
-
-    io: Any = o3d
+    io: Any = library("open3d")
     cloud = io.geometry.PointCloud(io.utility.Vector3dVector(points_m[:: max(len(points_m) // _SAMPLES_MAX, 1)]))
     cloud = cloud.voxel_down_sample(cell_m)
     cloud, _ = cloud.remove_statistical_outlier(16, 2.5)

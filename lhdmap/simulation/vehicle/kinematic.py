@@ -12,6 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from lhdmap.driving.model import DriveModel, drive_model
+from lhdmap.geometry.articulated import rear_axle
 from lhdmap.machine import Machine
 from lhdmap.messages import Command, FloatArray
 from lhdmap.simulation.history import SECOND_NS, START_NS, Column
@@ -54,10 +55,9 @@ class KinematicState(NamedTuple):
 
     def rear(self, model: DriveModel) -> tuple[float, float, float, float, float]:
         """Return x, y and heading of the rear axle, the joint's angle and rate."""
-        back = self.yaw_rad - self.articulation_rad
-        x = self.x_m - model.front_m * math.cos(self.yaw_rad) - model.rear_m * math.cos(back)
-        y = self.y_m - model.front_m * math.sin(self.yaw_rad) - model.rear_m * math.sin(back)
-        return x, y, back, self.articulation_rad, self.articulation_rate_rps
+        bend_rad = self.articulation_rad
+        x, y, back = rear_axle(self.x_m, self.y_m, self.yaw_rad, bend_rad, model.front_m, model.rear_m)
+        return x, y, back, bend_rad, self.articulation_rate_rps
 
 
 class Loader(NamedTuple):

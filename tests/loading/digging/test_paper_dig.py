@@ -111,6 +111,25 @@ def test_stops(heard: dict[str, Any], ended: str) -> None:
     assert (turn.pedals == Pedals()) == bool(ended)
 
 
+@pytest.mark.parametrize("method", ["paper", "paper-tuned", "adaptive"])
+@pytest.mark.parametrize("most_rad", [0.1, 0.5])
+def test_the_boom_is_lifted_no_higher_than_the_roof_allows(method: str, most_rad: float) -> None:
+    """All wheels slip for as long as it takes, and no other stop is near: what is not limited lifts to its stop at 0.85."""
+    common = ExcavationSettings(lift_most_rad=most_rad, alpha_max_rad=2.0, boom_max_rad=2.0, advance_max_m=10.0)
+    paper = PaperDigSettings(boom_max_rad=2.0, advance_max_m=10.0)
+    tuned = replace(TunedDigSettings(), boom_max_rad=2.0, advance_max_m=10.0)
+    settings = DigSettings(common, paper, tuned)
+    dig, boom_rad = excavation_of(settings, method), -0.35
+    for k in range(1500):
+        slips = QUIET._replace(
+            now_ns=k * 20_000_000, scan_ns=k * 20_000_000, scan_mps=0.0, tacho_mps=1.0, boom_rad=boom_rad
+        )
+        if k == 0:
+            dig.begin(slips)
+        boom_rad += 0.02 * 0.25 * dig.step(slips).pedals.lift
+    assert most_rad - 0.01 < boom_rad < most_rad + 0.01
+
+
 def test_zero_and_tolerance_of_the_bucket() -> None:
     """E5: with zero at the level floor the dig ends at once; E6: without tolerance a stop read as -0.02 never ends it."""
     level = PaperDig(ExcavationSettings(racked_rad=-0.83), PaperDigSettings())

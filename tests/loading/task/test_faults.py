@@ -9,8 +9,11 @@ from collections.abc import Callable
 from typing import Any
 
 import pytest
-from lhdmap.loading.health import NEEDS
+from lhdmap.driving.motion import Motion
+from lhdmap.loading.follows import Follows
+from lhdmap.loading.health import NEEDS, Health
 from lhdmap.loading.moment import LoadingInput
+from lhdmap.loading.signals import Pedals, Signals
 from lhdmap.loading.states import ASSISTANCE, State
 from lhdmap.loading.task import limits_s
 from lhdmap.loading.task_settings import LoadingSettings
@@ -198,3 +201,39 @@ def test_after_a_stop_it_does_not_go_on_from_where_it_was(step: tuple[State, str
     else:
         free = step[0] == State.POSITIONING
         assert out.state in ((State.IDENTIFICATION, State.POSITIONING) if free else (State.PULL_BACK,))
+
+
+def test_a_bucket_that_is_asked_and_does_not_follow_ends_the_dig() -> None:
+    """The dig of the bench asks for half of the tilt for 3 s: frozen, that is seen after 1 s at full pedal."""
+    one, broke_ns = broken((State.EXCAVATION, ""), frozen("bucket_rad"))
+    out = one.run(5.0, lambda said: said.state == State.HELD)
+    assert out.state == State.HELD
+    assert (one.now_ns - broke_ns) * 1e-9 == pytest.approx(2.0 * SETTINGS.follows_s, abs=0.2)
+    assert "bucket_rad does not follow" in one.notes[-1][1].cause
+    one.run(3.0)
+    assert one.said[-1].state == State.HELD  # nothing is moved by a reading that is old
+
+
+def test_short_lifts_of_a_frozen_boom_count_together_and_a_change_ends_it() -> None:
+    boom, quiet = Follows(1.0), Signals(0, 0.0, 0.0, 0, 0.0, 0.1, -0.5, 0.0, 200.0, 50.0, 20.0)
+    found = {}
+    for k in range(300):  # 0.2 s of lift each second
+        found[k] = boom.update(k * 20_000_000, quiet, Pedals(lift=float(k % 50 < 10)))
+    first = min(k for k, names in found.items() if names)
+    assert found[first] == ("boom_rad does not follow",)
+    assert 4.9 < 0.02 * first < 5.3
+    assert boom.update(6 * SECOND_NS, quiet._replace(boom_rad=0.1001), Pedals(lift=1.0)) == ()
+    assert not any(boom.update((7 + k) * SECOND_NS, quiet, Pedals()) for k in range(9))
+
+
+@pytest.mark.parametrize(("tacho_mps", "held"), [(0.7, True), (0.0, False)])
+def test_wheels_that_say_the_same_are_frozen_unless_they_stand(tacho_mps: float, held: bool) -> None:
+    health = Health(SETTINGS)
+    found: tuple[str, ...] = ()
+    for k in range(60):
+        now_ns = k * 40_000_000
+        bars = (200.0 + 0.1 * k, 50.0 + 0.1 * k, 20.0 + 0.1 * k)
+        signals = Signals(now_ns, tacho_mps, 0.7, now_ns, 0.0, 0.1, -0.5, 0.0, *bars)
+        motion = Motion(now_ns, 0.0, 0.0, 0.0, 0.7, 0.0, 0.0)
+        found = health.check(LoadingInput(now_ns, signals, motion), State.CHARGING, "")
+    assert found == (("tacho_mps is frozen",) if held else ())

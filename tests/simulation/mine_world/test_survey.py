@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from lhdmap.errors import InputError
-from lhdmap.integration.cloud import Cloud
+from lhdmap.integration.cloud import GridCloud
 from lhdmap.integration.cloud_io import write_cloud
 from lhdmap.machine import Machine
 from lhdmap.mine.network import make_network
@@ -99,7 +99,9 @@ def test_a_survey_cloud_is_meshed(tmp_path: Path) -> None:
     pick = rng.choice(len(area), 60_000, p=area / area.sum())
     u, v = np.sort(rng.random((2, 60_000)), axis=0)
     points = u[:, None] * a[pick] + (v - u)[:, None] * b[pick] + (1 - v)[:, None] * c[pick]
-    write_cloud(tmp_path / "drift.ply", Cloud((points + 0.01 * rng.standard_normal(points.shape)).astype(np.float32)))
+    write_cloud(
+        tmp_path / "drift.ply", GridCloud((points + 0.01 * rng.standard_normal(points.shape)).astype(np.float32))
+    )
     check(
         world_of(tmp_path, "drift.ply"), 0.08, step_m=0.25
     )  # the rounded foot of the walls is a step that wheels climb

@@ -1,0 +1,1 @@
+"""Logs of lines of text: CARMEN (`carmen`) and BreezySLAM (`breezy`)."""

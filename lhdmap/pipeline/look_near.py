@@ -1,0 +1,52 @@
+"""A lost place taken up again near where the odometry has carried it, where two looks in a row say the same."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+from lhdmap.geometry import se2
+from lhdmap.localization.method import Tracks
+from lhdmap.localization.starting import best_start, poses_along
+from lhdmap.localization.walls import MapWalls
+from lhdmap.messages import FloatArray
+
+# Time between two looks; travel after the loss until which it looks; what two looks may differ; how much better than any other
+# place the found one must fit; hits that a look needs.
+_LOOK_NS, _NEAR_M, _SAME_M, _CLEARLY, _LEAST_HITS = 400_000_000, 5.0, 0.3, 0.05, 40
+
+
+class NearLook:
+    """`lost` where a place is lost, then `look` with each scan until it gives a pose."""
+
+    def __init__(self, walls: MapWalls) -> None:
+        self._walls = walls
+        self._lost_m, self._next_ns = 0.0, 0
+        self._before: tuple[FloatArray, FloatArray] | None = None
+
+    def lost(self, stamp_ns: int, travelled_m: float) -> None:
+        """Begin to look."""
+        self._lost_m, self._before, self._next_ns = travelled_m, None, stamp_ns + _LOOK_NS
+
+    def look(
+        self, stamp_ns: int, travelled_m: float, tracker: Tracks, points: FloatArray, wanted: Callable[[], float]
+    ) -> FloatArray | None:
+        """Return the pose (3,) where hits (N, 2) fit again, near that of the tracker; None where they do not, or not surely.
+
+        `wanted`: tells which share of the hits must agree with the walls.
+        """
+        if len(points) < _LEAST_HITS or stamp_ns < self._next_ns or travelled_m - self._lost_m > _NEAR_M:
+            return None
+        self._next_ns = stamp_ns + _LOOK_NS
+        found = best_start(self._walls, poses_along(tracker.pose, tracker.height_m), points)
+        before, self._before = self._before, None
+        if found.support < max(wanted(), found.rival + _CLEARLY):
+            return None
+        self._before = tracker.pose.copy(), found.pose
+        if before is None:
+            return None
+        off = se2.between(se2.compose(before[1], se2.between(before[0], tracker.pose)), found.pose)
+        if math.hypot(off[0], off[1]) > _SAME_M:
+            return None
+        self._before = None
+        return found.pose.copy()

@@ -1,0 +1,111 @@
+"""The machine's end of the link, without a socket: what it commands itself when its operator falls silent."""
+
+from __future__ import annotations
+
+from lhdmap.console.link import MachineLink
+from lhdmap.console.messages import ANSWER, REARM, STOP, Beat, Command, Outcome, Status, Tick
+from lhdmap.console.settings import ConsoleSettings
+
+MS = 1_000_000
+ARMED, DISARMED = (Status(0.0, armed, "autonomous", True) for armed in (True, False))
+
+
+class Rig:
+    """A link on a clock of its own, and a page that answers while `alive`."""
+
+    def __init__(self, speed: float = 0.0) -> None:
+        self.now_ns, self.alive, self.slept_s = 0, True, 0.0
+        self.outcomes: list[Outcome] = []
+        self.link = MachineLink(
+            "one", "http://127.0.0.1:1", "key", ConsoleSettings(), speed, lambda: self.now_ns, self.sleep
+        )
+        self.link.told = self.outcomes.append  # type: ignore[method-assign, assignment]
+
+    def sleep(self, for_s: float) -> None:
+        self.slept_s += for_s
+        self.now_ns += round(for_s * 1e9)
+
+    def go(self, for_ms: int, status: Status) -> list[tuple[int, Command]]:
+        """Run turns of 20 ms; return commands with the clock's time, ms."""
+        found = []
+        for _ in range(for_ms // 20):
+            self.now_ns += 20 * MS
+            if self.now_ns % (100 * MS) == 0:
+                tick: Tick = self.link._tick()
+                if self.alive:
+                    self.link._heard(Beat(tick.number, "anna"))
+            found += [(self.now_ns // MS, command) for command in self.link.attend(self.now_ns, status, None)]
+        return found
+
+
+def test_an_armed_machine_stops_once_when_the_page_falls_silent_and_never_arms_itself() -> None:
+    rig = Rig()
+    assert rig.go(500, DISARMED) + rig.go(500, ARMED) == []
+    rig.alive = False
+    ((at_ms, stop),) = rig.go(3000, ARMED)
+    assert 1400 <= at_ms <= 1500
+    assert (stop.kind, stop.by) == (STOP, "watch")
+    rig.alive = True
+    assert rig.go(5000, DISARMED) == []
+
+
+def test_it_stops_again_after_it_was_armed_again() -> None:
+    rig = Rig()
+    rig.go(1000, DISARMED)
+    for _ in range(2):
+        rig.alive = False
+        assert [command.kind for _, command in rig.go(1000, ARMED)] == [STOP]
+        rig.alive = True
+        assert rig.go(1000, DISARMED) + rig.go(1000, ARMED) == []
+
+
+def test_an_armed_machine_without_an_operator_stops_at_once() -> None:
+    ((at_ms, stop),) = Rig().go(1000, ARMED)
+    assert (at_ms, stop.cause) == (20, "no operator")
+
+
+def test_a_machine_that_is_not_armed_has_nothing_to_stop_for() -> None:
+    rig = Rig()
+    rig.go(1000, DISARMED)
+    rig.alive = False
+    assert rig.go(3000, DISARMED) == []
+
+
+def test_nothing_is_armed_for_an_operator_who_is_silent() -> None:
+    rig = Rig()
+    rig.go(1000, DISARMED)
+    rig.alive = False
+    rig.go(1000, DISARMED)
+    rig.link._heard(Command("1", REARM, by="anna"))
+    assert rig.go(20, DISARMED) == []
+    assert not rig.outcomes[0].taken
+    assert "silent" in rig.outcomes[0].why
+
+
+def test_a_command_that_waited_is_not_followed_but_a_stop_is() -> None:
+    rig = Rig()
+    rig.go(1000, DISARMED)
+    for number, kind in enumerate((REARM, ANSWER, STOP)):
+        rig.link._heard(Command(str(number), kind, by="anna"))
+    rig.now_ns += 1001 * MS
+    assert [command.kind for _, command in rig.go(20, DISARMED)] == [STOP]
+    assert [outcome.why for outcome in rig.outcomes] == ["too late: the machine was not ready"] * 2
+
+
+def test_a_fresh_command_is_given_once() -> None:
+    rig = Rig()
+    rig.go(1000, DISARMED)
+    rig.link._heard(Command("1", REARM, by="anna", audit="ab"))
+    assert [command.id for _, command in rig.go(1000, DISARMED)] == ["1"]
+
+
+def test_the_machines_time_waits_for_the_clock_and_does_not_race_after_it() -> None:
+    rig = Rig(speed=2.0)
+    for k in range(51):
+        rig.link.attend(k * 20 * MS, DISARMED, None)
+    assert rig.now_ns == 500 * MS
+    rig.now_ns += 3000 * MS  # something took long
+    slept_s = rig.slept_s
+    for k in range(51, 102):
+        rig.link.attend(k * 20 * MS, DISARMED, None)
+    assert rig.slept_s - slept_s > 0.45
