@@ -181,7 +181,7 @@ class _Replay:
             folder.finished(folder.path / RECORDING)
         write_replay_report(folder.path / REPORT, data)
         folder.finished(folder.path / REPORT)
-        if has_mission(data):
+        if has_mission(data) and self._request.scenario.kind == "mission":
             write_mission_picture(folder.path / PICTURE, data)
             folder.finished(folder.path / PICTURE)
 

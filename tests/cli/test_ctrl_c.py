@@ -49,7 +49,7 @@ entry_point()
 
 @pytest.mark.parametrize(
     ("module", "name", "kept"),
-    [("pipeline.build", "MappingPipeline", []), ("pipeline.build", "Outcome", ["odometry.tum", "trajectory.tum"])],
+    [("pipeline.build", "MappingPipeline", []), ("pipeline.build", "MapOutcome", ["odometry.tum", "trajectory.tum"])],
 )
 def test_what_is_kept_is_said_and_nothing_else(
     module: str, name: str, kept: list[str], log: Path, tmp_path: Path
