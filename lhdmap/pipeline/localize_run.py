@@ -106,7 +106,7 @@ def localize(request: LocalizeRequest) -> LocalizeResult:
                 localizer.rows,
                 localizer.searches,
                 changes,
-                episodes(localizer.rows, localizer.reasons),
+                episodes(localizer.rows, localizer.facts.reasons),
                 summary,
                 told,
                 localizer.pipeline.records.articulation(),
@@ -157,15 +157,15 @@ def _localized(
 
 def summary_of(localizer: Localizer) -> dict[str, Any]:
     """Return the figures of a run."""
-    rows, first = localizer.rows, localizer.first_fix
+    rows, first = localizer.rows, localizer.facts.first_fix
     latencies = np.array([row.latency_ms for row in rows])
     return {
         "scans": len(rows),
         "tracking_share": sum(row.status == TRACKING for row in rows) / len(rows),
         "first_fix_s": None if first is None else first[0],
         "first_fix_m": None if first is None else first[1],
-        "lost_stretches": localizer.lost_stretches,
-        "false_fix_guard": localizer.withheld,
+        "lost_stretches": localizer.facts.lost_stretches,
+        "false_fix_guard": localizer.facts.withheld,
         "changes": len(localizer.world.changes()),
         "latency_ms": {"median": float(np.median(latencies)), "p99": float(np.quantile(latencies, 0.99))},
     }

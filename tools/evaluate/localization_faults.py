@@ -287,7 +287,7 @@ def row(fault: Fault, known: KnownMap, messages: Messages, drive: Any, truth: Ma
         f"{1e3 * math.sqrt(float((off[tracks] ** 2).mean())):.0f}, {1e3 * off[tracks].max():.0f} mm",
         f"{np.abs(np.degrees(error[tracks, 2])).max():.2f}°",
         f"{100 * inside[:, 0].mean():.0f} / {100 * inside[:, 1].mean():.0f} %",
-        str(localizer.lost_stretches),
+        str(localizer.facts.lost_stretches),
         str(int(silent.sum())),
         _again(fault, stamps, drive, tracks & (off < _RIGHT_M)),
     )
