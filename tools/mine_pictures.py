@@ -20,7 +20,8 @@ import matplotlib.pyplot as plt
 import numpy as np
 from lhdmap.machine import Machine
 from lhdmap.messages import FloatArray
-from lhdmap.mine.network import Network, make_network
+from lhdmap.mine.make_network import make_network
+from lhdmap.mine.network import Network
 from lhdmap.mine.plan import find_plan, load_plan
 from lhdmap.mine.route import start_of
 from lhdmap.mine.routes import Planner

@@ -38,7 +38,7 @@ from lhdmap.pipeline.refusal import require_a_map
 from lhdmap.pipeline.stream import Stream
 from lhdmap.provenance import file_entry, source_entry
 from lhdmap.report.page import fill_in_cost
-from lhdmap.report.recording import Thinning
+from lhdmap.report.recording_settings import Thinning
 from lhdmap.runfolder import RunInfo
 from lhdmap.topology.edits import load_edits
 from lhdmap.topology.geojson import to_geojson

@@ -31,7 +31,8 @@ from lhdmap.report.live_recording import add_pose_now
 from lhdmap.report.localization_data import LocalizationData
 from lhdmap.report.localization_page import write_localization_report
 from lhdmap.report.localization_recording import record_localization
-from lhdmap.report.recording import RecordingWriter, Thinning
+from lhdmap.report.recording import RecordingWriter
+from lhdmap.report.recording_settings import Thinning
 from lhdmap.runfolder import RunFolderWriter, RunInfo
 from lhdmap.topology.model import TopologicalMap
 from lhdmap.trajectory import Trajectory, write_tum

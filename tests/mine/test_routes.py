@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 from lhdmap.errors import UsageError
 from lhdmap.machine import Machine
-from lhdmap.mine.network import Network, make_network
+from lhdmap.mine.make_network import make_network
+from lhdmap.mine.network import Network
 from lhdmap.mine.plan import find_plan, load_plan
 from lhdmap.mine.route import Start, parse_route, start_of
 from lhdmap.mine.routes import Planner

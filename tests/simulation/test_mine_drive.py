@@ -15,7 +15,8 @@ from lhdmap.errors import LhdmapWarning, UsageError
 from lhdmap.logs.source import LogSource
 from lhdmap.machine import Machine
 from lhdmap.messages import GroundTruth, LaserScan, Message, Tachometer, Text
-from lhdmap.mine.network import Network, make_network
+from lhdmap.mine.make_network import make_network
+from lhdmap.mine.network import Network
 from lhdmap.mine.plan import find_plan, load_plan
 from lhdmap.simulation.history import Column
 from lhdmap.simulation.mine_drive import MineDrive, MineDriveSettings, SimulatedMineDrive, simulate_mine

@@ -18,7 +18,7 @@ from lhdmap.logs.source import LogSource
 from lhdmap.machine import Machine
 from lhdmap.mapfolder import MapFolder
 from lhdmap.messages import FloatArray, Joints, LaserScan, Message, Tachometer
-from lhdmap.mine.network import make_network
+from lhdmap.mine.make_network import make_network
 from lhdmap.mine.plan import load_plan
 from lhdmap.pipeline.build import BuildRequest, build_map
 from lhdmap.pipeline.inputs import ROLES_READ

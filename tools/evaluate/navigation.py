@@ -20,7 +20,7 @@ from lhdmap.config import Settings
 from lhdmap.geometry import se2
 from lhdmap.machine import Machine
 from lhdmap.messages import FloatArray
-from lhdmap.mine.network import make_network
+from lhdmap.mine.make_network import make_network
 from lhdmap.mine.plan import load_plan
 from lhdmap.replay.assemble import parts_of
 from lhdmap.replay.parts import Parts
