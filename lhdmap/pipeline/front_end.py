@@ -26,7 +26,7 @@ from lhdmap.odometry.cloud.motion import CloudPrior
 from lhdmap.odometry.planar import ScanView
 from lhdmap.odometry.start import ScanInput
 from lhdmap.odometry.steps import WheelStep
-from lhdmap.pipeline.inclinometer import Inclinometer
+from lhdmap.pipeline.inclinometer import AttitudeSource
 from lhdmap.pipeline.mounts import SensorMounts, level_sensor
 from lhdmap.pipeline.rear import AT_ONCE_NS, RearScans
 from lhdmap.pipeline.sweep_times import SweepTimes
@@ -44,7 +44,7 @@ class FrontEnd:
     def __init__(self, settings: Settings, machine: Machine | None) -> None:
         self.machine = machine or DEFAULT_MACHINE
         self.mounts = SensorMounts(machine)
-        self.inclinometer = Inclinometer(settings.attitude, settings.gyro, self.mounts)
+        self.inclinometer = AttitudeSource(settings.attitude, settings.gyro, self.mounts)
         self.wheels = WheelOdometry(settings.wheels, self.machine)
         self.rear = RearScans(self.mounts, self.wheels, self.machine)
         self.sweep_times = SweepTimes()

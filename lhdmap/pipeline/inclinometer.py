@@ -12,7 +12,7 @@ from lhdmap.proprioception.gyro import Gyro, GyroSettings
 _EARLY = 10_000  # inclinations that wait for their mount at most
 
 
-class Inclinometer:
+class AttitudeSource:
     """Takes inclinations; `attitude` and `gyro` are there from the start, and `there` says whether any message came."""
 
     def __init__(self, attitude: AttitudeSettings, gyro: GyroSettings, mounts: SensorMounts) -> None:

@@ -100,9 +100,9 @@ class Navigator(Process):
         elif topic == MACHINE_SAYS:
             self._mode = message.mode
             waits = message.mode == "assisted" and self._speed_mps < _CREEPS_MPS
-            self.control.may_move = message.armed and message.mode in _MOVES and not waits
+            self.control.allowed.may_move = message.armed and message.mode in _MOVES and not waits
         elif topic == PLAN:
-            self.control.sight_m = math.inf if isinstance(message, Idle) else message.speeds.sight_m
+            self.control.allowed.sight_m = math.inf if isinstance(message, Idle) else message.speeds.sight_m
         elif topic == STATION_SAYS:
             self._asked_on, self._gave_up = message.go_on, message.gave_up
             self._goal = message.goal or self._goal
