@@ -122,8 +122,8 @@ def test_the_operator_touches_nothing(name: str, route: str, start: str, speed_k
     settings = MineDriveSettings(route=route, start=start, operator=OperatorSettings(speed_kmh=speed_kmh))
     drive = MineDrive(make_network(load_plan(find_plan(name))), MACHINE, settings)
     drive.drive()
-    assert drive.contacts == []
-    assert drive.min_clearance_m > 0.09
+    assert drive.gauge.contacts == []
+    assert drive.gauge.min_clearance_m > 0.09
 
 
 def test_wandering_is_as_wide_as_asked(network: Network) -> None:

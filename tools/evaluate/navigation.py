@@ -104,7 +104,7 @@ def measured(plan: Path) -> float:
         make_network(load_plan(plan)), Machine(), MineDriveSettings(operator=OperatorSettings(speed_kmh=_SLOW_KMH))
     )
     drive.drive()
-    return drive.min_clearance_m
+    return drive.gauge.min_clearance_m
 
 
 def as_mapped(parts: Parts, scenario: Scenario, folder: Path) -> Parts:
