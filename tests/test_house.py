@@ -168,13 +168,12 @@ LARGE_CLASSES = {
 NAMES_TWICE = {
     "Asked", "Attempt", "Beat", "Beside", "Bodies", "Bumper", "Candidate", "Chance", "Change", "Column", "Command",
     "Crossing", "Cut", "Cycle", "Decision", "Digging", "Drift", "Drive", "Edge", "Errand", "Errors", "Event", "Face",
-    "Facts", "Field", "Figure", "Floor", "Found", "Gains", "Grid", "Guard", "Health", "Help", "Inbox", "Job",
-    "Landmarks", "Layout", "Ledger", "Leg", "Limits", "Link", "Load", "Loader", "Machine", "Moment", "Node",
-    "Operator", "Outcome", "Pairs", "Path", "PileTruth", "Place", "Plan", "Planner", "Plant", "Profile", "Reach",
-    "Refusal", "Request", "Rig", "Rock", "Room", "Row", "Rule", "Run", "Sampled", "Seen", "Series", "Shaking",
-    "Signals", "SkidFactor", "Span", "Speeds", "Start", "State", "Station", "Status", "Step", "Stop", "Stops",
-    "Table", "Tally", "Target", "Task", "Trajectory", "Tries", "Truth", "Tunnel", "Turn", "Vehicle", "Verdict",
-    "View", "Walls", "Watch", "Way", "Weighing", "WheelSettings", "Whereabouts", "Word",
+    "Facts", "Field", "Figure", "Floor", "Found", "Gains", "Grid", "Guard", "Help", "Landmarks", "Layout", "Ledger",
+    "Leg", "Limits", "Link", "Load", "Loader", "Moment", "Operator", "Pairs", "Path", "PileTruth", "Place", "Plan",
+    "Plant", "Profile", "Reach", "Refusal", "Request", "Rig", "Rock", "Room", "Row", "Rule", "Run", "Sampled", "Seen",
+    "Series", "Shaking", "Signals", "SkidFactor", "Span", "Speeds", "Start", "State", "Station", "Status", "Step",
+    "Stop", "Stops", "Table", "Target", "Task", "Trajectory", "Tries", "Truth", "Tunnel", "Vehicle", "Walls", "Watch",
+    "Way", "Weighing", "WheelSettings", "Whereabouts", "Word",
 }  # fmt: skip
 """Names that several classes have still, as `LONG_FILES`; none of them in the rooms of `UNIQUE`."""
 

@@ -92,7 +92,7 @@ def run(arguments: argparse.Namespace, console: Console) -> int:
 
 
 @dataclass(frozen=True, slots=True)
-class Outcome:
+class PlanOutcome:
     """What was planned: the values of `--json`, the trajectories of all steps, and the scene of a cloud."""
 
     values: dict[str, Any]
@@ -124,7 +124,7 @@ def _sources(arguments: argparse.Namespace) -> list[Path]:
     return [path for path in paths if path]
 
 
-def _plan(arguments: argparse.Namespace, machine: Rockbreaker, settings: RockbreakerSettings) -> Outcome:
+def _plan(arguments: argparse.Namespace, machine: Rockbreaker, settings: RockbreakerSettings) -> PlanOutcome:
     from lhdmap.rockbreaker.outcome import plan_json
     from lhdmap.rockbreaker.plan import Planner, start_joints
 
@@ -138,10 +138,10 @@ def _plan(arguments: argparse.Namespace, machine: Rockbreaker, settings: Rockbre
         return _plan_to_rock(planner, request, cloud_m)
     plan = planner.plan(request)
     trajectories = () if plan.trajectory is None else (plan.trajectory,)
-    return Outcome(plan_json(plan), trajectories, None, obstacles)
+    return PlanOutcome(plan_json(plan), trajectories, None, obstacles)
 
 
-def _plan_to_rock(planner: Planner, request: Request, cloud_m: FloatArray) -> Outcome:
+def _plan_to_rock(planner: Planner, request: Request, cloud_m: FloatArray) -> PlanOutcome:
     from lhdmap.rockbreaker.outcome import no_rock_json, task_json
     from lhdmap.rockbreaker.rocks import find_rocks
     from lhdmap.rockbreaker.task import plan_to_rock
@@ -150,9 +150,9 @@ def _plan_to_rock(planner: Planner, request: Request, cloud_m: FloatArray) -> Ou
     opening_m = planner.machine.grizzly.opening_m
     task = plan_to_rock(planner, scene, request, opening_m)
     if task is None:
-        return Outcome(no_rock_json(request, len(scene.rocks), opening_m), (), scene, planner.obstacles)
+        return PlanOutcome(no_rock_json(request, len(scene.rocks), opening_m), (), scene, planner.obstacles)
     trajectories = tuple(step.trajectory for step in task.steps if step.trajectory is not None)
-    return Outcome(task_json(task), trajectories, scene, planner.obstacles)
+    return PlanOutcome(task_json(task), trajectories, scene, planner.obstacles)
 
 
 def _obstacles(
@@ -234,7 +234,9 @@ def _finite(value: float, option: str) -> float:
     return value
 
 
-def _write(folder: RunFolderWriter, arguments: argparse.Namespace, settings: Any, outcome: Outcome) -> dict[str, Any]:
+def _write(
+    folder: RunFolderWriter, arguments: argparse.Namespace, settings: Any, outcome: PlanOutcome
+) -> dict[str, Any]:
     """Write the folder; return the values with the paths in it."""
     from lhdmap.config import settings_table
     from lhdmap.rockbreaker.table import UNITS, joined, sampled, write_table
@@ -258,7 +260,7 @@ def _write(folder: RunFolderWriter, arguments: argparse.Namespace, settings: Any
 FRAMES = {"base": "origin on the swing axis, x along the grizzly's middle, y left, z up"}
 
 
-def _draw(folder: Path, outcome: Outcome, rows: FloatArray | None) -> None:
+def _draw(folder: Path, outcome: PlanOutcome, rows: FloatArray | None) -> None:
     from lhdmap.report.rockbreaker_page import write_plan_report
     from lhdmap.report.rockbreaker_recording import write_plan_recording
 

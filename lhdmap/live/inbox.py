@@ -8,7 +8,7 @@ from collections.abc import Callable
 
 from lhdmap.live.recorder import LiveRecorder
 from lhdmap.live.source import Announced, LiveMessage
-from lhdmap.live.tally import Tally
+from lhdmap.live.tally import MessageTally
 
 MOST_MESSAGES, MOST_BYTES = 6000, 192 << 20  # 20 s of two scanners and the slow sensors; of 3D scanners by their size
 _SAID_KEPT = 1000
@@ -49,7 +49,7 @@ class Inbox:
     def __init__(
         self,
         recorder: LiveRecorder,
-        tally: Tally,
+        tally: MessageTally,
         *,
         waits: bool,
         most: tuple[int, int] = (MOST_MESSAGES, MOST_BYTES),

@@ -50,7 +50,7 @@ class Edge(NamedTuple):
         return self.end_m - self.start_m
 
 
-class Turn(NamedTuple):
+class BranchTurn(NamedTuple):
     """The way from one branch of a node into another: how far from the node it begins and ends (m), its tube and radius (m).
 
     `tube` is -1 where the way goes straight on in the same tube.
@@ -73,7 +73,7 @@ class Network:
     tubes: list[Tube]
     nodes: list[Node] = field(default_factory=list)
     edges: list[Edge] = field(default_factory=list)
-    turns: list[Turn] = field(default_factory=list)
+    turns: list[BranchTurn] = field(default_factory=list)
 
     def tube(self, name: str) -> int:
         """Return the index of a drift or place that is a tube."""

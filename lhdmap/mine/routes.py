@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterator, Sequence
 
 from lhdmap.errors import UsageError
 from lhdmap.machine import Machine
-from lhdmap.mine.network import Branch, Edge, Network, Turn
+from lhdmap.mine.network import Branch, BranchTurn, Edge, Network
 from lhdmap.mine.plan import BLIND
 from lhdmap.mine.route import Start, Stop
 from lhdmap.mine.route_search import RouteState, RouteStep, Starts, cheapest
@@ -27,14 +27,14 @@ LEAST_RADIUS_M = 5.0
 """Turns of a smaller radius are not driven (guidance prototype, tightest bends)."""
 
 
-class Planner:
+class RouteFinder:
     """Finds routes of a machine through a network."""
 
     def __init__(self, network: Network, machine: Machine) -> None:
         self.network, self.machine = network, machine
         self._wheelbase_m, self._reverse = machine.dimensions.wheelbase_m, _REVERSE
         self.left_out: list[str] = []
-        self._turns: dict[tuple[int, Branch], list[Turn]] = {}
+        self._turns: dict[tuple[int, Branch], list[BranchTurn]] = {}
         for turn in network.turns:
             if turn.tube < 0 or turn.radius_m >= LEAST_RADIUS_M:
                 self._turns.setdefault((turn.node, turn.start), []).append(turn)
@@ -182,7 +182,7 @@ class Planner:
     def _is_dead_end(self, edge: Edge, direction: int) -> bool:
         return self.network.nodes[edge.end if direction > 0 else edge.start].degree == 1
 
-    def _turn_run(self, turn: Turn, edge: Edge, gear: int) -> Run:
+    def _turn_run(self, turn: BranchTurn, edge: Edge, gear: int) -> Run:
         """Return the run through a turn's tube; which way follows from which of its ends is nearer to the edge."""
         tube = self.network.tubes[turn.tube]
         begin = self.network.tubes[edge.tube].pose(turn.start.s_m + turn.start.outward * turn.start_at_m)

@@ -8,7 +8,7 @@ import numpy as np
 
 from lhdmap.mine.biarc import biarc
 from lhdmap.mine.centre_line import CentreLine
-from lhdmap.mine.network import Branch, Network, Turn
+from lhdmap.mine.network import Branch, BranchTurn, Network
 from lhdmap.mine.tube import Tube
 
 _STRAIGHT_RAD = math.radians(8.0)
@@ -29,7 +29,7 @@ def add_turns(network: Network) -> None:
     for index, node in enumerate(list(network.nodes)):
         for a, b in ((a, b) for a in node.branches for b in node.branches if a != b):
             if a.tube == b.tube and a.s_m == b.s_m:
-                network.turns.append(Turn(index, a, b, -1, 0.0, 0.0, math.inf))
+                network.turns.append(BranchTurn(index, a, b, -1, 0.0, 0.0, math.inf))
                 continue
             back = next((turn for turn in network.turns if (turn.node, turn.start, turn.end) == (index, b, a)), None)
             if back is not None:
@@ -40,7 +40,7 @@ def add_turns(network: Network) -> None:
                 network.turns.append(turn)
 
 
-def _turn(network: Network, index: int, a: Branch, b: Branch) -> Turn | None:
+def _turn(network: Network, index: int, a: Branch, b: Branch) -> BranchTurn | None:
     """Return the turn from one branch into another, with its tube; None where there is no room for one."""
     node, tubes = network.nodes[index], network.tubes
     if node.corner_m == 0.0 or _left_as_it_is(tubes, a, b):
@@ -65,7 +65,7 @@ def _turn(network: Network, index: int, a: Branch, b: Branch) -> Turn | None:
         return None
     radius_m, way_m, line = best
     tubes.append(_turn_tube(f"{node.name or 'turn'} {tubes[a.tube].name} {tubes[b.tube].name}", line, tubes, (a, b)))
-    return Turn(index, a, b, len(tubes) - 1, way_m, way_m, radius_m)
+    return BranchTurn(index, a, b, len(tubes) - 1, way_m, way_m, radius_m)
 
 
 def _left_as_it_is(tubes: list[Tube], a: Branch, b: Branch) -> bool:

@@ -20,7 +20,7 @@ from lhdmap.machine import Machine
 from lhdmap.messages import FloatArray, GroundTruth, Record
 from lhdmap.mine.network import Network
 from lhdmap.mine.route import Start, parse_route, start_of
-from lhdmap.mine.routes import Planner
+from lhdmap.mine.routes import RouteFinder
 from lhdmap.mine.topology import Directory, topology_json
 from lhdmap.mine.ways import Leg, legs_of
 from lhdmap.outputs import OutputFiles
@@ -189,7 +189,7 @@ def planned(
     Raises:
         UsageError: the route is not in the plan, there is no way, or none to drive.
     """
-    planner = Planner(network, machine)
+    planner = RouteFinder(network, machine)
     runs = planner.route(start, parse_route(route, network.plan)) if route else planner.teaching(start)
     way_m = sum(abs(run.to_m - run.from_m) for run in runs)
     pose = network.tubes[start.tube].pose(start.at_m, start.facing)

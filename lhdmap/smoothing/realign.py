@@ -21,7 +21,7 @@ from lhdmap.messages import FloatArray
 from lhdmap.smoothing.height_pairs import Joint, wall_lines
 from lhdmap.smoothing.moves import Moves
 from lhdmap.smoothing.settings import SmoothingSettings
-from lhdmap.smoothing.window import Node, Offset, Window, solved
+from lhdmap.smoothing.window import Offset, Window, WindowNode, solved
 
 _SOLVE_SHARE = 0.3  # of the lag between two solutions
 _REST_SHARE = 0.2  # of the lag in time between nodes at rest
@@ -68,7 +68,7 @@ class Realigner:
     def __init__(self, settings: SmoothingSettings, joint_x_m: float = 0.0) -> None:
         self._settings = settings
         self._joint, self._offset = Joint(joint_x_m, 0.0), Offset()
-        self._nodes: deque[Node] = deque()  # final ones that others are tied to, then those that are still moved
+        self._nodes: deque[WindowNode] = deque()  # final ones that others are tied to, then those that are still moved
         self._poses: deque[FloatArray] = deque()
         self._final = self._paired = 0  # so many of the nodes are final, have been compared with the others
         self._worker = ThreadPoolExecutor(max_workers=1, thread_name_prefix="realign")
@@ -120,7 +120,7 @@ class Realigner:
         hits = np.concatenate([rear, front[::_FRONT_STEP]])
         serial = self._nodes[-1].serial + 1 if self._nodes else 0
         lines, pose_odom = wall_lines(front), scan.pose.copy()
-        self._nodes.append(Node(serial, scan.time_ns, travelled_m, pose_odom, sigmas, lines, hits, len(rear), []))
+        self._nodes.append(WindowNode(serial, scan.time_ns, travelled_m, pose_odom, sigmas, lines, hits, len(rear), []))
         self._poses.append(pose)
         self._way.weak = False
 
