@@ -32,7 +32,7 @@ from lhdmap.proprioception.attitude import AttitudeSettings
 from lhdmap.proprioception.gyro import GyroSettings
 from lhdmap.proprioception.slip import SlipSettings
 from lhdmap.proprioception.wheels import WheelSettings
-from lhdmap.report.recording import RecordingSettings
+from lhdmap.report.recording_settings import RecordingSettings
 from lhdmap.rockbreaker.settings import RockbreakerSettings
 from lhdmap.settings import load_section, nearest, section_toml
 from lhdmap.smoothing.settings import SmoothingSettings

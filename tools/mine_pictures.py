@@ -20,10 +20,11 @@ import matplotlib.pyplot as plt
 import numpy as np
 from lhdmap.machine import Machine
 from lhdmap.messages import FloatArray
-from lhdmap.mine.network import Network, make_network
+from lhdmap.mine.make_network import make_network
+from lhdmap.mine.network import Network
 from lhdmap.mine.plan import find_plan, load_plan
 from lhdmap.mine.route import start_of
-from lhdmap.mine.routes import Planner
+from lhdmap.mine.routes import RouteFinder
 from lhdmap.mine.ways import legs_of
 from lhdmap.simulation.mine_world.world import MineWorld
 
@@ -71,7 +72,7 @@ def draw(axis: Any, network: Network, machine: Machine) -> None:
     walls = _walls(MineWorld(network, machine))
     axis.scatter(*walls.T, s=0.15, c="0.25", linewidths=0, rasterized=True)
     start = start_of(network, machine, None)
-    runs = Planner(network, machine).teaching(start)
+    runs = RouteFinder(network, machine).teaching(start)
     pose = network.tubes[start.tube].pose(start.at_m, start.facing)
     for leg in legs_of(network, runs, machine, start=pose):
         axis.plot(leg.x_m, leg.y_m, color="tab:blue" if leg.gear > 0 else "tab:red", linewidth=0.8)

@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
 from lhdmap.batch.pool import RETRIES
-from lhdmap.batch.work import Job, Outcome, Ran, Work
+from lhdmap.batch.work import BatchJob, JobOutcome, Ran, Work
 from lhdmap.errors import InputError, UsageError
 from lhdmap.extras import install_line, is_installed, library
 
@@ -23,7 +23,7 @@ def check_installed() -> None:
 
 
 def run_on_cluster(
-    jobs: Sequence[Job], work: Work, address: str, told: Callable[[str], None], patience_s: float = PATIENCE_S
+    jobs: Sequence[BatchJob], work: Work, address: str, told: Callable[[str], None], patience_s: float = PATIENCE_S
 ) -> Iterator[Ran]:
     """Yield each job as it ends on a worker of the scheduler at `address`; what dies is tried again there.
 
@@ -68,7 +68,7 @@ def _seen(client: Any, seen_s: float, patience_s: float, left: int, told: Callab
     return seen_s
 
 
-def _ended(future: Any, job: Job) -> Ran:
+def _ended(future: Any, job: BatchJob) -> Ran:
     if future.status == "finished":
         outcome, wall_s = future.result()
         return Ran(job.key, outcome, "", 0, wall_s)
@@ -80,7 +80,7 @@ def _ended(future: Any, job: Job) -> Ran:
     return Ran(job.key, None, f"{type(error).__name__}: {error}", 0, 0.0)
 
 
-def _timed(work: Work, words: Sequence[str]) -> tuple[Outcome, float]:
+def _timed(work: Work, words: Sequence[str]) -> tuple[JobOutcome, float]:
     """Run on a worker: the outcome and the seconds it took there."""
     began_s = time.monotonic()
     return work(words), time.monotonic() - began_s

@@ -13,7 +13,7 @@ from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wai
 from concurrent.futures.process import BrokenProcessPool
 from typing import NamedTuple
 
-from lhdmap.batch.work import Job, Outcome, Ran, Work
+from lhdmap.batch.work import BatchJob, JobOutcome, Ran, Work
 from lhdmap.interrupts import obey, undisturbed
 
 RETRIES = 1
@@ -22,7 +22,7 @@ _JOBS_A_PROCESS = 20  # then a new one: what libraries keep adds up to a quarter
 
 class _Running(NamedTuple):
     worker: _Worker
-    job: Job
+    job: BatchJob
     killed: int
     began_s: float
 
@@ -35,7 +35,7 @@ class _Worker:
         self._pid: Future[int] | None = None
         self._jobs = 0
 
-    def submit(self, work: Work, job: Job) -> Future[Outcome]:
+    def submit(self, work: Work, job: BatchJob) -> Future[JobOutcome]:
         """Begin a job."""
         if self._jobs >= _JOBS_A_PROCESS:
             self.end()
@@ -45,7 +45,7 @@ class _Worker:
             self.end()
             return self._submitted(work, job)
 
-    def _submitted(self, work: Work, job: Job) -> Future[Outcome]:
+    def _submitted(self, work: Work, job: BatchJob) -> Future[JobOutcome]:
         with undisturbed():  # the process must not hear Ctrl-C before it can ignore it
             if self._pool is None:
                 spawn = multiprocessing.get_context("spawn")  # a fork would copy locks of threads
@@ -68,11 +68,11 @@ class _Worker:
         self._pool = self._pid = None
 
 
-def run_here(jobs: Sequence[Job], work: Work, workers: int, retries: int = RETRIES) -> Iterator[Ran]:
+def run_here(jobs: Sequence[BatchJob], work: Work, workers: int, retries: int = RETRIES) -> Iterator[Ran]:
     """Yield each job as it ends; one whose worker is killed is tried again, at the end, `retries` times."""
     left = deque((job, 0) for job in jobs)
     free = [_Worker() for _ in range(max(1, min(workers, len(jobs))))]
-    running: dict[Future[Outcome], _Running] = {}
+    running: dict[Future[JobOutcome], _Running] = {}
     try:
         while left or running:
             while left and free:
@@ -94,7 +94,7 @@ def run_here(jobs: Sequence[Job], work: Work, workers: int, retries: int = RETRI
             worker.end()
 
 
-def _ended(future: Future[Outcome], one: _Running) -> Ran:
+def _ended(future: Future[JobOutcome], one: _Running) -> Ran:
     wall_s = time.monotonic() - one.began_s
     try:
         return Ran(one.job.key, future.result(), "", one.killed, wall_s)

@@ -12,7 +12,7 @@ from typing import Any
 from lhdmap.batch.ledger import ROWS, Ledger, RowResult
 from lhdmap.batch.manifest import Task, read_manifest
 from lhdmap.batch.table import write_table
-from lhdmap.batch.work import Job, Runner, Work
+from lhdmap.batch.work import BatchJob, Runner, Work
 from lhdmap.descriptions import SOFTWARE, description_name, kind_of
 from lhdmap.errors import UsageError
 from lhdmap.interrupts import before_interrupt
@@ -103,7 +103,7 @@ def _run(request: BatchRequest, tasks: Sequence[Task], ledger: Ledger) -> list[R
         request.told(f"{skipped} of {len(tasks)} rows are complete already")
     for task in wanted:
         ledger.clear(task)
-    jobs = [Job(task.name, tuple(task.words(request.target, force=ledger.stands(task)))) for task in wanted]
+    jobs = [BatchJob(task.name, tuple(task.words(request.target, force=ledger.stands(task)))) for task in wanted]
     by_name, began_s = {task.name: task for task in wanted}, time.monotonic()
     runs = request.runner(jobs, request.work) if jobs else iter(())
     for number, ran in enumerate(runs, start=1):

@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 
 
-class Outcome(NamedTuple):
+class JobOutcome(NamedTuple):
     """What came of a command line: exit code, the object of `--json`, what it said on standard error."""
 
     exit_code: int
@@ -14,7 +14,7 @@ class Outcome(NamedTuple):
     said: str = ""
 
 
-class Job(NamedTuple):
+class BatchJob(NamedTuple):
     """A command line with a key of its own."""
 
     key: str
@@ -25,13 +25,13 @@ class Ran(NamedTuple):
     """A job that is over: its outcome, or why there is none; how often a worker died of it; seconds it took."""
 
     key: str
-    outcome: Outcome | None
+    outcome: JobOutcome | None
     reason: str
     killed: int
     wall_s: float
 
 
-Work = Callable[[Sequence[str]], Outcome]
+Work = Callable[[Sequence[str]], JobOutcome]
 """A function that can be sent to another process."""
-Runner = Callable[[Sequence[Job], Work], Iterator[Ran]]
+Runner = Callable[[Sequence[BatchJob], Work], Iterator[Ran]]
 """Yields each job once, as it ends, in any order."""

@@ -19,7 +19,7 @@ from lhdmap.errors import EvaluationShortfall, UsageError
 from lhdmap.names import beside
 
 if TYPE_CHECKING:
-    from lhdmap.batch.work import Outcome, Runner
+    from lhdmap.batch.work import JobOutcome, Runner
 
 _ONE = threading.Lock()  # standard output is the process's: a worker with several threads takes one row at a time
 _SAID = 50_000  # characters of what a command said that are kept
@@ -65,9 +65,9 @@ def run(arguments: argparse.Namespace, console: Console) -> int:
     return 0 if failure is None else failure.exit_code
 
 
-def run_words(words: Sequence[str]) -> Outcome:
+def run_words(words: Sequence[str]) -> JobOutcome:
     """Run one command line in this process and return what came of it: what workers do."""
-    from lhdmap.batch.work import Outcome
+    from lhdmap.batch.work import JobOutcome
     from lhdmap.cli.main import main
 
     printed, said = io.StringIO(), io.StringIO()
@@ -77,7 +77,7 @@ def run_words(words: Sequence[str]) -> Outcome:
         values = json.loads(printed.getvalue() or "{}")
     except ValueError:
         values = {}
-    return Outcome(exit_code, values if isinstance(values, dict) else {}, said.getvalue()[-_SAID:])
+    return JobOutcome(exit_code, values if isinstance(values, dict) else {}, said.getvalue()[-_SAID:])
 
 
 def _runner(arguments: argparse.Namespace, console: Console) -> Runner:

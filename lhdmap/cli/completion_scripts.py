@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from lhdmap.cli.completion_tree import Node, Option, Values
+from lhdmap.cli.completion_tree import CompletionNode, Option, Values
 
 _BASH = """\
 # Tab completion of lhdmap for bash: source <(lhdmap completion bash)
@@ -76,29 +76,29 @@ complete -c lhdmap -f
 """
 
 
-def bash(nodes: Sequence[Node]) -> str:
+def bash(nodes: Sequence[CompletionNode]) -> str:
     """Return the script for bash."""
     return _BASH.format(paths=_paths(nodes), cases="\n".join(_case(node, "_lhdmap_files", "$cur") for node in nodes))
 
 
-def zsh(nodes: Sequence[Node]) -> str:
+def zsh(nodes: Sequence[CompletionNode]) -> str:
     """Return the script for zsh."""
     cases = "\n".join(_case(node, "_files", "$words[CURRENT]", each_word=True) for node in nodes)
     return _ZSH.format(paths=_paths(nodes), cases=cases)
 
 
-def fish(nodes: Sequence[Node]) -> str:
+def fish(nodes: Sequence[CompletionNode]) -> str:
     """Return the script for fish."""
     lines = [line for node in nodes for line in _fish_lines(node)]
     return _FISH.format(paths=" ".join(node.path for node in nodes if node.path), lines="\n".join(lines))
 
 
-def _paths(nodes: Sequence[Node]) -> str:
+def _paths(nodes: Sequence[CompletionNode]) -> str:
     """Return the pattern of all commands as `COMMAND/WORD`: that of the first level begins with the stroke."""
     return "|".join(node.path if "/" in node.path else f"/{node.path}" for node in nodes if node.path)
 
 
-def _case(node: Node, files: str, current: str, *, each_word: bool = False) -> str:
+def _case(node: CompletionNode, files: str, current: str, *, each_word: bool = False) -> str:
     """Return what is completed behind a command: values of the option before, options, commands or arguments."""
     inner = [
         f"                {'|'.join(one.names)}) {_offer(one.values, files, each_word=each_word)} ;;"
@@ -125,7 +125,7 @@ def _offer(values: Values, files: str, *, each_word: bool) -> str:
     return "; ".join([*steps, *([files] if values.files else [])]) or ":"
 
 
-def _fish_lines(node: Node) -> list[str]:
+def _fish_lines(node: CompletionNode) -> list[str]:
     start = f"complete -c lhdmap -n \"__lhdmap_at '{node.path}'\""
     lines = [f"{start} -a {name} -d {_quoted(text)}" for name, text in node.commands.items()]
     lines += [f"{start} {_fish_values(node.arguments)}"] if node.arguments != Values() and not node.commands else []

@@ -25,7 +25,7 @@ class Option:
 
 
 @dataclass(frozen=True, slots=True)
-class Node:
+class CompletionNode:
     """A command or sub-command by its `path` (`eval/trajectory`; empty: `lhdmap` itself)."""
 
     path: str
@@ -34,14 +34,14 @@ class Node:
     arguments: Values = field(default_factory=Values)
 
 
-def all_nodes() -> list[Node]:
+def all_nodes() -> list[CompletionNode]:
     """Return the nodes of all commands; their modules are imported for it."""
     from lhdmap.cli.main import COMMANDS, command_parser
 
     return list(_nodes(command_parser(list(COMMANDS)), ""))
 
 
-def _nodes(parser: argparse.ArgumentParser, path: str) -> list[Node]:
+def _nodes(parser: argparse.ArgumentParser, path: str) -> list[CompletionNode]:
     options, commands, inner = [], {}, []
     arguments = Values()
     for action in parser._actions:  # noqa: SLF001  # argparse has no other way to ask
@@ -55,7 +55,7 @@ def _nodes(parser: argparse.ArgumentParser, path: str) -> list[Node]:
         elif action.help != argparse.SUPPRESS:
             text = " ".join((action.help or "").replace("%%", "%").split())
             options.append(Option(tuple(action.option_strings), text, None if action.nargs == 0 else _values(action)))
-    return [Node(path, tuple(options), commands, arguments), *inner]
+    return [CompletionNode(path, tuple(options), commands, arguments), *inner]
 
 
 def _values(action: argparse.Action) -> Values:

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from lhdmap.cli.console import Console
 from lhdmap.cli.options import add_common, add_output, add_settings
+from lhdmap.cli.rockbreaker_text import plan_text, workspace_text
 from lhdmap.errors import EvaluationShortfall, UsageError
 
 if TYPE_CHECKING:
@@ -91,7 +92,7 @@ def run(arguments: argparse.Namespace, console: Console) -> int:
 
 
 @dataclass(frozen=True, slots=True)
-class Outcome:
+class PlanOutcome:
     """What was planned: the values of `--json`, the trajectories of all steps, and the scene of a cloud."""
 
     values: dict[str, Any]
@@ -110,7 +111,7 @@ def _run_plan(arguments: argparse.Namespace, console: Console, machine: Rockbrea
         outcome = _plan(arguments, machine, settings.rockbreaker)
         values = _write(folder, arguments, settings, outcome)
     failure = None if values["feasible"] else EvaluationShortfall(f"not feasible: {values['reason']['text']}")
-    console.result(values, _text(values), failure=failure)
+    console.result(values, plan_text(values), failure=failure)
     return 0 if failure is None else failure.exit_code
 
 
@@ -123,7 +124,7 @@ def _sources(arguments: argparse.Namespace) -> list[Path]:
     return [path for path in paths if path]
 
 
-def _plan(arguments: argparse.Namespace, machine: Rockbreaker, settings: RockbreakerSettings) -> Outcome:
+def _plan(arguments: argparse.Namespace, machine: Rockbreaker, settings: RockbreakerSettings) -> PlanOutcome:
     from lhdmap.rockbreaker.outcome import plan_json
     from lhdmap.rockbreaker.plan import Planner, start_joints
 
@@ -137,10 +138,10 @@ def _plan(arguments: argparse.Namespace, machine: Rockbreaker, settings: Rockbre
         return _plan_to_rock(planner, request, cloud_m)
     plan = planner.plan(request)
     trajectories = () if plan.trajectory is None else (plan.trajectory,)
-    return Outcome(plan_json(plan), trajectories, None, obstacles)
+    return PlanOutcome(plan_json(plan), trajectories, None, obstacles)
 
 
-def _plan_to_rock(planner: Planner, request: Request, cloud_m: FloatArray) -> Outcome:
+def _plan_to_rock(planner: Planner, request: Request, cloud_m: FloatArray) -> PlanOutcome:
     from lhdmap.rockbreaker.outcome import no_rock_json, task_json
     from lhdmap.rockbreaker.rocks import find_rocks
     from lhdmap.rockbreaker.task import plan_to_rock
@@ -149,9 +150,9 @@ def _plan_to_rock(planner: Planner, request: Request, cloud_m: FloatArray) -> Ou
     opening_m = planner.machine.grizzly.opening_m
     task = plan_to_rock(planner, scene, request, opening_m)
     if task is None:
-        return Outcome(no_rock_json(request, len(scene.rocks), opening_m), (), scene, planner.obstacles)
+        return PlanOutcome(no_rock_json(request, len(scene.rocks), opening_m), (), scene, planner.obstacles)
     trajectories = tuple(step.trajectory for step in task.steps if step.trajectory is not None)
-    return Outcome(task_json(task), trajectories, scene, planner.obstacles)
+    return PlanOutcome(task_json(task), trajectories, scene, planner.obstacles)
 
 
 def _obstacles(
@@ -233,7 +234,9 @@ def _finite(value: float, option: str) -> float:
     return value
 
 
-def _write(folder: RunFolderWriter, arguments: argparse.Namespace, settings: Any, outcome: Outcome) -> dict[str, Any]:
+def _write(
+    folder: RunFolderWriter, arguments: argparse.Namespace, settings: Any, outcome: PlanOutcome
+) -> dict[str, Any]:
     """Write the folder; return the values with the paths in it."""
     from lhdmap.config import settings_table
     from lhdmap.rockbreaker.table import UNITS, joined, sampled, write_table
@@ -257,40 +260,13 @@ def _write(folder: RunFolderWriter, arguments: argparse.Namespace, settings: Any
 FRAMES = {"base": "origin on the swing axis, x along the grizzly's middle, y left, z up"}
 
 
-def _draw(folder: Path, outcome: Outcome, rows: FloatArray | None) -> None:
+def _draw(folder: Path, outcome: PlanOutcome, rows: FloatArray | None) -> None:
     from lhdmap.report.rockbreaker_page import write_plan_report
     from lhdmap.report.rockbreaker_recording import write_plan_recording
 
     write_plan_report(folder / "report.html", outcome.values, outcome.trajectories, rows, outcome.scene)
     if rows is not None:
         write_plan_recording(folder / "recording.rrd", outcome.trajectories, rows, outcome.scene, outcome.obstacles)
-
-
-def _text(values: dict[str, Any]) -> str:
-    """Return the plan in words."""
-    lines = [f"folder       {values['folder']}"]
-    if values.get("rock"):
-        rock = values["rock"]
-        lines.append(f"rock         at {_point(rock['top_m'])} m: {rock['why']}")
-    if not values["feasible"]:
-        return "\n".join([*lines, f"not feasible {values['reason']['text']}"])
-    duration_s, bound_s = values["duration_s"], values["bound_s"]
-    ends = f"{_point(values['from_m'])} to {_point(values['to_m'])} m"
-    lines += [
-        f"trajectory   {values['path'].upper()}, {values['timing']}: {duration_s:.2f} s, {ends}",
-        f"orientation  {values['phi_from_deg']:.2f}° to {values['phi_to_deg']:.2f}°",
-        f"set by       {values['limiting']} at {values['limit_reached_at_s']:.1f} s; oil {values['pump_volume_l']:.2f} L",
-        f"bound        {bound_s:.2f} s on any path: {duration_s / max(bound_s, 1e-9):.2f} times that",
-        f"checked      {'yes' if values['checked'] else 'NO'}, highest flow over its limit {values['max_flow_ratio']:.5f}",
-        f"planned in   {values['planning_ms']:.1f} ms",
-    ]
-    if values["timing"] == "limit":
-        lines.append("note         a bound for this path, not a motion: speed jumps at its ends")
-    return "\n".join(lines)
-
-
-def _point(values: Any) -> str:
-    return "(" + ", ".join(f"{float(value):.2f}" for value in values) + ")"
 
 
 def _run_workspace(arguments: argparse.Namespace, console: Console, machine: Rockbreaker) -> int:
@@ -309,21 +285,5 @@ def _run_workspace(arguments: argparse.Namespace, console: Console, machine: Roc
             write_workspace_report(folder.path / "report.html", machine, values, at_m)
             values["folder"] = str(folder.complete(RunInfo(sources, frames=FRAMES)))
     failure = EvaluationShortfall("the tip cannot be there") if values["reached"] is False else None
-    console.result(values, _workspace_text(values), failure=failure)
+    console.result(values, workspace_text(values), failure=failure)
     return 0 if failure is None else failure.exit_code
-
-
-def _workspace_text(values: dict[str, Any]) -> str:
-    lines = [f"folder       {values['folder']}"] if values["folder"] else []
-    lines += [
-        f"theta{k + 1}       {low:.3f} to {high:.3f} deg" for k, (low, high) in enumerate(values["theta_limits_deg"])
-    ]
-    lines.append(
-        f"slice        {values['area_m2']:.2f} m2 at theta1 = 0, {values['vertical_area_m2']:.2f} m2 with a vertical breaker"
-    )
-    if values["reached"] is False:
-        lines.append("phi          the tip cannot be there")
-    elif values["reached"]:
-        text = ", ".join(f"{low:.3f} to {high:.3f}" for low, high in values["phi_intervals_deg"])
-        lines.append(f"phi          {text} deg; nearest to vertical {values['phi_deg']:.3f} deg")
-    return "\n".join(lines)

@@ -79,7 +79,7 @@ def refuse_others(arguments: argparse.Namespace) -> None:
 def run_mine(arguments: argparse.Namespace, console: Console, scanner: dict[str, Any]) -> int:
     """Simulate a drive through a mine; return the exit code. `scanner` are the scanners' options."""
     from lhdmap.machine import load_machine
-    from lhdmap.mine.network import make_network
+    from lhdmap.mine.make_network import make_network
     from lhdmap.mine.plan import find_plan, load_plan
     from lhdmap.simulation.mine_drive import simulate_mine
 

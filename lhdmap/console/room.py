@@ -34,7 +34,7 @@ class Wish(NamedTuple):
     answer: str = ""
 
 
-class Machine:
+class ConsoleMachine:
     """A machine as the console knows it: `outbox` to it, None: not connected; the newest message of each kind."""
 
     def __init__(self, name: str) -> None:
@@ -48,7 +48,7 @@ class Room:
 
     def __init__(self, settings: ConsoleSettings, audit: Audit) -> None:
         self.audit, self.seat, self.alarms = audit, Seat(), Alarms(settings)
-        self.machines: dict[str, Machine] = {}
+        self.machines: dict[str, ConsoleMachine] = {}
         self._pages: dict[str, Outbox] = {}
         self._events: deque[str] = deque(maxlen=_EVENTS)
         self._numbers = itertools.count(1)
@@ -76,7 +76,7 @@ class Room:
 
     def machine_comes(self, name: str, now_s: float) -> Outbox:
         """Take a machine in; one of the same name is replaced."""
-        machine = self.machines.setdefault(name, Machine(name))
+        machine = self.machines.setdefault(name, ConsoleMachine(name))
         machine.outbox, machine.newest = Outbox(), {}
         self.alarms.clear("lost", name)
         self.audit.write(now_s, name, "connected")

@@ -16,7 +16,7 @@ from typing import Any, get_args
 import numpy as np
 
 from lhdmap.resources import resource
-from lhdmap.rockbreaker.check import Verdict, check
+from lhdmap.rockbreaker.check import PathVerdict, check
 from lhdmap.rockbreaker.orientation import nearest_vertical, phi_range, planar_position
 from lhdmap.rockbreaker.paths import KINDS, Kind
 from lhdmap.rockbreaker.plan import Planner, Request
@@ -134,7 +134,7 @@ def _row(planner: Planner, name: str, ends: list[np.ndarray], how: tuple[Kind, T
     return replace(row, limiting=verdict.limiting, limit_reached_at_s=at_s, problems=verdict.problems)
 
 
-def _sound(duration_s: float, bound_s: float, verdict: Verdict) -> bool:
+def _sound(duration_s: float, bound_s: float, verdict: PathVerdict) -> bool:
     """Return whether a plan passed the dense check and is not below the any-path bound."""
     return not verdict.problems and duration_s >= bound_s - 1e-6
 

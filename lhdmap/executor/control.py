@@ -11,19 +11,15 @@ from lhdmap.driving.bodies import Bodies
 from lhdmap.driving.model import DriveModel
 from lhdmap.driving.motion import Motion, Setpoints
 from lhdmap.executor.executor import Executor
-from lhdmap.executor.guard import Guard, Swept
+from lhdmap.executor.guard_watch import GuardWatch
 from lhdmap.executor.joint import JointWatch
 from lhdmap.executor.modes import IDLE, MODES, Modes, operator_setpoints
-from lhdmap.executor.notes import Note, Notes, Stop
+from lhdmap.executor.notes import Note, Stop
 from lhdmap.executor.settings import ExecutorSettings
 from lhdmap.executor.watchdog import Watchdog
-from lhdmap.geometry import se2
-from lhdmap.geometry.polygon import inside
 from lhdmap.messages import Command, FloatArray
 
-_GUARD_NS = 50_000_000
 _DIGS_NS = 100_000_000  # so old the pedals of a loading controller may be
-_LOOKS = 2  # in a row, before a point within the margin is believed: a single one is noise
 
 
 class Control:
@@ -37,20 +33,15 @@ class Control:
     ) -> None:
         self.executor = Executor(model, settings)
         self.watchdog, self.modes = Watchdog(inputs, settings), Modes()
-        self.guard = Guard(model, bodies, settings, period_s=_LOOKS * _GUARD_NS * 1e-9)
-        self.swept: Swept | None = None
+        self.watch = GuardWatch(model, bodies, settings)
         self._joint = JointWatch(model)
         self._settings = settings
-        self._notes, self._blocked, self._near = Notes(), False, 0
-        self._points: dict[str, tuple[Motion, FloatArray]] = {}
         self._pedals: Command | None = None
-        self._touched_m: FloatArray | None = None
-        self._looked_ns: int | None = None
 
     def loaded(self, model: DriveModel) -> None:
         """Take the model for another load."""
         self.executor.loaded(model)
-        self.guard.model = self._joint.model = model
+        self.watch.guard.model = self._joint.model = model
 
     def saw(
         self, name: str, stamp_ns: int, now_ns: int, values: Sequence[float] = (), content: int | None = None
@@ -64,7 +55,7 @@ class Control:
 
     def points(self, name: str, points_m: FloatArray, motion: Motion) -> None:
         """Take the points (N, 2) of a scanner in `base_link`, and the motion at their stamp; what is not finite goes."""
-        self._points[name] = motion, points_m[np.isfinite(points_m).all(axis=1)]
+        self.watch.points(name, points_m, motion)
 
     def plan(self, source: str, setpoints: Setpoints, made_ns: int, now_ns: int) -> bool:
         """Take setpoints of `guidance` or `operator`, made of data of `made_ns`; False where they do not count now."""
@@ -90,7 +81,7 @@ class Control:
 
     def touches(self, corners_m: FloatArray | None) -> None:
         """Take where the bucket is to touch: corners (4, 2) in `odom`, counterclockwise; the guard looks beside it."""
-        self._touched_m = corners_m
+        self.watch.touched_m = corners_m
 
     @staticmethod
     def _fresh(pedals: Command, now_ns: int) -> bool:
@@ -148,7 +139,7 @@ class Control:
         parts = {
             "watchdog": self.watchdog.notes,
             "modes": self.modes.notes,
-            "guard": self._notes,
+            "guard": self.watch.notes,
             "executor": self.executor.notes,
         }
         return [(name, note) for name, notes in parts.items() for note in notes.take()]
@@ -169,39 +160,11 @@ class Control:
             self.watchdog.trip((f"the joint is {math.degrees(apart_rad):.1f} deg off its commands",))
 
     def _guarded(self, now_ns: int, motion: Motion, pull_mps2: float) -> bool:
-        """Return whether the guard holds the machine; one that it has stopped goes on from standstill alone."""
-        if self._looked_ns is not None and now_ns - self._looked_ns < _GUARD_NS:
-            return self._blocked
-        self._looked_ns = now_ns
-        self.swept = self.guard.sweep(
-            motion,
-            self._beside(self._seen_from(motion), motion),
-            commanded_mps=self._commanded_mps(now_ns),
-            plan=self._plan_ahead(),
-            pull_mps2=pull_mps2,
-        )
-        self._near = self._near + 1 if self.swept.contact else 0
-        seen = self.swept.hit or self._near >= _LOOKS
-        blocked = seen or (self._blocked and not self.executor.standing)
-        if blocked != self._blocked:
-            before, self._blocked = ("blocked" if self._blocked else "free"), blocked
-            found = self.swept
-            self._notes.add(
-                "guard",
-                before,
-                "blocked" if blocked else "free",
-                "points on the braking path",
-                free_m=found.free_m,
-                stop_m=found.stop_m,
-                at_m=found.at_m,
-                own=found.own,
-            )
-        return blocked
-
-    def _seen_from(self, motion: Motion) -> FloatArray:
-        """Return all points in `base_link` of a motion: the machine has moved since they were seen."""
-        seen = [_moved(points, at, motion) for at, points in self._points.values()]
-        return np.concatenate(seen) if seen else np.zeros((0, 2))
+        """Return whether the guard holds the machine."""
+        if self.watch.is_due(now_ns):
+            commanded_mps, standing = self._commanded_mps(now_ns), self.executor.standing
+            self.watch.look(now_ns, motion, commanded_mps, self._plan_ahead(), pull_mps2, standing=standing)
+        return self.watch.holds
 
     def _commanded_mps(self, now_ns: int) -> float | None:
         """Return the speed that is asked for, by pedals or by the queue; None where nobody asks."""
@@ -210,28 +173,9 @@ class Control:
         wanted = self.executor.queue.at(now_ns)
         return None if wanted is None else wanted.speed_mps
 
-    def _beside(self, points: FloatArray, motion: Motion) -> FloatArray:
-        """Return points in `base_link` without those that the bucket is to touch."""
-        if self._touched_m is None:
-            return points
-        T_base_odom = se2.inverse(np.array([motion.x_m, motion.y_m, motion.heading_rad]))
-        beside: FloatArray = points[~inside(points, se2.transform(T_base_odom, self._touched_m))]
-        return beside
-
     def _plan_ahead(self) -> FloatArray | None:
         path = self.executor.keeper.path
         if path is None:
             return None
         ahead: FloatArray = np.column_stack([path.way_m - self.executor.keeper.way_m, path.bend_rad])
         return ahead
-
-
-def _moved(points: FloatArray, before: Motion, after: Motion) -> FloatArray:
-    """Return points (N, 2) of `base_link` at one motion in that of another."""
-    turn = before.heading_rad - after.heading_rad
-    c, s = math.cos(after.heading_rad), math.sin(after.heading_rad)
-    dx, dy = before.x_m - after.x_m, before.y_m - after.y_m
-    shift = np.array([c * dx + s * dy, c * dy - s * dx])
-    ct, st = math.cos(turn), math.sin(turn)
-    moved: FloatArray = points @ np.array([[ct, st], [-st, ct]]) + shift
-    return moved

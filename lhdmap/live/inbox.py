@@ -8,11 +8,36 @@ from collections.abc import Callable
 
 from lhdmap.live.recorder import LiveRecorder
 from lhdmap.live.source import Announced, LiveMessage
-from lhdmap.live.tally import Tally
+from lhdmap.live.tally import MessageTally
 
 MOST_MESSAGES, MOST_BYTES = 6000, 192 << 20  # 20 s of two scanners and the slow sensors; of 3D scanners by their size
 _SAID_KEPT = 1000
 _GAP_WORDS = "{topic}: nothing came for {gap_s:.1f} s"
+
+
+class _BoundedQueue:
+    """Messages that wait, counted by number and bytes; `full` where either bound is reached."""
+
+    def __init__(self, most: tuple[int, int]) -> None:
+        self._most = most
+        self._messages: deque[LiveMessage] = deque()
+        self._bytes = 0
+
+    def __len__(self) -> int:
+        return len(self._messages)
+
+    def append(self, message: LiveMessage, size: int) -> None:
+        self._messages.append(message)
+        self._bytes += size
+
+    def popleft(self) -> LiveMessage:
+        message = self._messages.popleft()
+        self._bytes -= len(message.data)
+        return message
+
+    @property
+    def full(self) -> bool:
+        return len(self._messages) >= self._most[0] or self._bytes >= self._most[1]
 
 
 class Inbox:
@@ -24,16 +49,15 @@ class Inbox:
     def __init__(
         self,
         recorder: LiveRecorder,
-        tally: Tally,
+        tally: MessageTally,
         *,
         waits: bool,
         most: tuple[int, int] = (MOST_MESSAGES, MOST_BYTES),
         heard: Callable[[str], None] | None = None,
     ) -> None:
-        self._recorder, self.tally, self._waits, self._most = recorder, tally, waits, most
+        self._recorder, self.tally, self._waits = recorder, tally, waits
         self._heard = heard
-        self._queue: deque[LiveMessage] = deque()
-        self._bytes = 0
+        self._queue = _BoundedQueue(most)
         self._changed = threading.Condition()
         self._ended = False
         self._error: BaseException | None = None
@@ -56,15 +80,14 @@ class Inbox:
         """Record a message and queue it; where the queue is full, wait, or drop the oldest one."""
         with self._changed:
             if self._waits:
-                self._changed.wait_for(lambda: self._ended or not self._full())
+                self._changed.wait_for(lambda: self._ended or not self._queue.full)
             if self._ended:
                 return
             gap_s = self.tally.count(message.topic, message.log_time_ns, len(message.data))
             if gap_s is not None:
                 self._say(_GAP_WORDS.format(topic=message.topic, gap_s=gap_s))
-            self._queue.append(self._recorder.write(message))
-            self._bytes += len(message.data)
-            while self._full() and len(self._queue) > 1 and not self._waits:
+            self._queue.append(self._recorder.write(message), len(message.data))
+            while self._queue.full and len(self._queue) > 1 and not self._waits:
                 self._drop(self._queue.popleft())
             self._changed.notify_all()
 
@@ -96,7 +119,6 @@ class Inbox:
                     raise self._error
                 return None
             message = self._queue.popleft()
-            self._bytes -= len(message.data)
             if self._waits:
                 self._changed.notify_all()
             return message
@@ -114,11 +136,7 @@ class Inbox:
                 self._recorder.close()
             self._changed.notify_all()
 
-    def _full(self) -> bool:
-        return len(self._queue) >= self._most[0] or self._bytes >= self._most[1]
-
     def _drop(self, message: LiveMessage) -> None:
-        self._bytes -= len(message.data)
         if not self.tally.dropped:
             self._say("the computer is too slow: messages are dropped (they are in the log)")
         self.tally.dropped[message.topic] += 1

@@ -15,7 +15,7 @@ from lhdmap.live.followed import Followed, Thinned
 from lhdmap.live.inbox import MOST_BYTES, MOST_MESSAGES, Inbox
 from lhdmap.live.recorder import LiveRecorder
 from lhdmap.live.source import LiveSource
-from lhdmap.live.tally import Tally
+from lhdmap.live.tally import MessageTally
 from lhdmap.live.warm_up import warm_up
 from lhdmap.live.watch import Status, Watch
 from lhdmap.logs.source import LogSource
@@ -98,7 +98,7 @@ def live(request: LiveRequest) -> LiveResult:
 
 
 def _followed(request: LiveRequest, log: Path) -> Followed:
-    inbox = Inbox(LiveRecorder(log), Tally(), waits=request.source.waits, most=request.most, heard=request.say)
+    inbox = Inbox(LiveRecorder(log), MessageTally(), waits=request.source.waits, most=request.most, heard=request.say)
     observer = Watch(inbox, request.show, request.interval_s)
     return Followed(request.source, inbox, observer, live_port=request.live_port, for_s=request.for_s)
 

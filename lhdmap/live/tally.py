@@ -19,7 +19,7 @@ class _Period:
 
 
 @dataclass(slots=True)
-class Tally:
+class MessageTally:
     """Counts by topic; `gaps`: pauses of a regular topic of over five of its periods, half a second at least.
 
     `dropped`: came, and found the queue full; `missed`: counted by the sender, never came; `backlog`: given up by a new

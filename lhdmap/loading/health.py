@@ -28,7 +28,7 @@ _WATCHED = ("tacho_mps", *_PRESSURES)
 _AHEAD_NS = 50_000_000
 
 
-class Health:
+class LoadingHealth:
     """Watches inputs, call by call."""
 
     def __init__(self, settings: LoadingSettings) -> None:

@@ -15,7 +15,7 @@ from lhdmap.driving.model import DriveModel
 from lhdmap.executor.notes import Note
 from lhdmap.loading.assistance import LOADED, Answer
 from lhdmap.loading.digging_parts import Controllers, Driven, Rule, Weighing
-from lhdmap.loading.health import Health
+from lhdmap.loading.health import LoadingHealth
 from lhdmap.loading.helping import Help
 from lhdmap.loading.identification import Identification
 from lhdmap.loading.memory import Memory
@@ -37,7 +37,7 @@ class LoadingTask:
     def __init__(
         self, model: DriveModel, bodies: Bodies, controllers: Controllers, rule: Rule, settings: LoadingSettings
     ) -> None:
-        self._settings, self._health, self._help = settings, Health(settings), Help()
+        self._settings, self._health, self._help = settings, LoadingHealth(settings), Help()
         self._memory, self._trail = Memory(), Trail()
         lip = np.array([bodies.front_box_m[1, 0], 0.0])
         self._weighing = Weighing(controllers.weigh, rule)

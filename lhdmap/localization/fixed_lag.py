@@ -53,6 +53,14 @@ class LagStep(NamedTuple):
     turn_rad: float | None = None
 
 
+class _SinceNode:
+    """What came since the newest node: `information` (3, 3) of the map, `covariance` (3, 3) of the way, turn by the gyroscope."""
+
+    def __init__(self) -> None:
+        self.information, self.covariance = np.zeros((3, 3)), np.zeros((3, 3))
+        self.turn_rad = 0.0
+
+
 class FixedLag:
     """`take` each scan; what comes back is final. `restart` where the place on the map was lost or found anew."""
 
@@ -68,20 +76,20 @@ class FixedLag:
         self._odometry: dict[int, FloatArray] = {}
         self._rows: dict[int, list[LagStep]] = {}  # of each node, with those up to the next one
         self._estimates: dict[int, FloatArray] = {}
-        self._information = np.zeros((3, 3))
+        self._since = _SinceNode()
         self._travelled_m, self._key = 0.0, -1
-        self._covariance, self._turn_rad, self._last = np.zeros((3, 3)), 0.0, np.zeros(3)
+        self._last = np.zeros(3)
         self._left_covariance = np.zeros((3, 3))
 
     def take(self, step: LagStep, before: Belief, after: Belief) -> list[LagPlaced]:
         """Take a scan with the tracker's belief before and after its match (alike where there was none); return what is final."""
-        self._information = self._information + _told(before, after)
+        self._since.information = self._since.information + _told(before, after)
         if self._key < 0:
             self._add(step, after, None)
             return []
         moved = se2.between(self._last, step.odometry)
-        self._covariance = se2.composed_covariance(self._covariance, moved, step.covariance)
-        self._turn_rad += math.nan if step.turn_rad is None else step.turn_rad
+        self._since.covariance = se2.composed_covariance(self._since.covariance, moved, step.covariance)
+        self._since.turn_rad += math.nan if step.turn_rad is None else step.turn_rad
         self._travelled_m += math.hypot(moved[0], moved[1])
         self._last = step.odometry
         way = se2.between(self._odometry[self._key], step.odometry)
@@ -115,14 +123,16 @@ class FixedLag:
             graph.add(gtsam.PriorFactorPose2(key, gtsam.Pose2(*told.pose), noise))
             values.insert(key, gtsam.Pose2(*told.pose))
         else:
-            covariance = self._covariance + np.diag(_LEAST_STEP_STD**2)
+            covariance = self._since.covariance + np.diag(_LEAST_STEP_STD**2)
             noise = gtsam.noiseModel.Gaussian.Covariance(covariance)
             graph.add(gtsam.BetweenFactorPose2(key - 1, key, gtsam.Pose2(*way), noise))
             values.insert(key, gtsam.Pose2(*se2.compose(self._estimates[key - 1], way)))
-            if math.isfinite(self._turn_rad):
+            if math.isfinite(self._since.turn_rad):
                 turn = gtsam.noiseModel.Diagonal.Sigmas(np.array([_LOOSE_M, _LOOSE_M, _TURN_STD_RAD]))
-                graph.add(gtsam.BetweenFactorPose2(key - 1, key, gtsam.Pose2(way[0], way[1], self._turn_rad), turn))
-            information = _body(self._information, told.pose[2]) + _LEAST_INFORMATION * np.eye(3)
+                graph.add(
+                    gtsam.BetweenFactorPose2(key - 1, key, gtsam.Pose2(way[0], way[1], self._since.turn_rad), turn)
+                )
+            information = _body(self._since.information, told.pose[2]) + _LEAST_INFORMATION * np.eye(3)
             robust = gtsam.noiseModel.mEstimator.Cauchy.Create(_CAUCHY)
             seen = gtsam.noiseModel.Robust.Create(robust, gtsam.noiseModel.Gaussian.Information(information))
             graph.add(gtsam.PriorFactorPose2(key, gtsam.Pose2(*told.pose), seen))
@@ -131,7 +141,7 @@ class FixedLag:
         self._keep_left(way)
         self._solver.update(graph, values, stamps)
         self._key, self._last, self._odometry[key], self._rows[key] = key, step.odometry, step.odometry, [step]
-        self._covariance, self._turn_rad, self._information = np.zeros((3, 3)), 0.0, np.zeros((3, 3))
+        self._since = _SinceNode()
         return self._settled()
 
     def _keep_left(self, way: FloatArray | None) -> None:

@@ -38,6 +38,16 @@ _DRIFT_RAD = math.radians(0.3)  # of the heading by wheels, each √m
 _LEAST_HITS = 30
 
 
+class _OnNode:
+    """The node that the pose is in; where that is a `tunnel`: lateral place, heading of the axis, and `dir` (1 or -1)."""
+
+    def __init__(self) -> None:
+        self.node = ""
+        self.tunnel: Tunnel | None = None
+        self.lateral_m = self.axis_rad = 0.0
+        self.direction = 1.0
+
+
 class PaperTracker:
     """`pose` (3,) in `map`; in a tunnel held as ρ (`x[0]`), lateral place and heading; `C` (2, 2) is the covariance of ρ, v."""
 
@@ -47,8 +57,7 @@ class PaperTracker:
         self.x = np.zeros(2)
         self.C = np.diag([float(start.deviations[0]) ** 2, 1.0])
         self._since_s, self._blind_m = math.inf, 0.0
-        self._node, self._lateral_m, self._axis_rad, self._dir = "", 0.0, 0.0, 1.0
-        self._tunnel: Tunnel | None = None
+        self._at = _OnNode()
         self._enter()
 
     def predict(self, _step: FloatArray, _covariance: FloatArray, wheels: Wheels | None = None, /) -> None:
@@ -57,9 +66,11 @@ class PaperTracker:
             return
         dt = wheels.dt_s
         self._since_s += dt
-        self.x = np.array([self.x[0] + self.x[1] * self._dir * dt, self.x[1]])
-        F = np.array([[1.0, self._dir * dt], [0.0, 1.0]])
-        q = _ACCELERATION**2 * np.array([[dt**3 / 3.0, self._dir * dt**2 / 2.0], [self._dir * dt**2 / 2.0, dt]])
+        self.x = np.array([self.x[0] + self.x[1] * self._at.direction * dt, self.x[1]])
+        F = np.array([[1.0, self._at.direction * dt], [0.0, 1.0]])
+        q = _ACCELERATION**2 * np.array(
+            [[dt**3 / 3.0, self._at.direction * dt**2 / 2.0], [self._at.direction * dt**2 / 2.0, dt]]
+        )
         self.C = F @ self.C @ F.T + q
         if dt > 0.0 and math.isfinite(wheels.forward_m):
             self._update(np.array([0.0, 1.0]), wheels.forward_m / dt, _WHEELS_MPS**2)
@@ -68,35 +79,34 @@ class PaperTracker:
 
     def _carry(self, dt_s: float, turn_rad: float) -> None:
         """Place the pose: in a tunnel at ρ, else by speed and turn; then see which node it is in."""
-        tunnel = self._tunnel
+        tunnel = self._at.tunnel
         if tunnel is None:
             turn = turn_rad if math.isfinite(turn_rad) else 0.0
             self.pose = se2.compose(self.pose, np.array([self.x[1] * dt_s, 0.0, turn]))
         else:
-            before = self._axis_rad
-            self._lateral_m += self.x[1] * dt_s * math.sin(self.pose[2] - before)
-            place, axis = self._nodes.on_axis(tunnel, float(self.x[0]), self._lateral_m)
+            before = self._at.axis_rad
+            self._at.lateral_m += self.x[1] * dt_s * math.sin(self.pose[2] - before)
+            place, axis = self._nodes.on_axis(tunnel, float(self.x[0]), self._at.lateral_m)
             turn = turn_rad if math.isfinite(turn_rad) else math.remainder(axis - before, 2.0 * math.pi)
-            self.pose, self._axis_rad = np.array([*place, self.pose[2] + turn]), axis
+            self.pose, self._at.axis_rad = np.array([*place, self.pose[2] + turn]), axis
         self._enter()
 
     def _enter(self) -> None:
         """Hand over where the pose is in another node (3.3.3): it stays where it is in `map`, ρ is that of the new axis."""
         place = self._placer.at(self.pose, self.height_m, 1.0)
-        if place.node in (self._node, ""):
+        if place.node in (self._at.node, ""):
             return
-        self._node = place.node
-        node = self._nodes.topology.nodes[self._node]
-        self._tunnel = node if isinstance(node, Tunnel) else None
-        self._dir = 1.0
-        if self._tunnel is not None:
+        node = self._nodes.topology.nodes[place.node]
+        self._at.node, self._at.direction = place.node, 1.0
+        self._at.tunnel = node if isinstance(node, Tunnel) else None
+        if self._at.tunnel is not None:
             self._stand(place.rho_m, place.lateral_m)
 
     def _stand(self, rho_m: float, lateral_m: float) -> None:
-        assert self._tunnel is not None  # noqa: S101  # asked for in tunnels alone
-        self.x[0], self._lateral_m = rho_m, lateral_m
-        _, self._axis_rad = self._nodes.on_axis(self._tunnel, rho_m, 0.0)
-        self._dir = math.copysign(1.0, math.cos(self.pose[2] - self._axis_rad))
+        assert self._at.tunnel is not None  # noqa: S101  # asked for in tunnels alone
+        self.x[0], self._at.lateral_m = rho_m, lateral_m
+        _, self._at.axis_rad = self._nodes.on_axis(self._at.tunnel, rho_m, 0.0)
+        self._at.direction = math.copysign(1.0, math.cos(self.pose[2] - self._at.axis_rad))
 
     def _update(self, H: FloatArray, value: float, variance: float) -> None:
         gain = self.C @ H / (H @ self.C @ H + variance)
@@ -119,19 +129,19 @@ class PaperTracker:
         return Corrected(1.0, _ICP_M**-2, "landmarks")
 
     def _seen(self, cloud: FloatArray) -> Seen | None:
-        if self._tunnel is None:
-            return self._nodes.in_intersection(self._node, self.pose, cloud)
-        return self._nodes.most_similar(self._node, float(self.x[0]), self.pose, cloud)
+        if self._at.tunnel is None:
+            return self._nodes.in_intersection(self._at.node, self.pose, cloud)
+        return self._nodes.most_similar(self._at.node, float(self.x[0]), self.pose, cloud)
 
     def _take(self, pose: FloatArray) -> None:
         """Take over a pose (3,) that a match gave: in a tunnel through the filter, in an intersection as it is."""
-        if self._tunnel is None:
+        if self._at.tunnel is None:
             self.pose, self.C[0] = pose, [_ICP_M**2, 0.0]
             self.C[1, 0] = 0.0
         else:
-            rho, lateral = self._placer.along(self._tunnel, pose, self.height_m)
+            rho, lateral = self._placer.along(self._at.tunnel, pose, self.height_m)
             self._update(np.array([1.0, 0.0]), rho, _ICP_M**2)
-            place, _ = self._nodes.on_axis(self._tunnel, float(self.x[0]), lateral)
+            place, _ = self._nodes.on_axis(self._at.tunnel, float(self.x[0]), lateral)
             self.pose = np.array([*place, pose[2]])
             self._stand(float(self.x[0]), lateral)
         self._enter()
@@ -140,7 +150,7 @@ class PaperTracker:
         """Turn round where hits (N, 2) fit the walls clearly better so."""
         self._start.turn_if_better(points)
         self.pose[2] = self._start.pose[2]
-        self._node = ""
+        self._at.node = ""
         self._enter()
 
     @property

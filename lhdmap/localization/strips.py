@@ -21,15 +21,23 @@ from lhdmap.landmarks.distinct import channels
 from lhdmap.landmarks.model import Landmarks
 from lhdmap.landmarks.profile import WallProfile, profile_of
 from lhdmap.landmarks.settings import LandmarkSettings
+from lhdmap.localization.strip_ways import (
+    BEYOND_M,
+    LEAST_M,
+    access_points,
+    arm_of,
+    curve_through,
+    extended,
+    inside_m,
+    point_on,
+    tail_of,
+)
 from lhdmap.messages import Float32Array, FloatArray
 from lhdmap.topology.driven import arc_m
-from lhdmap.topology.model import AccessPoint, Intersection, TopologicalMap, Tunnel
+from lhdmap.topology.model import TopologicalMap
 
-_INSIDE_M = 8.0  # of a tunnel that belong to the strips through its intersection
-_BEYOND_M = 8.0  # of way beside a strip, for its mid line's sake
 _OPEN_M = 6.0  # beyond an end of the map: unknown walls, so that a window that reaches out of it is not lost
 _NEAR_M = 40.0
-_LEAST_M = 2.0
 _ANOTHER_DRIVE, _LEAST_NOISE, _MOST_NOISE = 2.0, 0.1, 4.0
 _MAD = 1.4826
 
@@ -122,15 +130,15 @@ class _Walls:
 
 def _tunnels(topology: TopologicalMap, walls: _Walls, settings: LandmarkSettings) -> Iterator[Strip]:
     for tunnel in topology.tunnels:
-        if tunnel.id not in walls or len(tunnel.line_m) < 2 or tunnel.length_m < _LEAST_M:
+        if tunnel.id not in walls or len(tunnel.line_m) < 2 or tunnel.length_m < LEAST_M:
             continue
         line, at = tunnel.line_m, arc_m(tunnel.line_m)
         joined = [end in topology.nodes for end in tunnel.ends]
-        inside = _inside_m(tunnel)
-        way, along = _extended(line[:, :2], at, _BEYOND_M)
+        inside = inside_m(tunnel)
+        way, along = extended(line[:, :2], at, BEYOND_M)
         profile = profile_of(*walls.near([tunnel.id, *tunnel.ends], way), way, along, settings)
         first, last = (inside if joined[0] else 0.0), at[-1] - (inside if joined[1] else 0.0)
-        rows = _between(profile, _on(line, at, first), _on(line, at, last))
+        rows = _between(profile, point_on(line, at, first), point_on(line, at, last))
         enters = (tunnel.id, 0, False) if joined[0] else None
         leaves = (tunnel.id, 1, True) if joined[1] else None
         strip = _strip(tunnel.id, profile, rows, settings, walls.noise)
@@ -141,74 +149,19 @@ def _tunnels(topology: TopologicalMap, walls: _Walls, settings: LandmarkSettings
 def _crossings(topology: TopologicalMap, walls: _Walls, settings: LandmarkSettings) -> Iterator[Strip]:
     """Yield the strips through intersections, one for each pair of arms."""
     for node in topology.intersections:
-        arms = [arm for arm in (_arm(topology, point) for point in _access(topology, node)) if arm is not None]
+        arms = [arm for arm in (arm_of(topology, point) for point in access_points(topology, node)) if arm is not None]
         nodes = [node.id, *(tunnel.id for _, tunnel, _ in arms)]
         for (p, a, end_a), (q, b, end_b) in combinations(arms, 2):
             if a.id not in walls or b.id not in walls:
                 continue
-            tail, cut_a = _tail(a, end_a)
-            head, cut_b = _tail(b, end_b)
-            way = np.concatenate([tail[::-1], _curve(p.pose, q.pose), head])
+            tail, cut_a = tail_of(a, end_a)
+            head, cut_b = tail_of(b, end_b)
+            way = np.concatenate([tail[::-1], curve_through(p.pose, q.pose), head])
             profile = profile_of(*walls.near(nodes, way), way, arc_m(way), settings)
             rows = _between(profile, cut_a, cut_b)
             strip = _strip(node.id, profile, rows, settings, walls.noise)
             heights = np.full(len(strip.poses), node.T_map_node[2])
             yield strip._replace(heights_m=heights, enters=(a.id, end_a, True), leaves=(b.id, end_b, False))
-
-
-def _access(topology: TopologicalMap, node: Intersection) -> list[AccessPoint]:
-    return [point for point in topology.points_of(node.id) if isinstance(point, AccessPoint)]
-
-
-def _arm(topology: TopologicalMap, point: AccessPoint) -> tuple[AccessPoint, Tunnel, int] | None:
-    """Return an intersection's access point with its tunnel and which end of it that is; None where there is none."""
-    twin = topology.points.get(point.joins or "")
-    tunnel = topology.nodes.get(twin.node) if twin is not None else None
-    if twin is None or not isinstance(tunnel, Tunnel) or len(tunnel.line_m) < 2 or tunnel.length_m < _LEAST_M:
-        return None
-    ends = [math.dist(tunnel.line_m[k, :2], twin.pose[:2]) for k in (0, -1)]
-    return point, tunnel, int(ends[1] < ends[0])
-
-
-def _inside_m(tunnel: Tunnel) -> float:
-    return min(_INSIDE_M, 0.5 * (tunnel.length_m - 1.0))
-
-
-def _tail(tunnel: Tunnel, end: int) -> tuple[FloatArray, FloatArray]:
-    """Return the line (K, 2) of a tunnel from one of its ends inwards, some metres, and where (2,) its own strip begins."""
-    line = tunnel.line_m[:: 1 if end == 0 else -1]
-    at = arc_m(line)
-    grid = np.arange(0.0, min(_inside_m(tunnel) + _BEYOND_M, at[-1]) + 1e-6, 0.5)
-    return np.column_stack([np.interp(grid, at, column) for column in line.T[:2]]), _on(line, at, _inside_m(tunnel))
-
-
-def _on(line: FloatArray, at: FloatArray, place: float) -> FloatArray:
-    return np.array([np.interp(place, at, column) for column in line.T[:2]])
-
-
-def _curve(enters: FloatArray, leaves: FloatArray) -> FloatArray:
-    """Return a smooth way (K, 2) through an intersection: in against the heading of one access point, out along the other's."""
-    apart = math.dist(enters[:2], leaves[:2])
-    t = np.linspace(0.0, 1.0, max(int(apart / 0.5), 3))[1:-1, None]
-    into = -apart * np.array([math.cos(enters[3]), math.sin(enters[3])])
-    out = apart * np.array([math.cos(leaves[3]), math.sin(leaves[3])])
-    start, end = enters[:2], leaves[:2]
-    way: FloatArray = (
-        (2 * t**3 - 3 * t**2 + 1) * start
-        + (t**3 - 2 * t**2 + t) * into
-        + (3 * t**2 - 2 * t**3) * end
-        + (t**3 - t**2) * out
-    )
-    return way
-
-
-def _extended(way: FloatArray, at: FloatArray, beyond_m: float) -> tuple[FloatArray, FloatArray]:
-    """Return a way (K, 2) that goes on straight beyond both ends, and its places (K,)."""
-    ends = []
-    for points in (way, way[::-1]):
-        inner = points[min(len(points) - 1, max(1, int(np.searchsorted(arc_m(points), 2.0))))]
-        ends.append(points[0] + (points[0] - inner) / max(math.dist(points[0], inner), 1e-9) * beyond_m)
-    return np.vstack([ends[0], way, ends[1]]), np.concatenate([[at[0] - beyond_m], at, [at[-1] + beyond_m]])
 
 
 def _between(profile: WallProfile, first: FloatArray, last: FloatArray) -> slice:

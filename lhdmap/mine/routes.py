@@ -7,16 +7,14 @@ came. To invert it drives past a node until it has all of its length behind it, 
 from __future__ import annotations
 
 import functools
-import heapq
-import itertools
 from collections.abc import Callable, Iterator, Sequence
-from typing import NamedTuple
 
 from lhdmap.errors import UsageError
 from lhdmap.machine import Machine
-from lhdmap.mine.network import Branch, Edge, Network, Turn
+from lhdmap.mine.network import Branch, BranchTurn, Edge, Network
 from lhdmap.mine.plan import BLIND
 from lhdmap.mine.route import Start, Stop
+from lhdmap.mine.route_search import RouteState, RouteStep, Starts, cheapest
 from lhdmap.mine.runs import Run, joined, trimmed
 from lhdmap.mine.stands import kept_free_m, overhang_m, place_end, stand_at
 
@@ -29,31 +27,14 @@ LEAST_RADIUS_M = 5.0
 """Turns of a smaller radius are not driven (guidance prototype, tightest bends)."""
 
 
-class _State(NamedTuple):
-    """At one end of an edge: `entering` it in a direction and gear, or having come to its other end."""
-
-    edge: int
-    direction: int
-    gear: int
-    entering: bool
-
-
-class _Step(NamedTuple):
-    """A step of a search: what it costs (m), where it leads, and what is driven."""
-
-    cost_m: float
-    state: _State
-    runs: tuple[Run, ...]
-
-
-class Planner:
+class RouteFinder:
     """Finds routes of a machine through a network."""
 
     def __init__(self, network: Network, machine: Machine) -> None:
         self.network, self.machine = network, machine
         self._wheelbase_m, self._reverse = machine.dimensions.wheelbase_m, _REVERSE
         self.left_out: list[str] = []
-        self._turns: dict[tuple[int, Branch], list[Turn]] = {}
+        self._turns: dict[tuple[int, Branch], list[BranchTurn]] = {}
         for turn in network.turns:
             if turn.tube < 0 or turn.radius_m >= LEAST_RADIUS_M:
                 self._turns.setdefault((turn.node, turn.start), []).append(turn)
@@ -106,7 +87,7 @@ class Planner:
         place = self.network.tubes[edge.tube].place
         return place is not None and place.kind in BLIND
 
-    def _covers_any(self, edges: frozenset[int], step: _Step) -> bool:
+    def _covers_any(self, edges: frozenset[int], step: RouteStep) -> bool:
         return any(self._covered(k, run) for k in edges for run in step.runs)
 
     def _covered(self, index: int, run: Run) -> bool:
@@ -119,9 +100,9 @@ class Planner:
         begins = (run.from_m - first) * direction < _AT_NODE_M
         return begins and (run.to_m - last) * direction > -min(_AT_NODE_M, 0.4 * abs(last - first))
 
-    def _begin(self, start: Start) -> tuple[list[Run], dict[_State, tuple[Run, ...]]]:
+    def _begin(self, start: Start) -> tuple[list[Run], Starts]:
         """Return where a machine that stands somewhere can go to first, in both gears."""
-        states: dict[_State, tuple[Run, ...]] = {}
+        states: Starts = {}
         for index, edge in enumerate(self.network.edges):
             if edge.tube != start.tube or not edge.start_m - 0.01 <= start.at_m <= edge.end_m + 0.01:
                 continue
@@ -131,7 +112,7 @@ class Planner:
                 end = self._end(edge, direction, gear)
                 if (end - lead) * direction > -self._wheelbase_m:
                     run = Run(edge.tube, lead, end, gear)
-                    states[_State(index, direction, gear, False)] = (run,) if (end - lead) * direction > 0.0 else ()
+                    states[RouteState(index, direction, gear, False)] = (run,) if (end - lead) * direction > 0.0 else ()
             break
         return [], states
 
@@ -142,7 +123,7 @@ class Planner:
             return s
         return s - direction * (kept_free_m(self.network, edge.tube, s) + overhang_m(self.machine, gear))
 
-    def _steps(self, state: _State) -> Iterator[_Step]:
+    def _steps(self, state: RouteState) -> Iterator[RouteStep]:
         edge = self.network.edges[state.edge]
         if state.entering:
             yield from self._through(state, edge)
@@ -150,15 +131,15 @@ class Planner:
         else:
             yield from self._on(state, edge)
 
-    def _through(self, state: _State, edge: Edge) -> Iterator[_Step]:
+    def _through(self, state: RouteState, edge: Edge) -> Iterator[RouteStep]:
         begin = edge.start_m if state.direction > 0 else edge.end_m
         end = self._end(edge, state.direction, state.gear)
         way = (end - begin) * state.direction
         if way > 0.0:
             run = Run(edge.tube, begin, end, state.gear)
-            yield _Step(way * (1.0 if state.gear > 0 else self._reverse), state._replace(entering=False), (run,))
+            yield RouteStep(way * (1.0 if state.gear > 0 else self._reverse), state._replace(entering=False), (run,))
 
-    def _short_inversion(self, state: _State, edge: Edge) -> Iterator[_Step]:
+    def _short_inversion(self, state: RouteState, edge: Edge) -> Iterator[RouteStep]:
         """Drive into an edge until the whole machine is past the node, and come back in the other gear."""
         node, begin = (edge.start, edge.start_m) if state.direction > 0 else (edge.end, edge.end_m)
         reach = max(
@@ -176,16 +157,16 @@ class Planner:
         there = begin + state.direction * depth
         back = there - state.direction * self._wheelbase_m
         runs = (Run(edge.tube, begin, there, state.gear), Run(edge.tube, back, begin, -state.gear))
-        yield _Step(2.0 * depth + _INVERSION_M, _State(state.edge, -state.direction, -state.gear, False), runs)
+        yield RouteStep(2.0 * depth + _INVERSION_M, RouteState(state.edge, -state.direction, -state.gear, False), runs)
 
-    def _on(self, state: _State, edge: Edge) -> Iterator[_Step]:
+    def _on(self, state: RouteState, edge: Edge) -> Iterator[RouteStep]:
         """Go on from the end of an edge: into another one, or back in the other gear."""
         node, s = (edge.end, edge.end_m) if state.direction > 0 else (edge.start, edge.start_m)
         for turn in self._turns.get((node, Branch(edge.tube, s, -state.direction)), ()):
             following = self._edge_of.get((turn.end.tube, turn.end.outward, round(turn.end.s_m, 3)))
             if following is not None:
                 runs = () if turn.tube < 0 else (self._turn_run(turn, edge, state.gear),)
-                yield _Step(0.1, _State(following, turn.end.outward, state.gear, True), runs)
+                yield RouteStep(0.1, RouteState(following, turn.end.outward, state.gear, True), runs)
         if self.network.nodes[node].degree == 1:
             back = self._end(edge, state.direction, state.gear) - state.direction * self._wheelbase_m
             begin = edge.start_m if state.direction > 0 else edge.end_m
@@ -196,12 +177,12 @@ class Planner:
             if way > 0.0 or not self._is_dead_end(edge, -state.direction):
                 cost = max(way, 0.0) * (1.0 if state.gear < 0 else self._reverse) + _INVERSION_M
                 runs = (Run(edge.tube, back, other, -state.gear),) if way > 0.0 else ()
-                yield _Step(cost, _State(state.edge, -state.direction, -state.gear, False), runs)
+                yield RouteStep(cost, RouteState(state.edge, -state.direction, -state.gear, False), runs)
 
     def _is_dead_end(self, edge: Edge, direction: int) -> bool:
         return self.network.nodes[edge.end if direction > 0 else edge.start].degree == 1
 
-    def _turn_run(self, turn: Turn, edge: Edge, gear: int) -> Run:
+    def _turn_run(self, turn: BranchTurn, edge: Edge, gear: int) -> Run:
         """Return the run through a turn's tube; which way follows from which of its ends is nearer to the edge."""
         tube = self.network.tubes[turn.tube]
         begin = self.network.tubes[edge.tube].pose(turn.start.s_m + turn.start.outward * turn.start_at_m)
@@ -209,7 +190,7 @@ class Planner:
         ahead = ((first - begin)[:2] ** 2).sum() <= ((last - begin)[:2] ** 2).sum()
         return Run(turn.tube, 0.0, tube.length_m, gear) if ahead else Run(turn.tube, tube.length_m, 0.0, gear)
 
-    def _short_of_node(self, state: _State, runs: list[Run]) -> list[Run]:
+    def _short_of_node(self, state: RouteState, runs: list[Run]) -> list[Run]:
         """Return runs that end before the drift that theirs runs into: with the bumper before its walls."""
         edge = self.network.edges[state.edge]
         node = self.network.nodes[edge.end if state.direction > 0 else edge.start]
@@ -222,7 +203,7 @@ class Planner:
         to_m = last.to_m - state.direction * min(back_m, 0.9 * abs(last.to_m - last.from_m))
         return [*runs[:-1], last._replace(to_m=to_m)]
 
-    def _reaches(self, stop: Stop, *, first: bool, last: bool) -> Callable[[_Step], bool]:
+    def _reaches(self, stop: Stop, *, first: bool, last: bool) -> Callable[[RouteStep], bool]:
         """Return what tells whether a step reaches an element of a route."""
         network = self.network
         place = next((one for one in network.plan.places if one.name == stop.name), None)
@@ -256,11 +237,11 @@ class Planner:
             < 0.01
         )
 
-    def _through_drift(self, run: Run, state: _State, tube: int, gear: int, first: bool) -> bool:
+    def _through_drift(self, run: Run, state: RouteState, tube: int, gear: int, first: bool) -> bool:
         """Return whether a run goes through an edge of a drift; the first of a drive may begin within it."""
         return run.tube == tube and run.gear == gear and (first or self._covered(state.edge, run))
 
-    def _is_last(self, state: _State) -> bool:
+    def _is_last(self, state: RouteState) -> bool:
         """Return whether the tube does not go on behind this edge."""
         edge = self.network.edges[state.edge]
         node, s = (edge.end, edge.end_m) if state.direction > 0 else (edge.start, edge.start_m)
@@ -278,30 +259,6 @@ class Planner:
             return [*runs[:-1], last._replace(to_m=at_m, stop=stop.name), last._replace(from_m=at_m)]
         return [*runs[:-1], runs[-1]._replace(stop=stop.name)]
 
-    def _search(
-        self, states: dict[_State, tuple[Run, ...]], reached: Callable[[_Step], bool]
-    ) -> tuple[_State, list[Run]] | None:
+    def _search(self, states: Starts, reached: Callable[[RouteStep], bool]) -> tuple[RouteState, list[Run]] | None:
         """Return the cheapest way from one of `states` to what is `reached`: where it ends, and the runs."""
-        count = itertools.count()
-        queue: list[tuple[float, int, _State, tuple[Run, ...], tuple[object, ...]]] = []
-        for state, runs in states.items():
-            way = sum(abs(run.to_m - run.from_m) * (1.0 if run.gear > 0 else self._reverse) for run in runs)
-            first = _Step(way, state, runs)
-            if runs and reached(first):
-                heapq.heappush(queue, (way, next(count), state, runs, ("end",)))
-            heapq.heappush(queue, (way, next(count), state, runs, ()))
-        done: set[_State] = set()
-        while queue:
-            cost, _, state, runs, end = heapq.heappop(queue)
-            if end:
-                return state, list(runs)
-            if state in done:
-                continue
-            done.add(state)
-            for step in self._steps(state):
-                following = (cost + step.cost_m, next(count), step.state, (*runs, *step.runs))
-                if reached(step):
-                    heapq.heappush(queue, (*following, ("end",)))
-                if step.state not in done:
-                    heapq.heappush(queue, (*following, ()))
-        return None
+        return cheapest(states, self._steps, reached, self._reverse)

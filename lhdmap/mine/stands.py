@@ -6,7 +6,8 @@ import math
 
 from lhdmap.machine import Machine
 from lhdmap.messages import FloatArray
-from lhdmap.mine.network import Network, place_at
+from lhdmap.mine.network import Network
+from lhdmap.mine.place_tubes import place_at
 from lhdmap.mine.plan import BLIND, PlacePlan
 
 PILE_BACK_M = 8.0

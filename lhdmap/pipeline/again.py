@@ -21,7 +21,7 @@ def integrate_again(
 
     Sweeps before the first pose or after the last are left out. `survey`: of these logs, where one was taken.
     """
-    sweeps = SweepIntegration(inputs.settings, pipeline.machine, pipeline.mounts, None)
+    sweeps = SweepIntegration(inputs.settings, pipeline.machine, pipeline.front_end.mounts, None)
     wheels = WheelOdometry(inputs.settings.wheels, pipeline.machine or Machine())
     track, times, sweep_times = FinalTrack(rows), map(int, pipeline.records.times_ns), SweepTimes()
     with LogSource(

@@ -31,14 +31,14 @@ from lhdmap.pipeline.inputs import ROLES_READ, Inputs
 from lhdmap.pipeline.inspection import Inspection, Inspector, PileBeside
 from lhdmap.pipeline.interruption import Interruption
 from lhdmap.pipeline.live_view import LiveView
-from lhdmap.pipeline.mapping import MappingPipeline
+from lhdmap.pipeline.mapping import MappingOptions, MappingPipeline
 from lhdmap.pipeline.mounts import machine_of
 from lhdmap.pipeline.outcome import MapOutcome
 from lhdmap.pipeline.refusal import require_a_map
 from lhdmap.pipeline.stream import Stream
 from lhdmap.provenance import file_entry, source_entry
 from lhdmap.report.page import fill_in_cost
-from lhdmap.report.recording import Thinning
+from lhdmap.report.recording_settings import Thinning
 from lhdmap.runfolder import RunInfo
 from lhdmap.topology.edits import load_edits
 from lhdmap.topology.geojson import to_geojson
@@ -127,10 +127,12 @@ def build_map(request: BuildRequest) -> BuildResult:
             pipeline = MappingPipeline(
                 request.settings,
                 machine_of(source, request.machine),
-                _sweep_sink(inspector, request.settings.recording.scan_interval_s),
-                primary,
-                pile=PileBeside(inspector),
-                on_step=None if view is None else view.take,
+                MappingOptions(
+                    primary,
+                    on_sweep=_sweep_sink(inspector, request.settings.recording.scan_interval_s),
+                    pile=PileBeside(inspector),
+                    on_step=None if view is None else view.take,
+                ),
             )
             if view is not None:
                 view.pipeline = pipeline
@@ -155,7 +157,7 @@ def build_map(request: BuildRequest) -> BuildResult:
         fill_in_cost(folder.path / "report.html", figures)
         info = RunInfo(request.logs, options_of(request), figures, outcome.warnings, frames_of(request))
         path = folder.complete(info, known)
-    said, pile = pipeline.said, outcome.pile
+    said, pile = pipeline.evidence.said, outcome.pile
     return BuildResult(path, figures | {"map": str(path)}, outcome.warnings, final, said, pile)
 
 
@@ -203,7 +205,7 @@ def _write(
     folder.finished(folder.path / "cloud.ply")
     if outcome.pile is not None:
         folder.write_json("pile.json", outcome.pile.to_json())
-    if evidence := outcome.pipeline.smoother.evidence:
+    if evidence := outcome.pipeline.evidence.smoother.evidence:
         folder.write_json("closures.json", {"closures": [one.to_json() for one in evidence]})
     if outcome.topology is not None:
         times_s = connection_times(outcome.topology.map, request.settings.movement)
@@ -212,7 +214,7 @@ def _write(
         if outcome.landmarks is not None:
             write_landmarks(folder.path / "landmarks.npz", outcome.landmarks)
             folder.finished(folder.path / "landmarks.npz")
-        folder.finished(write_views(folder.path / "views.npz", list(outcome.pipeline.views)))
+        folder.finished(write_views(folder.path / "views.npz", list(outcome.pipeline.evidence.views)))
     try:
         spent = inspector.ask(Inspection.spent)
     except HelperDied as error:

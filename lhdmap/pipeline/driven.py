@@ -65,7 +65,7 @@ def ways_of(pipeline: MappingPipeline, given: TrackRows | None) -> DrivenPaths:
             correction.closures, correction.end_covariance, correction.height_std_m
         )  # fmt: skip
     else:
-        end = 0, None if steadied is None else pipeline.smoother.end_covariance([steadied]), None
+        end = 0, None if steadied is None else pipeline.evidence.smoother.end_covariance([steadied]), None
     return DrivenPaths(odometry_of(pipeline), final, rows, moved, *end)
 
 
@@ -76,7 +76,7 @@ def _correction(pipeline: MappingPipeline, rows: TrackRows, steadied: Correction
         return resample(rows, times_ns).poses[:, _FLOOR]
 
     moved = [one for one in (pipeline.path.correction(), steadied) if one is not None]
-    return pipeline.smoother.correction(moved, floor if pipeline.has_inclinometer else None)
+    return pipeline.evidence.smoother.correction(moved, floor if pipeline.has_inclinometer else None)
 
 
 def moments_of(pipeline: MappingPipeline) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.int64]]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections import Counter, deque
+from collections import Counter
 from functools import partial
 
 from lhdmap.config import Settings
@@ -26,36 +26,30 @@ from lhdmap.odometry.cloud.motion import CloudPrior
 from lhdmap.odometry.planar import ScanView
 from lhdmap.odometry.start import ScanInput
 from lhdmap.odometry.steps import WheelStep
+from lhdmap.pipeline.inclinometer import AttitudeSource
 from lhdmap.pipeline.mounts import SensorMounts, level_sensor
 from lhdmap.pipeline.rear import AT_ONCE_NS, RearScans
 from lhdmap.pipeline.sweep_times import SweepTimes
-from lhdmap.proprioception.attitude import AttitudeFilter
-from lhdmap.proprioception.gyro import Gyro
 from lhdmap.proprioception.wheels import WheelOdometry
 from lhdmap.scan_matching.scan_points import NO_BOXES
 from lhdmap.scan_matching.slant import rise_of
 
 DEFAULT_MACHINE = Machine()
 _TILTED = 0.01  # rise of the scan plane ahead (m/m)
-_EARLY = 10_000  # inclinations that wait for their mount at most
 
 
 class FrontEnd:
     """Takes the messages of all sensors but the primary scanner; tells what holds at the time of a scan."""
 
     def __init__(self, settings: Settings, machine: Machine | None) -> None:
-        self._settings, self._gyro_settings = settings.attitude, settings.gyro
         self.machine = machine or DEFAULT_MACHINE
         self.mounts = SensorMounts(machine)
-        self.attitude, self.gyro = AttitudeFilter(settings.attitude), Gyro(settings.gyro, settings.attitude.lag_s)
+        self.inclinometer = AttitudeSource(settings.attitude, settings.gyro, self.mounts)
         self.wheels = WheelOdometry(settings.wheels, self.machine)
         self.rear = RearScans(self.mounts, self.wheels, self.machine)
         self.sweep_times = SweepTimes()
         self.boxes = own_boxes(machine, settings.integration.body_margin_m)
-        self.has_inclinometer = False
         self.wheel_sources: Counter[str] = Counter()  # scans that wheels told the motion of, by sensor
-        self._early: deque[Inclination] | None = deque(maxlen=_EARLY)  # None once the attitude is in use
-        self._attitude_of: tuple[int, tuple[float, float]] = (-(2**63), (0.0, 0.0))
 
     def update(self, role: str, message: Message) -> None:
         """Take a message of any sensor but the primary scanner."""
@@ -63,35 +57,34 @@ class FrontEnd:
             case LaserScan() if role == "rear":
                 self.rear.hold(message)
             case Inclination():
-                self._take_inclination(message)
+                self.inclinometer.update(message)
             case Tachometer() | Joints() | WheelPose():
                 self.wheels.update(message)
             case Mount():
                 self.mounts.update(message)
-                self._mount_inclinometer()
+                self.inclinometer.mount()
             case _:
                 pass
 
     def ready_until_ns(self, newest_ns: int, judged_ns: int | None) -> int:
         """Return the latest time whose attitude and wheel motion later messages will not change."""
         ready_ns = self.wheels.ready_until_ns(newest_ns, judged_ns)
-        return min(ready_ns, self.attitude.ready_until_ns(newest_ns)) if self.has_inclinometer else ready_ns
-
-    def begin(self) -> None:
-        """Say that the first scan is used: the attitude stands from here on."""
-        self._early = None
+        return (
+            min(ready_ns, self.inclinometer.attitude.ready_until_ns(newest_ns)) if self.has_inclinometer else ready_ns
+        )
 
     def input(self, scan: LaserScan, before_ns: int, time_ns: int, height_m: float) -> ScanInput:
         """Return a scan with all that is known of the machine at `time_ns`, the middle of its sweep."""
         rear = partial(self.behind_at, time_ns) if self.has_inclinometer else None
         rise = rise_of(self.mounts.of(scan.frame_id, "front").T_parent_child)
-        turn_rad = self.gyro.turn_between(before_ns, time_ns) if self.gyro.there else None
+        gyro = self.inclinometer.gyro
+        turn_rad = gyro.turn_between(before_ns, time_ns) if gyro.there else None
         view = ScanView(height_m, self.boxes, rear, rise, self.has_inclinometer, turn_rad)
         return ScanInput(scan, partial(self.placement, scan, time_ns), self._wheel_step(before_ns, time_ns), view)
 
     def placement(self, scan: LaserScan, time_ns: int) -> FloatArray:
         """Return `T_level_sensor` (4, 4) of the front scanner."""
-        return level_sensor(self.mounts.of(scan.frame_id, "front"), *self.attitude_at(time_ns))
+        return level_sensor(self.mounts.of(scan.frame_id, "front"), *self.inclinometer.roll_pitch_at(time_ns))
 
     def cloud_input(
         self, cloud: PointCloud, before_ns: int, time_ns: int
@@ -102,15 +95,8 @@ class FrontEnd:
         if motion is not None:
             x, y, turn = (float(value) for value in motion.delta)
             prior = CloudPrior(se3.from_rpy(0.0, 0.0, turn, (x, y, 0.0)), motion.covariance)
-        T_level_base = se3.from_rpy(*self.attitude_at(time_ns), 0.0) if self.has_inclinometer else None
+        T_level_base = se3.from_rpy(*self.inclinometer.roll_pitch_at(time_ns), 0.0) if self.has_inclinometer else None
         return self.mounts.of(cloud.frame_id, "points").T_parent_child, prior, T_level_base
-
-    def attitude_at(self, time_ns: int) -> tuple[float, float]:
-        """Return roll and pitch; a log without inclinometer counts as level."""
-        if self._attitude_of[0] != time_ns:  # a scan asks twice, and the filter fits anew each time
-            known = self.attitude.roll_pitch_at(time_ns) if self.has_inclinometer else (0.0, 0.0)
-            self._attitude_of = (time_ns, known)
-        return self._attitude_of[1]
 
     def sees_again(self, scan: LaserScan, stamp_ns: int) -> bool:
         """Return whether a front scan is tilted, with a rear scanner that sees its walls again at the same height."""
@@ -118,42 +104,24 @@ class FrontEnd:
         return tilted and self.has_inclinometer and self.rear.near(stamp_ns, 0.0, 0.0) is not None
 
     @property
+    def has_inclinometer(self) -> bool:
+        """Whether an inclinometer has told the attitude."""
+        return self.inclinometer.there
+
+    @property
     def warnings(self) -> list[str]:
         """What was odd in the sensors, in words."""
         return [
             *self.mounts.warnings,
-            *self.attitude.texts(),
-            *self.gyro.texts(),
+            *self.inclinometer.attitude.texts(),
+            *self.inclinometer.gyro.texts(),
             *self.wheels.warnings.texts(),
             *self.sweep_times.warnings,
         ]
 
-    def _take_inclination(self, message: Inclination) -> None:
-        first, self.has_inclinometer = not self.has_inclinometer, True
-        if self._early is not None:
-            self._early.append(message)
-        if first:
-            self._mount_inclinometer()
-        else:
-            self.attitude.update(message)
-            self.gyro.update(message)
-
-    def _mount_inclinometer(self) -> None:
-        """Begin the attitude, with the inclinometer's mount if it is known; once more where that comes late."""
-        if not self._early:  # what was used already stands
-            return
-        frame, R_base_sensor = self._early[0].frame_id, None
-        if self.mounts.known(frame):
-            R_base_sensor = self.mounts.of(frame, "inclinometer").T_parent_child[:3, :3]
-        self.attitude = AttitudeFilter(self._settings, R_base_sensor)
-        self.gyro = Gyro(self._gyro_settings, self._settings.lag_s, R_base_sensor)
-        for message in self._early:
-            self.attitude.update(message)
-            self.gyro.update(message)
-
     def behind_at(self, time_ns: int, within_ns: int = AT_ONCE_NS) -> RearView | None:
         """Return what the rear scanner saw at `time_ns`, None where it saw nothing `within_ns` or the joint is not known."""
-        return self.rear.near(time_ns, *self.attitude_at(time_ns), within_ns)
+        return self.rear.near(time_ns, *self.inclinometer.roll_pitch_at(time_ns), within_ns)
 
     def _wheel_step(self, before_ns: int, time_ns: int) -> WheelStep | None:
         """Return the wheels' motion since the scan before, as far as the sensors tell."""

@@ -20,7 +20,7 @@ from lhdmap.pile.face import FaceRegistration
 from lhdmap.pile.result import PileApproach, PileReport, Snapshot
 from lhdmap.pipeline.front_end import own_boxes
 from lhdmap.pipeline.given import given_rows
-from lhdmap.pipeline.mapping import MappingPipeline, feed
+from lhdmap.pipeline.mapping import MappingOptions, MappingPipeline, feed
 from lhdmap.pipeline.mounts import SensorMounts, level_sensor, machine_of
 from lhdmap.pipeline.pile import NO_INCLINOMETER, PileWatch, PlacedScan
 from lhdmap.pipeline.said import said_once
@@ -64,7 +64,7 @@ def identify(
         if poses:
             rows = given_rows(poses, [log], topics or {})
             return _warned(identify_along(rows, [log], settings, body, topics), (*told, *source.damage))
-        pipeline = MappingPipeline(settings, body, cloud=False)
+        pipeline = MappingPipeline(settings, body, MappingOptions(cloud=False))
         feed(pipeline, _read(source))
     if pipeline.pile is None or not len(pipeline.track):
         raise InputError(f"{log}: no usable scan of a front scanner in it; lhdmap doctor tells what is wrong")
@@ -80,7 +80,7 @@ def _read(source: LogSource) -> Iterator[tuple[str, Message]]:
 
 def _in_cloud(source: LogSource, settings: Settings, machine: Machine | None) -> PileReport:
     """Look for the pile in the cloud of a 3D scanner: it sees the face at once, no drive is needed to climb it."""
-    pipeline = MappingPipeline(settings, machine, primary="points")
+    pipeline = MappingPipeline(settings, machine, MappingOptions("points"))
     feed(pipeline, _read(source))
     if not len(pipeline.track):
         raise InputError(f"{source.paths[0]}: no usable cloud in it; lhdmap doctor tells what is wrong")

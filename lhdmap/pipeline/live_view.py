@@ -8,7 +8,7 @@ from lhdmap.odometry.planar import PlanarOdometry
 from lhdmap.odometry.steps import OdometryStep
 from lhdmap.pipeline.inspection import Inspection, Inspector
 from lhdmap.pipeline.mapping import MappingPipeline
-from lhdmap.report.recording import Thinning
+from lhdmap.report.recording_settings import Thinning
 
 _EVERY_S = 0.2
 

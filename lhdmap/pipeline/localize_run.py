@@ -31,7 +31,8 @@ from lhdmap.report.live_recording import add_pose_now
 from lhdmap.report.localization_data import LocalizationData
 from lhdmap.report.localization_page import write_localization_report
 from lhdmap.report.localization_recording import record_localization
-from lhdmap.report.recording import RecordingWriter, Thinning
+from lhdmap.report.recording import RecordingWriter
+from lhdmap.report.recording_settings import Thinning
 from lhdmap.runfolder import RunFolderWriter, RunInfo
 from lhdmap.topology.model import TopologicalMap
 from lhdmap.trajectory import Trajectory, write_tum
@@ -106,7 +107,7 @@ def localize(request: LocalizeRequest) -> LocalizeResult:
                 localizer.rows,
                 localizer.searches,
                 changes,
-                episodes(localizer.rows, localizer.reasons),
+                episodes(localizer.rows, localizer.facts.reasons),
                 summary,
                 told,
                 localizer.pipeline.records.articulation(),
@@ -157,15 +158,15 @@ def _localized(
 
 def summary_of(localizer: Localizer) -> dict[str, Any]:
     """Return the figures of a run."""
-    rows, first = localizer.rows, localizer.first_fix
+    rows, first = localizer.rows, localizer.facts.first_fix
     latencies = np.array([row.latency_ms for row in rows])
     return {
         "scans": len(rows),
         "tracking_share": sum(row.status == TRACKING for row in rows) / len(rows),
         "first_fix_s": None if first is None else first[0],
         "first_fix_m": None if first is None else first[1],
-        "lost_stretches": localizer.lost_stretches,
-        "false_fix_guard": localizer.withheld,
+        "lost_stretches": localizer.facts.lost_stretches,
+        "false_fix_guard": localizer.facts.withheld,
         "changes": len(localizer.world.changes()),
         "latency_ms": {"median": float(np.median(latencies)), "p99": float(np.quantile(latencies, 0.99))},
     }

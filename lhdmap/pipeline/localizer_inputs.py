@@ -30,7 +30,7 @@ class FromOdometry:
         """
         covariance = step.error.covariance if step.processed else np.zeros((3, 3))
         dt_s = (step.time_ns - since_ns) * 1e-9
-        motion = self._pipeline.wheels.motion_between(since_ns, step.time_ns)
+        motion = self._pipeline.front_end.wheels.motion_between(since_ns, step.time_ns)
         if step.lost:
             covariance = covariance + (np.diag((_GUESSED * dt_s) ** 2) if motion is None else motion.covariance)
         if motion is None:

@@ -8,11 +8,10 @@ integrated once a later pose is known, so that its motion is interpolated and no
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Iterable
 from concurrent.futures import Executor
 from types import TracebackType
-from typing import Literal, Self
+from typing import Literal, NamedTuple, Self
 
 import numpy as np
 
@@ -21,75 +20,66 @@ from lhdmap.machine import Machine
 from lhdmap.messages import FloatArray, LaserScan, Message, PointCloud, Text, WheelPose
 from lhdmap.odometry.anchored.rear_view import behind
 from lhdmap.odometry.cloud.odometry import CloudOdometry
-from lhdmap.odometry.cloud.steps import CloudStep
 from lhdmap.odometry.planar import PlanarOdometry
 from lhdmap.odometry.start import starting_velocity
 from lhdmap.odometry.steps import OdometryStep
+from lhdmap.pipeline.evidence import DriveEvidence
 from lhdmap.pipeline.front_end import FrontEnd
 from lhdmap.pipeline.path import FinalPath
 from lhdmap.pipeline.pile import PileSink, PileWatch, PlacedScan
-from lhdmap.pipeline.pose_now import Newest, PoseNow, pose_now
+from lhdmap.pipeline.pose_now import PoseNow, pose_now
 from lhdmap.pipeline.records import ScanRecords
-from lhdmap.pipeline.scan_order import LONG_AGO_NS, ScanOrder, ScanQueue, TimedScan
+from lhdmap.pipeline.scan_order import TimedScan, WaitingScans, says_nothing
+from lhdmap.pipeline.step_recorder import StepRecorder
 from lhdmap.pipeline.sweeps import ScanSink, SweepIntegration
 from lhdmap.pipeline.track import Track
-from lhdmap.proprioception.slip import SkidFactor
 from lhdmap.smoothing.realign import AlignedScan
-from lhdmap.smoothing.smoother import Smoother
-from lhdmap.smoothing.turns import Turns
-from lhdmap.topology.views import Views
 
-_PATIENCE_SCANS = 3  # after a pause of the whole log, wheels may come within as many scans before they count as silent
-_MOMENT_NS = 5_000_000
+# A view of the drift: beams of the rear scanner that its free space needs, and how old its scan may be (six periods at 50 Hz).
 _VIEW_BEAMS, _VIEW_NS = 400, 120_000_000
-_PLANAR = [3, 4, 2]  # of a twist (rotation before translation): x, y, heading
-_NOT_KNOWN = np.full(3, math.nan)
 
 
 StepSink = Callable[[int, OdometryStep, PlanarOdometry], None]
 """Takes each front scan's stamp, what the odometry says of it, and the odometry with the hits of the last processed one."""
 
 
+class MappingOptions(NamedTuple):
+    """How a `MappingPipeline` runs.
+
+    `primary`: the sensor that the odometry runs on, the front scanner or a 3D scanner; `cloud`: whether sweeps are integrated,
+    and `on_sweep` is told of each; `pile`: what looks for the pile, if not the stage of the settings here; `worker`: integrates
+    sweeps, a thread of its own by default; `on_step`: is told of each front scan.
+    """
+
+    primary: Literal["front", "points"] = "front"
+    cloud: bool = True
+    on_sweep: ScanSink | None = None
+    pile: PileSink | None = None
+    worker: Executor | None = None
+    on_step: StepSink | None = None
+
+
+_WHOLE = MappingOptions()
+
+
 class MappingPipeline:
     """Takes messages by role in time order; `finish` ends the stream. Trajectory and cloud are there at any time.
 
-    `primary`: the sensor that the odometry runs on, the front scanner or a 3D scanner; `cloud`: whether sweeps are integrated;
-    `pile`: what looks for the pile, if not the stage of the settings here; `worker`: integrates sweeps, a thread of its own by
-    default; `on_step`: is told of each front scan. A context manager: left by an error, it lets go of what it holds.
+    A context manager: left by an error, it lets go of what it holds.
     """
 
-    def __init__(
-        self,
-        settings: Settings,
-        machine: Machine | None = None,
-        on_sweep: ScanSink | None = None,
-        primary: Literal["front", "points"] = "front",
-        *,
-        cloud: bool = True,
-        pile: PileSink | None = None,
-        worker: Executor | None = None,
-        on_step: StepSink | None = None,
-    ) -> None:
-        self.settings, self.machine, self._primary, self._cloud = settings, machine, primary, cloud
+    def __init__(self, settings: Settings, machine: Machine | None = None, options: MappingOptions = _WHOLE) -> None:
+        self.settings, self.machine, self._options = settings, machine, options
         self.front_end = front = FrontEnd(settings, machine)
-        self.mounts, self.wheels = front.mounts, front.wheels
-        self._order, self._queue = ScanOrder(), ScanQueue()
+        self._waiting = WaitingScans()
         self.odometry: PlanarOdometry | None = None  # begins once the first scans have told the speed
-        self.clouds = CloudOdometry(settings.cloud_odometry) if primary == "points" else None
-        self.track = Track(settings.odometry.height_lever * front.machine.dimensions.wheelbase_m)
-        self.path = FinalPath(self.track)
-        self.sweeps = SweepIntegration(settings, machine, self.mounts, on_sweep, worker)
-        self.smoother = Smoother(settings.smoothing)
-        self.turns = Turns()  # by the gyroscope, where there is one
-        self.told: list[str] = []  # what came out once the drive was over
-        self.said: list[tuple[int, str]] = []  # names of nodes, each where the operator begins to say it
-        self.views = Views()  # of the drift, for the free space that the topology is found in
-        looked_for = primary == "front" and settings.pile.method != "off"
-        self.pile: PileSink | None = (pile or PileWatch(settings)) if looked_for else None
-        self._on_step = on_step
-        self.records, self.slip = ScanRecords(), SkidFactor(settings.slip)
-        self._time_ns = self._before_ns = LONG_AGO_NS
-        self._newest = Newest(np.zeros((3, 3)), np.zeros(3), None)
+        self.clouds = CloudOdometry(settings.cloud_odometry) if options.primary == "points" else None
+        self.path = FinalPath(Track(settings.odometry.height_lever * front.machine.dimensions.wheelbase_m))
+        self.sweeps = SweepIntegration(settings, machine, front.mounts, options.on_sweep, options.worker)
+        self.evidence = DriveEvidence(settings.smoothing)
+        looked_for = options.primary == "front" and settings.pile.method != "off"
+        self.pile: PileSink | None = (options.pile or PileWatch(settings)) if looked_for else None
+        self._steps = StepRecorder(front.wheels, settings.slip)
 
     def __enter__(self) -> Self:
         return self
@@ -104,28 +94,28 @@ class MappingPipeline:
         """Take one message of the log."""
         if isinstance(message, (LaserScan, PointCloud)):
             message = self.front_end.sweep_times.checked(role, message)
-            if role == self._primary:
-                self._queue.append(self._order.of_scan(message))
+            if role == self._options.primary:
+                self._waiting.append(message)
                 self._process_ready()
                 return
             self._hold(role, message.stamp_ns, message)
         if isinstance(message, WheelPose):
-            self.front_end.update(role, message._replace(stamp_ns=self._order.of_wheels(message.stamp_ns)))
+            self.front_end.update(role, message._replace(stamp_ns=self._waiting.order.of_wheels(message.stamp_ns)))
             self._process_ready()
             return
         if isinstance(message, Text):
-            if role == "node" and (not self.said or self.said[-1][1] != message.text):
-                self.said.append((self._order.newest_ns, message.text))  # a text has no stamp of its own
+            if role == "node":
+                self.evidence.say(self._waiting.order.newest_ns, message.text)  # a text has no stamp of its own
             return
         self.front_end.update(role, message)
 
     def finish(self) -> None:
         """Say that the log has ended: what waits is processed with what there is."""
-        self.front_end.attitude.finish()
-        while len(self._queue):
-            self._process(self._queue.pop())
+        self.front_end.inclinometer.attitude.finish()
+        while len(self._waiting.queue):
+            self._process(self._waiting.queue.pop())
         self.path.finish()
-        self.sweeps.finish(self.path.final, self.wheels)
+        self.sweeps.finish(self.path.final, self.front_end.wheels)
 
     def pose_at(self, now_ns: int) -> PoseNow | None:
         """Return where the machine is now, as far as the newest processed scan and the sensors since tell; None before the first.
@@ -135,7 +125,7 @@ class MappingPipeline:
         """
         if self.track.last_ns is None:
             return None
-        return pose_now(now_ns, self.track, self._newest, self.front_end, self.settings.odometry)
+        return pose_now(now_ns, self.track, self._steps.newest, self.front_end, self.settings.odometry)
 
     @property
     def warnings(self) -> list[str]:
@@ -147,8 +137,18 @@ class MappingPipeline:
             *self.front_end.warnings,
             *self.odometry.wheels.warnings(),
             *([] if gyro is None else [gyro]),
-            *self.told,
+            *self.evidence.told,
         ]
+
+    @property
+    def track(self) -> Track:
+        """The path by odometry alone."""
+        return self.path.track
+
+    @property
+    def records(self) -> ScanRecords:
+        """A few numbers of each scan, for tables and curves."""
+        return self._steps.records
 
     @property
     def has_inclinometer(self) -> bool:
@@ -158,16 +158,16 @@ class MappingPipeline:
     @property
     def drives_by_rear_body(self) -> bool:
         """Whether the scanner that the odometry uses sits on the rear body."""
-        return self.mounts.on_rear_body(self._primary)
+        return self.front_end.mounts.on_rear_body(self._options.primary)
 
     def _process_ready(self) -> None:
         """Process the scans whose attitude and wheel motion later messages will not change."""
-        paused = len(self._queue) < _PATIENCE_SCANS and self._time_ns > 0
-        ready_ns = self.front_end.ready_until_ns(self._order.newest_ns, self._time_ns if paused else None)
-        if self.clouds is None and self.odometry is None and not self._queue.is_warm(ready_ns):
+        waiting = self._waiting
+        ready_ns = self.front_end.ready_until_ns(waiting.order.newest_ns, waiting.judged_ns)
+        if self.clouds is None and self.odometry is None and not waiting.queue.is_warm(ready_ns):
             return
-        while self._queue.is_ready(ready_ns):
-            self._process(self._queue.pop())
+        while waiting.queue.is_ready(ready_ns):
+            self._process(waiting.queue.pop())
 
     def _process(self, one: TimedScan) -> None:
         """Run one scan of the primary scanner through all stages."""
@@ -175,43 +175,47 @@ class MappingPipeline:
             if self.clouds is not None:
                 self._process_cloud(self.clouds, one.scan, one.stamp_ns)
             return
-        scan, stamp_ns = one.scan, one.stamp_ns
+        scan, stamp_ns, waiting = one.scan, one.stamp_ns, self._waiting
         in_bunches = self.odometry is not None and self.odometry.clock.bunched
-        if _says_nothing(scan, stamp_ns - self._before_ns) and not (in_bunches and scan.ranges_m.size):
-            self.records.add_scan(scan.stamp_ns, max(stamp_ns, self._time_ns + 1))
+        if says_nothing(scan, stamp_ns - waiting.said_ns) and not (in_bunches and scan.ranges_m.size):
+            self.records.add_scan(scan.stamp_ns, max(stamp_ns, waiting.used_ns + 1))
             return
-        self._before_ns = stamp_ns
+        waiting.said_ns = stamp_ns
         odometry = self.odometry or self._begin(one)
-        time_ns = max(one.time_ns, self._time_ns + 1)
-        step = odometry.update(*self.front_end.input(scan, self._time_ns, time_ns, self.track.height_m))
-        self._time_ns = time_ns
-        self.front_end.begin()
+        time_ns = waiting.rising(one.time_ns)
+        step = odometry.update(*self.front_end.input(scan, waiting.used_ns, time_ns, self.track.height_m))
+        self._use(time_ns)
         self.records.add_scan(scan.stamp_ns, stamp_ns)
         self._hold("front", stamp_ns, scan)
         if step.processed:
             self._take(scan, time_ns, step, odometry)
-        if self._on_step is not None:
-            self._on_step(scan.stamp_ns, step, odometry)
+        if self._options.on_step is not None:
+            self._options.on_step(scan.stamp_ns, step, odometry)
+
+    def _use(self, time_ns: int) -> None:
+        """Note that the scans up to a time are used."""
+        self._waiting.used_ns = time_ns
+        self.front_end.inclinometer.begin()
 
     def _take(self, scan: LaserScan, time_ns: int, step: OdometryStep, odometry: PlanarOdometry) -> None:
         """Hand a processed scan on to all that live by its pose."""
-        self.track.append(time_ns, step.pose_odom_base, *self.front_end.attitude_at(time_ns))
-        if self.front_end.gyro.there:
-            self.turns.append(time_ns, self.front_end.gyro.turned_at(np.array([time_ns]))[0])
-        believed = odometry.wheels.use.used
-        self._newest = Newest(step.covariance, step.velocity, odometry.wheels.scale if believed else None)
-        self.smoother.keys.update(time_ns, step.pose_odom_base, odometry.points, step.error, unseen=step.unseen)
+        front, evidence = self.front_end, self.evidence
+        self.track.append(time_ns, step.pose_odom_base, *front.inclinometer.roll_pitch_at(time_ns))
+        if front.inclinometer.gyro.there:
+            evidence.turns.append(time_ns, front.inclinometer.gyro.turned_at(np.array([time_ns]))[0])
+        self._steps.believe(step, odometry)
+        evidence.smoother.keys.update(time_ns, step.pose_odom_base, odometry.points, step.error, unseen=step.unseen)
         self._view(scan, time_ns, step, odometry)
         aligned = AlignedScan(time_ns, step.pose_odom_base, odometry.points, odometry.points_behind, weak=step.lost)
         self.path.update(aligned)
-        self._record(scan.stamp_ns, time_ns, step)
+        self._steps.record(scan.stamp_ns, time_ns, step, odometry)
         self._look_for_pile(scan, time_ns, step)
-        self.sweeps.advance(self.path.final, self.wheels)
+        self.sweeps.advance(self.path.final, front.wheels)
 
     def _view(self, scan: LaserScan, time_ns: int, step: OdometryStep, odometry: PlanarOdometry) -> None:
         """Keep what both scanners saw, where the views want it."""
-        height_m = self.track.height_m
-        if not self._cloud or not self.views.wants(step.pose_odom_base, height_m):
+        height_m, views = self.track.height_m, self.evidence.views
+        if not self._options.cloud or not views.wants(step.pose_odom_base, height_m):
             return
         front = odometry.points - [0.0, 0.0, height_m]
         fans = [(self.front_end.placement(scan, time_ns)[:2, 3], front)]
@@ -219,20 +223,20 @@ class MappingPipeline:
         if rear is not None:
             floor_m = self.settings.odometry.min_height_m
             fans.append((rear.T_level_sensor[:2, 3], behind(rear, step.velocity, 0.0, floor_m, _VIEW_BEAMS).points))
-        self.views.add(time_ns, fans)
+        views.add(time_ns, fans)
 
     def _begin(self, one: TimedScan) -> PlanarOdometry:
         """Start the odometry with the speed that a dry run over the first scans finds; realign its scans where that helps."""
-        inputs, before_ns = [], self._time_ns
-        for scan, stamp_ns in [one, *self._queue.first()]:
-            if not isinstance(scan, LaserScan) or _says_nothing(scan, stamp_ns - before_ns):
+        inputs, before_ns = [], self._waiting.used_ns
+        for scan, stamp_ns in [one, *self._waiting.queue.first()]:
+            if not isinstance(scan, LaserScan) or says_nothing(scan, stamp_ns - before_ns):
                 continue
             time_ns = TimedScan(scan, stamp_ns).time_ns
             inputs.append(self.front_end.input(scan, before_ns, time_ns, self.track.height_m))
             before_ns = time_ns
         self.odometry = odometry = self._odometry(starting_velocity(self._odometry, inputs))
         s = self.settings
-        wanted = self._cloud and s.smoothing.realign and s.odometry.method == "anchored"
+        wanted = self._options.cloud and s.smoothing.realign and s.odometry.method == "anchored"
         if wanted and isinstance(one.scan, LaserScan) and self.front_end.sees_again(one.scan, one.stamp_ns):
             self.path.realign(s.smoothing, -self.front_end.machine.dimensions.joint_to_front_axle_m)
         return odometry
@@ -248,39 +252,24 @@ class MappingPipeline:
             self.pile.update(PlacedScan(scan, placement, step.velocity, self.front_end.boxes, pose))
 
     def _hold(self, role: str, time_ns: int, sweep: LaserScan | PointCloud) -> None:
-        if self._cloud:
+        if self._options.cloud:
             self.sweeps.hold(role, time_ns, sweep)
 
     def _process_cloud(self, odometry: CloudOdometry, cloud: PointCloud, stamp_ns: int) -> None:
         """Run one cloud of a 3D scanner through all stages."""
-        time_ns = max(stamp_ns, self._time_ns + 1)
-        T_base_sensor, prior, T_level_base = self.front_end.cloud_input(cloud, self._time_ns, time_ns)
+        time_ns = self._waiting.rising(stamp_ns)
+        T_base_sensor, prior, T_level_base = self.front_end.cloud_input(cloud, self._waiting.used_ns, time_ns)
         step = odometry.update(
             cloud._replace(stamp_ns=time_ns), T_base_sensor, prior, T_level_base, self.front_end.boxes
         )
-        self._time_ns = time_ns
-        self.front_end.begin()
+        self._use(time_ns)
         self.records.add_scan(cloud.stamp_ns, time_ns)
         self._hold("points", time_ns, cloud)
         if step.processed:
             self.track.append_space(time_ns, step.T_odom_base)
-            self._newest = Newest(step.covariance[np.ix_(_PLANAR, _PLANAR)], step.velocity, 1.0)
-            self._record(cloud.stamp_ns, time_ns, step)
-            self.sweeps.advance(self.track, self.wheels)
-
-    def _record(self, stamp_ns: int, time_ns: int, step: OdometryStep | CloudStep) -> None:
-        wheel_mps = self.wheels.speed_at(time_ns)
-        speed_mps = float(step.velocity[0])
-        match_, flags = (step.residual_m, step.support), (step.degenerate, step.lost)
-        wheels = step.wheels, self._slip(time_ns, wheel_mps, math.nan if step.degenerate else speed_mps)
-        std = step.error.deviations if isinstance(step, OdometryStep) else _NOT_KNOWN
-        self.records.add_processed(stamp_ns, match_, (step.information, std), step.substitute, flags, wheels)
-        self.records.add_motion(time_ns, speed_mps, wheel_mps, self.wheels.articulation_at(time_ns))
-
-    def _slip(self, time_ns: int, wheel_mps: float | None, seen_mps: float) -> float:
-        """Return the skid factor; `seen_mps` is NaN where the walls did not show the speed, which is then the wheels' own."""
-        scale = 1.0 if self.odometry is None else self.odometry.wheels.scale
-        return self.slip.update(time_ns, math.nan if wheel_mps is None else wheel_mps / scale, seen_mps)
+            self._steps.believe_cloud(step)
+            self._steps.record(cloud.stamp_ns, time_ns, step, None)
+            self.sweeps.advance(self.track, self.front_end.wheels)
 
 
 def feed(pipeline: MappingPipeline, messages: Iterable[tuple[str, Message]]) -> MappingPipeline:
@@ -290,8 +279,3 @@ def feed(pipeline: MappingPipeline, messages: Iterable[tuple[str, Message]]) -> 
             pipeline.update(role, message)
         pipeline.finish()
     return pipeline
-
-
-def _says_nothing(scan: LaserScan, after_ns: int) -> bool:
-    """Return whether a scan is none: without beams, or without a hit a moment after another one."""
-    return not scan.ranges_m.size or (after_ns < _MOMENT_NS and not bool((scan.ranges_m < scan.range_max_m).any()))

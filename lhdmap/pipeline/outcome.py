@@ -93,10 +93,12 @@ class MapOutcome:
     def _expected_error(self, distance_m: float) -> dict[str, Any] | None:
         """Return how far the map may be off at its end; None of clouds of a 3D scanner, whose drift nobody measures."""
         pipeline = self.pipeline
-        height_std_m = pipeline.front_end.attitude.height_std_m(distance_m) if pipeline.has_inclinometer else None
+        height_std_m = (
+            pipeline.front_end.inclinometer.attitude.height_std_m(distance_m) if pipeline.has_inclinometer else None
+        )
         if height_std_m is not None and self.ways.end_height_std_m is not None:
             height_std_m = min(height_std_m, self.ways.end_height_std_m)
-        found = expected_error(pipeline.smoother.keys, height_std_m, self.ways.end_covariance)
+        found = expected_error(pipeline.evidence.smoother.keys, height_std_m, self.ways.end_covariance)
         return None if found is None else found._asdict()
 
     def _no_pile(self) -> str:
@@ -120,7 +122,7 @@ class MapOutcome:
     def _topology(self, beside: Executor) -> tuple[Topology | None, Future[Landmarks] | None]:
         """Return the topological map, None where it is not wanted or no planar scanner saw the drift, and landmarks to come."""
         settings = self._inputs.settings
-        if settings.topology.method == "off" or not len(self.pipeline.views):
+        if settings.topology.method == "off" or not len(self.pipeline.evidence.views):
             return None, None
         seen = seen_of(self.pipeline, self.ways.rows)
         topology = topology_of(seen, settings.topology, self._inputs.edits)
@@ -154,7 +156,7 @@ class MapOutcome:
             landmarks=self.landmarks,
             landmark_settings=inputs.settings.landmarks,
             sheets=() if self.topology is None else self.topology.sheets,
-            closures=closure_rows(self.pipeline.smoother.evidence, self.ways.rows),
+            closures=closure_rows(self.pipeline.evidence.smoother.evidence, self.ways.rows),
             warnings=self.warnings,
             settings_text=settings_toml(inputs.settings),
             provenance={"log": ", ".join(name_of(path) for path in inputs.logs)} | given_of(inputs),

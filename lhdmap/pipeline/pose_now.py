@@ -103,5 +103,5 @@ def _attitude_now(now_ns: int, last_ns: int, front_end: FrontEnd) -> tuple[float
     """Return roll and pitch of now: the filter's, as late as its sensor has been heard."""
     if not front_end.has_inclinometer:
         return 0.0, 0.0
-    found = front_end.attitude.causal_at(now_ns)
-    return front_end.attitude_at(last_ns) if found is None else (found.roll_rad, found.pitch_rad)
+    found = front_end.inclinometer.attitude.causal_at(now_ns)
+    return front_end.inclinometer.roll_pitch_at(last_ns) if found is None else (found.roll_rad, found.pitch_rad)

@@ -83,7 +83,7 @@ def remarks_of(pipeline: MappingPipeline) -> list[str]:
             f"odometry: in {100 * share:.0f} % of the scans a direction is weakly observed (smooth walls, or too far away?)"
         )
     remarks += key_scans_remark(pipeline.records)
-    remarks += open_loops(pipeline.smoother.evidence)
+    remarks += open_loops(pipeline.evidence.smoother.evidence)
     gap_s = float(np.diff(pipeline.records.times_ns).max(initial=0.0)) * 1e-9
     if gap_s > _GAP_S:
         remarks.append(

@@ -9,6 +9,8 @@ from lhdmap.messages import LaserScan, PointCloud
 from lhdmap.scan_matching.scan_points import half_sweep_ns
 
 LONG_AGO_NS = -(2**62)
+_PATIENCE_SCANS = 3  # after a pause of the whole log, wheels may come within as many scans before they count as silent
+_MOMENT_NS = 5_000_000  # a scan without a hit so soon after another is none of its own
 _WARM_SCANS, _FEWEST_WARM_SCANS, _WARM_NS = 50, 6, 1_500_000_000
 _QUEUE_SCANS = 2000  # a sensor that stops must not hold back scans without bound
 
@@ -83,3 +85,33 @@ class ScanQueue:
     def first(self) -> list[TimedScan]:
         """Return the scans of the dry run that wait behind the one just taken out."""
         return list(self._waiting)[: _WARM_SCANS - 1]
+
+
+class WaitingScans:
+    """The scans of the primary scanner on their way to the odometry: in `order`, in the `queue`, and up to when they are used.
+
+    `used_ns`: time of the newest scan that the odometry has; `said_ns`: stamp of the newest one that said anything.
+    """
+
+    def __init__(self) -> None:
+        self.order, self.queue = ScanOrder(), ScanQueue()
+        self.used_ns = self.said_ns = LONG_AGO_NS
+
+    def append(self, scan: LaserScan | PointCloud) -> None:
+        """Take the next scan of the log."""
+        self.queue.append(self.order.of_scan(scan))
+
+    def rising(self, time_ns: int) -> int:
+        """Return a time, later than that of the newest scan used."""
+        return max(time_ns, self.used_ns + 1)
+
+    @property
+    def judged_ns(self) -> int | None:
+        """From when on silent wheels are judged; None while those of a pause may still come."""
+        paused = len(self.queue) < _PATIENCE_SCANS and self.used_ns > 0
+        return self.used_ns if paused else None
+
+
+def says_nothing(scan: LaserScan, after_ns: int) -> bool:
+    """Return whether a scan is none: without beams, or without a hit a moment after another one."""
+    return not scan.ranges_m.size or (after_ns < _MOMENT_NS and not bool((scan.ranges_m < scan.range_max_m).any()))

@@ -18,7 +18,7 @@ _PLANAR_AND_HEIGHT = [0, 1, 2, 5]  # of a pose: x, y, z, heading
 
 def seen_of(pipeline: MappingPipeline, rows: TrackRows) -> Seen:
     """Return what a run saw along its final path `rows`; views beyond its ends are left out (given poses may be fewer)."""
-    views = [view for view in pipeline.views if rows.times_ns[0] <= view.time_ns <= rows.times_ns[-1]]
+    views = [view for view in pipeline.evidence.views if rows.times_ns[0] <= view.time_ns <= rows.times_ns[-1]]
     times = np.array([view.time_ns for view in views], dtype=np.int64)
     chosen = each_step(rows)
     path_ns = rows.times_ns[chosen]
@@ -27,7 +27,7 @@ def seen_of(pipeline: MappingPipeline, rows: TrackRows) -> Seen:
         resample(rows, times).poses[:, _PLANAR_AND_HEIGHT],
         rows.poses[chosen][:, _PLANAR_AND_HEIGHT],
         path_ns,
-        said_at(pipeline.said, path_ns),
+        said_at(pipeline.evidence.said, path_ns),
         pipeline.machine,
     )
 

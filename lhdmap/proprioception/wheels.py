@@ -86,11 +86,10 @@ class WheelOdometry:
         keep_s = settings.keep_s
         self._speeds = SampleBuffer("tachometer", 1, keep_s, self.warnings)
         self._angles = SampleBuffer("articulation", 1, keep_s, self.warnings)
-        self._gap_ns, self._hold_ns = round(settings.max_gap_s * 1e9), round(settings.max_hold_s * 1e9)
-        self._limits_ns = self._gap_ns, self._hold_ns
+        self._limits_ns = round(settings.max_gap_s * 1e9), round(settings.max_hold_s * 1e9)  # gap, hold
         self._bending, self._straight = self._drive_errors()
         self._pose_gap_ns = round(settings.max_pose_gap_s * 1e9)
-        limits = ReckoningLimits(settings.max_speed_mps, settings.max_jump_m, self._pose_gap_ns, self._hold_ns)
+        limits = ReckoningLimits(settings.max_speed_mps, settings.max_jump_m, self._pose_gap_ns, self._limits_ns[1])
         self._poses = DeadReckoning(limits, keep_s, self.warnings)
 
     def update(self, message: Tachometer | Joints | WheelPose) -> None:
@@ -109,7 +108,8 @@ class WheelOdometry:
         `judged_ns` is not waited for: the newest stamp, or an older one where the whole log paused.
         """
         judged_ns = now_ns if judged_ns is None else judged_ns
-        limits = ((self._speeds, self._gap_ns), (self._angles, self._gap_ns), (self._poses.samples, self._pose_gap_ns))
+        gap_ns, _ = self._limits_ns
+        limits = ((self._speeds, gap_ns), (self._angles, gap_ns), (self._poses.samples, self._pose_gap_ns))
         newest = ((samples.latest_ns, limit_ns) for samples, limit_ns in limits)
         return min((ns for ns, limit_ns in newest if ns is not None and judged_ns - ns <= limit_ns), default=now_ns)
 

@@ -13,7 +13,7 @@ SEES_TRUTH = ("plant", "operator", "monitor", "recorder", "film")
 """The simulator, the scripted operator, and those who only watch: nobody else may subscribe to the truth."""
 
 
-class Inbox:
+class ProcessInbox:
     """What waits for a process: bounded, the oldest are lost first and counted."""
 
     def __init__(self, process: Process) -> None:
@@ -54,15 +54,15 @@ class Bus:
             ValueError: a process subscribes to the truth that may not see it.
         """
         self._link, self._withhold = link, withhold_truth
-        self.inboxes = {process.name: Inbox(process) for process in processes}
-        self._routes: dict[str, list[Inbox]] = {}
-        self._parted: dict[tuple[str, str, bool], tuple[list[tuple[Inbox, bool]], list[Inbox]]] = {}
+        self.inboxes = {process.name: ProcessInbox(process) for process in processes}
+        self._routes: dict[str, list[ProcessInbox]] = {}
+        self._parted: dict[tuple[str, str, bool], tuple[list[tuple[ProcessInbox, bool]], list[ProcessInbox]]] = {}
         for process in processes:
             secret = [topic for topic in process.reads if topic.startswith(TRUTH)]
             if secret and role_of(process.name) not in SEES_TRUTH:
                 raise ValueError(f"process '{process.name}' may not see {secret[0]}: only {', '.join(SEES_TRUTH)}")
 
-    def deliveries(self, sender: Process, topic: str, sent_ns: int) -> Iterator[tuple[int, list[Inbox]]]:
+    def deliveries(self, sender: Process, topic: str, sent_ns: int) -> Iterator[tuple[int, list[ProcessInbox]]]:
         """Yield when a message arrives, and at whom."""
         route = self._routes.get(topic)
         if route is None:
@@ -85,16 +85,18 @@ class Bus:
         if at_once:
             yield sent_ns, at_once
 
-    def _route(self, topic: str) -> list[Inbox]:
+    def _route(self, topic: str) -> list[ProcessInbox]:
         if topic.startswith(TRUTH) and self._withhold:
             return []
         return [inbox for inbox in self.inboxes.values() if _gets(inbox.process, topic)]
 
 
-def _parted(here: str, route: list[Inbox], *, at_fault: bool) -> tuple[list[tuple[Inbox, bool]], list[Inbox]]:
+def _parted(
+    here: str, route: list[ProcessInbox], *, at_fault: bool
+) -> tuple[list[tuple[ProcessInbox, bool]], list[ProcessInbox]]:
     """Return the inboxes that the link decides on, and whether it lies between; and those that get all at once."""
-    over: list[tuple[Inbox, bool]] = []
-    at_once: list[Inbox] = []
+    over: list[tuple[ProcessInbox, bool]] = []
+    at_once: list[ProcessInbox] = []
     for inbox in route:
         crosses = bool(here and inbox.process.site and here != inbox.process.site)
         if not crosses and (not at_fault or not inbox.process.site):

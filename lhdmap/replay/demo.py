@@ -13,7 +13,7 @@ from pathlib import Path
 from lhdmap.config import Settings, settings_table
 from lhdmap.evaluation.trajectory import TrajectoryEvaluation, evaluate_trajectory
 from lhdmap.machine import load_machine
-from lhdmap.mine.network import make_network
+from lhdmap.mine.make_network import make_network
 from lhdmap.mine.plan import find_plan, load_plan
 from lhdmap.pipeline.build import BuildRequest, BuildResult, Progress, build_map
 from lhdmap.replay.assemble import parts_of

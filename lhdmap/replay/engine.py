@@ -6,7 +6,7 @@ import heapq
 from collections.abc import Iterator, Sequence
 from typing import Any
 
-from lhdmap.replay.bus import Bus, Inbox
+from lhdmap.replay.bus import Bus, ProcessInbox
 from lhdmap.replay.faults import Faults
 from lhdmap.replay.journal import Journal
 from lhdmap.replay.link import Link
@@ -22,7 +22,7 @@ _TOLD_NS = SECOND_NS // 10
 class _Slot:
     """A process with what the engine knows of it."""
 
-    def __init__(self, process: Process, inbox: Inbox) -> None:
+    def __init__(self, process: Process, inbox: ProcessInbox) -> None:
         self.process, self.inbox = process, inbox
         self.busy_until_ns = 0
         self.missed = 0

@@ -13,7 +13,8 @@ from lhdmap.config import Settings
 from lhdmap.geometry import se2
 from lhdmap.machine import Machine, load_machine
 from lhdmap.messages import FloatArray
-from lhdmap.mine.network import Network, make_network
+from lhdmap.mine.make_network import make_network
+from lhdmap.mine.network import Network
 from lhdmap.mine.plan import find_plan, load_plan
 from lhdmap.mine.route import Start, start_of
 from lhdmap.mine.stands import place_pose

@@ -19,7 +19,7 @@ from lhdmap.replay.processes.told import ModeNow
 from lhdmap.replay.site_drive import SiteGround
 from lhdmap.simulation.drift import Mesh
 from lhdmap.simulation.sensing.sensor import Sensor
-from lhdmap.simulation.surroundings import View
+from lhdmap.simulation.surroundings import SurroundingsView
 from lhdmap.simulation.vehicle.shaking import Shaking
 
 
@@ -163,7 +163,7 @@ class Parts:
     """
 
     machine: Machine
-    world: View
+    world: SurroundingsView
     vehicle: Vehicle
     start: State
     sensors: Sequence[Sensor]

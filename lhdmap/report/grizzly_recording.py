@@ -29,7 +29,7 @@ def write_grizzly_recording(path: Path, title: str, machine: Rockbreaker, story:
     rows = story.table()
     rows[:, 0] += story.began_s
     with RecordingWriter(path, title, 0) as writer:
-        writer.curves = CURVES
+        writer.layout.curves = CURVES
         add_arm(writer, machine, rows)
         bars = bar_lines(machine, story.looks[0].scene if story.looks else None)
         writer.add_shape("map/grizzly", rr.LineStrips3D(bars, colors=_SMALL, radii=0.03))

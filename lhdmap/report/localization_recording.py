@@ -17,9 +17,10 @@ from lhdmap.localization.search import Search
 from lhdmap.machine import Machine
 from lhdmap.messages import FloatArray
 from lhdmap.report.localization_data import LocalizationData
-from lhdmap.report.recording import PathStyle, RecordingWriter
+from lhdmap.report.recording import RecordingWriter
 from lhdmap.report.recording_end import rerun
 from lhdmap.report.recording_layout import Curves
+from lhdmap.report.recording_settings import PathStyle
 from lhdmap.report.topology_recording import add_topology
 from lhdmap.trajectory import Trajectory
 
@@ -48,7 +49,7 @@ _ABOVE_M, _MACHINE_M = 0.3, 3.0
 
 def record_localization(writer: RecordingWriter, data: LocalizationData, machine: Machine) -> None:
     """Record all that a finished run knows; its scans are in `writer` already."""
-    writer.curves = CURVES
+    writer.layout.curves = CURVES
     _add_map(writer, data)
     placed = [row for row in data.rows if row.status != UNKNOWN and math.isfinite(row.x_m)]
     if placed:

@@ -12,8 +12,9 @@ from lhdmap.integration.beams import scan_points
 from lhdmap.kinematics import T_base_rear
 from lhdmap.machine import Machine
 from lhdmap.messages import FloatArray, Inclination, Joints, LaserScan, Message, Mount, PointCloud, Tachometer
-from lhdmap.report.recording import RecordingSettings, RecordingWriter
+from lhdmap.report.recording import RecordingWriter
 from lhdmap.report.recording_layout import LOG_CURVES
+from lhdmap.report.recording_settings import RecordingSettings
 
 SCAN_INTERVAL_S = 0.1
 _BLUE, _ORANGE, _GREEN, _RED = 0x2F86C9FF, 0xE69F00FF, 0x009E73FF, 0xD55E00FF
@@ -68,7 +69,7 @@ class LogRecorder:
         if self._writer is None:
             settings = RecordingSettings(scan_interval_s=SCAN_INTERVAL_S)
             self._writer = RecordingWriter(self._path, self._title, message.stamp_ns, settings)
-            self._writer.curves = LOG_CURVES
+            self._writer.layout.curves = LOG_CURVES
         if self._writer.wants_scan(message.stamp_ns, role):
             T_base_sensor = self._pose(message.frame_id)
             points = _points(message) @ T_base_sensor[:3, :3].T + T_base_sensor[:3, 3]

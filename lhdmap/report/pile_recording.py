@@ -41,7 +41,7 @@ def write_pile_recording(report: PileReport, path: Path, title: str) -> None:
     """Write a `.rrd` file of what is said of the pile."""
     stamps = [one.stamp_ns for one in report.history]
     with RecordingWriter(path, title, stamps[0] if stamps else 0) as writer:
-        writer.curves = ()
+        writer.layout.curves = ()
         add_pile(writer, report, report.around_m)
 
 
@@ -52,7 +52,7 @@ def add_pile(
 
     `around_m` (N, 3): hits around the pile, where the recording has no cloud of its own; `said`: texts that are in it already.
     """
-    writer.curves = (*writer.curves, *CURVES)
+    writer.layout.curves = (*writer.layout.curves, *CURVES)
     _add_course(writer, report)
     for one in report.piles:
         writer.add_text(f"pile decided: {one.decision.estimate.status}", one.decision.stamp_ns, "INFO")

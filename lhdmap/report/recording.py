@@ -10,10 +10,9 @@ from __future__ import annotations
 
 from collections import deque
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
-from typing import Any, NamedTuple, Self
+from typing import Any, Self
 
 import numpy as np
 import numpy.typing as npt
@@ -22,63 +21,20 @@ from lhdmap.errors import InputError
 from lhdmap.integration.cloud import GridCloud
 from lhdmap.machine import Machine
 from lhdmap.mapfolder import Diagnostics
-from lhdmap.messages import Float32Array, FloatArray
-from lhdmap.names import in_utf8, shown
-from lhdmap.report.recording_end import rerun, warn_if_left_out, write_out
-from lhdmap.report.recording_layout import RUN_CURVES, Curves, blueprint, whole_of
-from lhdmap.settings import setting
+from lhdmap.messages import FloatArray
+from lhdmap.names import shown
+from lhdmap.report.height_colours import height_colours
+from lhdmap.report.recording_end import warn_if_left_out, write_out
+from lhdmap.report.recording_layout import ViewerLayout, whole_of
+from lhdmap.report.recording_settings import PathStyle, RecordingSettings, Thinning
+from lhdmap.report.recording_start import open_recording
 from lhdmap.trajectory import Trajectory
 
-APPLICATION = "lhdmap"
 TIMELINE = "time"
 SCAN = 0xF2F2F2FF
-LOOPBACK, _LIVE_MEMORY = "127.0.0.1", "64MB"
 Stamps = npt.NDArray[np.int64]
-_VIRIDIS = np.array([[59, 82, 139], [33, 145, 140], [94, 201, 98], [253, 231, 37]], dtype=float)
 
 _LEAP_M = 5.0  # from scan to scan: the end of one drive and the start of the next
-
-
-class PathStyle(NamedTuple):
-    """How a path is drawn: its name, its colour (in a word, and as 0xRRGGBBAA), and at which share of it the name stands."""
-
-    label: str
-    colour: str
-    rgba: int
-    label_at: float
-
-
-@dataclass(frozen=True, slots=True)
-class RecordingSettings:
-    """What of a run goes into its Rerun recording."""
-
-    scan_interval_s: float = setting(
-        0.5, unit="s", minimum=0.0, maximum=60.0, doc="Time between the scans that are recorded; 0 records each."
-    )
-    cloud_parts: int = setting(90, unit="parts", minimum=1, maximum=1000, doc="Parts in which the cloud appears.")
-    height_window_m: float = setting(
-        4.0, unit="m", minimum=0.1, maximum=100.0, doc="Height over the floor that the colours of the cloud span."
-    )
-    point_size_px: float = setting(1.5, unit="px", minimum=0.1, maximum=20.0, doc="Size of a cloud point on screen.")
-
-
-class Thinning:
-    """Which scans go into a recording: of each name one in `interval_s`."""
-
-    def __init__(self, interval_s: float = RecordingSettings().scan_interval_s) -> None:
-        self._interval_ns = round(interval_s * 1e9)
-        self._next_ns: dict[str, int] = {}
-
-    def wants(self, stamp_ns: int, name: str) -> bool:
-        """Return whether a scan of this stamp is due."""
-        return stamp_ns >= self._next_ns.get(name, stamp_ns)
-
-    def take(self, stamp_ns: int, name: str) -> bool:
-        """Return whether a scan of this stamp is due; if so, it is taken for recorded."""
-        due = self.wants(stamp_ns, name)
-        if due:
-            self._next_ns[name] = stamp_ns + self._interval_ns
-        return due
 
 
 class RecordingWriter:
@@ -106,14 +62,12 @@ class RecordingWriter:
         self._start_ns = self._end_ns = start_ns
         self._thinning = Thinning(self._settings.scan_interval_s)
         self._floor: tuple[Stamps, FloatArray] | None = None
-        self._bounds: FloatArray | None = None
-        self._drawn: set[str] = set()
-        self._legend: dict[str, None] = {}  # in the order of the first mention
-        self.curves, self.has_topology = RUN_CURVES, False
-        self.beside_topology: tuple[str, ...] = ()
+        self.layout = ViewerLayout()
         self._scans: deque[tuple[int, FloatArray, str]] = deque()
         loader = ThreadPoolExecutor(max_workers=1, thread_name_prefix="recording")
-        self._opened = loader.submit(_open, path, title, start_ns, live_port)  # loading Rerun takes most of a second
+        self._opened = loader.submit(
+            open_recording, path, title, start_ns, live_port
+        )  # loading Rerun takes most of a second
         loader.shutdown(wait=False)
 
     def __enter__(self) -> Self:
@@ -183,7 +137,7 @@ class RecordingWriter:
 
     def explain(self, drawn: str, meaning: str) -> None:
         """Add a line to the legend, once: what it looks like and what it is."""
-        self._legend.setdefault(f"| {drawn} | {meaning} |")
+        self.layout.explain(drawn, meaning)
 
     def add_motion(self, trajectory: Trajectory, machine: Machine) -> None:
         """Record the final trajectory: the machine moves along it, and the cloud is coloured by height over it."""
@@ -227,7 +181,7 @@ class RecordingWriter:
             return
         stamps = cloud.stamps_ns if cloud.stamps_ns is not None else np.full(len(cloud), self._start_ns)
         order = np.argsort(stamps, kind="stable")
-        colours = self._height_colours(cloud.points_m[:, 2], stamps)
+        colours = height_colours(cloud.points_m[:, 2], stamps, self._floor, self._settings.height_window_m)
         for number, rows in enumerate(np.array_split(order, min(self._settings.cloud_parts, len(order)))):
             self._at(int(stamps[rows[0]]))
             size = self._points_px(self._settings.point_size_px)
@@ -238,7 +192,7 @@ class RecordingWriter:
 
     def add_curve(self, entity: str, stamps_ns: Stamps, values: FloatArray, rgba: int, name: str) -> None:
         """Record a curve over time: stamps (M,), values (M,)."""
-        self._drawn.add(entity)
+        self.layout.draws(entity)
         self._stream.log(entity, self._rr.SeriesLines(colors=rgba, names=name, widths=1.5), static=True)
         self._stream.send_columns(entity, [self._times(stamps_ns)], self._rr.Scalars.columns(scalars=values))
 
@@ -270,11 +224,9 @@ class RecordingWriter:
         if self._failed:
             return
         self._log_scans()
-        if self._legend:
-            words = "\n".join(["| drawn | what it is |", "| --- | --- |", *sorted(self._legend)])
-            self.add_shape("legend", self._rr.TextDocument(words, media_type="text/markdown"))
-        used = tuple(view for view in self.curves if any(self._has(entity) for entity in view[1]))
-        self._lay_out(used, self._end_ns - self._start_ns)
+        if self.layout.legend:
+            self.add_shape("legend", self._rr.TextDocument(self.layout.legend, media_type="text/markdown"))
+        self._stream.send_blueprint(self.layout.blueprint(self.layout.used, self._end_ns - self._start_ns))
         try:
             write_out(self._stream, self._path)
         except InputError:
@@ -283,17 +235,7 @@ class RecordingWriter:
 
     def lay_out(self, duration_s: float) -> None:
         """Lay the viewer out for what is to come, for those who follow while it is written."""
-        self._lay_out(self.curves, round(1e9 * duration_s))
-
-    def _lay_out(self, used: Curves, duration_ns: int) -> None:
-        words, graph = bool(self._legend), self.has_topology
-        beside = self.beside_topology
-        layout = blueprint(self._bounds, duration_ns, used, legend=words, topology=graph, beside=beside)
-        self._stream.send_blueprint(layout)
-
-    def _has(self, pattern: str) -> bool:
-        """Return whether a curve of this entity, or below it (`…/**`), was recorded."""
-        return any(entity.startswith(pattern.removesuffix("**")) for entity in self._drawn)
+        self._stream.send_blueprint(self.layout.blueprint(self.layout.curves, round(1e9 * duration_s)))
 
     def _at(self, stamp_ns: int) -> None:
         self._end_ns = max(self._end_ns, stamp_ns)
@@ -314,37 +256,6 @@ class RecordingWriter:
             boxes = self._rr.Boxes3D(centers=centres, sizes=sizes, colors=0xF0C419FF, fill_mode="solid")
             self._stream.log(entity, boxes, static=True)
 
-    def _height_colours(self, heights_m: Float32Array, stamps_ns: Stamps) -> npt.NDArray[np.uint32]:
-        """Return RGBA of heights (N,) over the floor at the stamps (N,), or over the lowest point."""
-        floor = heights_m.min() if self._floor is None else np.interp(stamps_ns, *self._floor)
-        above = np.asarray(heights_m - floor)
-        share = np.clip(above / self._settings.height_window_m, 0.0, 1.0) if np.ptp(above) > 0.05 else 0.6 + 0.0 * above
-        return _palette()[(255 * share).astype(np.int64)]
-
     def widen(self, points_m: npt.NDArray[np.floating[Any]]) -> None:
         """Widen the bounds that the views are laid out for, so that they hold the points (N, 3) in map."""
-        seen = points_m if self._bounds is None else np.vstack([self._bounds, points_m])
-        self._bounds = np.array([seen.min(axis=0), seen.max(axis=0)], dtype=float)
-
-
-def _open(path: Path, title: str, start_ns: int, live_port: int | None) -> tuple[Any, Any]:
-    """Return the module of Rerun, and a stream into the file; what goes wrong is told by `close`, in our words."""
-    rr = rerun()
-    title = shown(title)
-    stream = rr.RecordingStream(APPLICATION, recording_id=f"{title} {start_ns}")
-    with in_utf8(path) as written:  # it is open from here on
-        if live_port is None:
-            stream.save(written)
-        else:  # never a connection to a viewer: a slow one would hold up the run
-            server = rr.GrpcServerSink(bind_ip=LOOPBACK, port=live_port, server_memory_limit=_LIVE_MEMORY)
-            stream.set_sinks(rr.FileSink(written), server)
-    stream.send_recording_name(title)
-    stream.log("map", rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
-    return rr, stream
-
-
-def _palette() -> npt.NDArray[np.uint32]:
-    """Return 256 colours as 0xRRGGBBAA: viridis without its dark end, which the viewer's ground would swallow."""
-    steps = np.linspace(0, len(_VIRIDIS) - 1, 256)
-    r, g, b = (np.interp(steps, range(len(_VIRIDIS)), _VIRIDIS[:, i]).astype(np.uint32) for i in range(3))
-    return r << 24 | g << 16 | b << 8 | np.uint32(255)
+        self.layout.widen(points_m)

@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from lhdmap.messages import Float32Array, FloatArray
 from lhdmap.report.recording_end import rerun
@@ -37,6 +38,53 @@ REPLAY_GRAPH = ("map/base_link/**", "map/plan/**", "map/path/**")
 """Of a drive on a map: what is seen beside the map."""
 GRAPH = ("+ map/topology/**", "+ map/route/**", "+ map/pile/**")
 LOG_CURVES: Curves = (("Speed, m/s", ("motion/speed/**",)), ("Angles, deg", ("angles/**",)))
+
+
+class ViewerLayout:
+    """What the viewer's layout depends on: what was drawn, how far it reaches, and what it means.
+
+    `curves`: views of curves; `has_topology`: the map's graph has a view of its own, where `beside_topology` is seen, too.
+    """
+
+    def __init__(self) -> None:
+        self.curves, self.has_topology = RUN_CURVES, False
+        self.beside_topology: tuple[str, ...] = ()
+        self._bounds: FloatArray | None = None
+        self._drawn: set[str] = set()
+        self._legend: dict[str, None] = {}  # in the order of the first mention
+
+    def draws(self, entity: str) -> None:
+        """Note that a curve was recorded."""
+        self._drawn.add(entity)
+
+    def explain(self, drawn: str, meaning: str) -> None:
+        """Add a line to the legend, once."""
+        self._legend.setdefault(f"| {drawn} | {meaning} |")
+
+    def widen(self, points_m: npt.NDArray[np.floating[Any]]) -> None:
+        """Widen the bounds so that they hold the points (N, 3) in map."""
+        seen = points_m if self._bounds is None else np.vstack([self._bounds, points_m])
+        self._bounds = np.array([seen.min(axis=0), seen.max(axis=0)], dtype=float)
+
+    @property
+    def legend(self) -> str:
+        """The legend as a table in Markdown; empty where nothing was explained."""
+        if not self._legend:
+            return ""
+        return "\n".join(["| drawn | what it is |", "| --- | --- |", *sorted(self._legend)])
+
+    @property
+    def used(self) -> Curves:
+        """The views that have a curve: of an entity, or of what is below it (`…/**`)."""
+        return tuple(view for view in self.curves if any(self._has(entity) for entity in view[1]))
+
+    def _has(self, pattern: str) -> bool:
+        return any(entity.startswith(pattern.removesuffix("**")) for entity in self._drawn)
+
+    def blueprint(self, curves: Curves, duration_ns: int) -> Any:
+        """Return the layout with some views of curves."""
+        words, graph = bool(self._legend), self.has_topology
+        return blueprint(self._bounds, duration_ns, curves, legend=words, topology=graph, beside=self.beside_topology)
 
 
 def blueprint(

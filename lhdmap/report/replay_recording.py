@@ -15,9 +15,10 @@ import numpy as np
 from lhdmap.machine import Machine
 from lhdmap.messages import FloatArray
 from lhdmap.report.loading_recording import add_load
-from lhdmap.report.recording import PathStyle, RecordingWriter
+from lhdmap.report.recording import RecordingWriter
 from lhdmap.report.recording_end import rerun
 from lhdmap.report.recording_layout import REPLAY_CURVES, REPLAY_GRAPH
+from lhdmap.report.recording_settings import PathStyle
 from lhdmap.report.replay_data import COLUMNS, DriveData, ReplayData
 from lhdmap.report.topology_recording import add_topology, raised
 from lhdmap.topology.model import TopologicalMap
@@ -51,7 +52,7 @@ class ReplayRecording:
 
     def __init__(self, path: Path, title: str, start_ns: int, machine: Machine, live_port: int | None = None) -> None:
         self._writer = RecordingWriter(path, title, start_ns, live_port=live_port)
-        self._writer.curves, self._writer.beside_topology = REPLAY_CURVES, REPLAY_GRAPH
+        self._writer.layout.curves, self._writer.layout.beside_topology = REPLAY_CURVES, REPLAY_GRAPH
         self._machine, self._start_ns, self._live = machine, start_ns, live_port is not None
         self._planned = False
 

@@ -40,7 +40,7 @@ def write_plan_recording(
     """Write a `.rrd` file; `rows` are the sampled trajectories, one after the other."""
     machine = trajectories[0].path.machine
     with RecordingWriter(path, "Rockbreaker", 0) as writer:
-        writer.curves = CURVES
+        writer.layout.curves = CURVES
         add_arm(writer, machine, rows)
         _add_surroundings(writer, machine, scene, obstacles, trajectories[-1].way_m()[-1])
         for number, one in enumerate(trajectories):

@@ -6,7 +6,8 @@ import numpy as np
 
 from lhdmap.machine import Machine
 from lhdmap.report.data import ReportData
-from lhdmap.report.recording import PathStyle, RecordingWriter
+from lhdmap.report.recording import RecordingWriter
+from lhdmap.report.recording_settings import PathStyle
 from lhdmap.report.topology_recording import add_topology
 from lhdmap.trajectory import Trajectory
 

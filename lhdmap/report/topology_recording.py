@@ -49,7 +49,7 @@ def add_topology(writer: RecordingWriter, topology: TopologicalMap, closures: Se
         writer.explain("green arrow with a name", "waypoint, in its heading")
     _add_connections(writer, topology)
     _add_closures(writer, closures)
-    writer.has_topology = writer.has_topology or bool(topology.tunnels)
+    writer.layout.has_topology = writer.layout.has_topology or bool(topology.tunnels)
 
 
 def record_route(writer: RecordingWriter, topology: TopologicalMap, route_states: Sequence[Step]) -> None:
@@ -80,11 +80,11 @@ def write_topology_recording(
 ) -> None:
     """Write a `.rrd` file of a topological map alone, with a route where one is given."""
     with RecordingWriter(path, title, 0) as writer:
-        writer.curves = ()
+        writer.layout.curves = ()
         add_topology(writer, topology)
         if route_states:
             record_route(writer, topology, route_states)
-        writer.has_topology = False  # nothing else is in it: the views of the map show it
+        writer.layout.has_topology = False  # nothing else is in it: the views of the map show it
 
 
 def raised(points_m: FloatArray, by_m: float = _ABOVE_M) -> FloatArray:

@@ -19,7 +19,7 @@ _LENGTH_M, _ANGLE = 1e-6, 1e-6  # what rounding may add
 
 
 @dataclass(frozen=True, slots=True)
-class Verdict:
+class PathVerdict:
     """What the check found: highest load of the five limits (5,), when each was highest (5,), and what is wrong, if anything."""
 
     highest: FloatArray
@@ -37,7 +37,7 @@ class Verdict:
         return float(self.at_s[int(np.argmax(self.highest))])
 
 
-def check(path: Path, law: TimeLaw, *, executable: bool = True, samples: int = SAMPLES) -> Verdict:
+def check(path: Path, law: TimeLaw, *, executable: bool = True, samples: int = SAMPLES) -> PathVerdict:
     """Return the verdict on a timed path; `executable`: must start and end at rest."""
     machine = path.machine
     t = np.linspace(0.0, law.duration_s, samples)
@@ -54,7 +54,7 @@ def check(path: Path, law: TimeLaw, *, executable: bool = True, samples: int = S
     if executable and max(abs(rate[0]), abs(rate[-1])) > 1e-9:
         problems.append("not at rest at its ends")
     highest = loads.max(axis=0)
-    return Verdict(highest, t[np.argmax(loads >= 0.999 * highest, axis=0)], tuple(problems))
+    return PathVerdict(highest, t[np.argmax(loads >= 0.999 * highest, axis=0)], tuple(problems))
 
 
 def _beyond_limits(machine: Rockbreaker, theta: FloatArray, rho: FloatArray) -> list[str]:

@@ -13,7 +13,7 @@ import numpy as np
 
 from lhdmap.machine import Machine
 from lhdmap.messages import Float32Array, FloatArray
-from lhdmap.simulation.surroundings import Rays, View
+from lhdmap.simulation.surroundings import Rays, SurroundingsView
 from lhdmap.simulation.vehicle.bodies import Bodies, Boxes
 from lhdmap.simulation.vehicle.state import VehicleState
 
@@ -70,7 +70,7 @@ class Company:
 class Among:
     """The view of one machine: the mine, and the bodies of the others in it."""
 
-    def __init__(self, world: View, company: Company, name: str) -> None:
+    def __init__(self, world: SurroundingsView, company: Company, name: str) -> None:
         self._world, self._company, self._name = world, company, name
 
     def near(self, position_m: FloatArray) -> Rays:

@@ -20,7 +20,7 @@ from lhdmap.machine import Machine
 from lhdmap.messages import FloatArray, GroundTruth, Record
 from lhdmap.mine.network import Network
 from lhdmap.mine.route import Start, parse_route, start_of
-from lhdmap.mine.routes import Planner
+from lhdmap.mine.routes import RouteFinder
 from lhdmap.mine.topology import Directory, topology_json
 from lhdmap.mine.ways import Leg, legs_of
 from lhdmap.outputs import OutputFiles
@@ -80,6 +80,26 @@ class SimulatedMineDrive:
     contacts: tuple[str, ...]
 
 
+class DriveGauge:
+    """What is measured of a drive: its way, how near the bodies came to walls (1 m: not nearer), and what they touched."""
+
+    def __init__(self, bumper: Bumper, directory: Directory) -> None:
+        self._bumper, self._directory = bumper, directory
+        self.distance_m, self.min_clearance_m = 0.0, 1.0
+        self.contacts: list[str] = []
+
+    def look(self, state: VehicleState) -> None:
+        """Note how near the bodies are to walls, and what they touch."""
+        self.min_clearance_m = self._bumper.clearance_m(state, self.min_clearance_m)
+        if self.min_clearance_m > 0.0:
+            return
+        for touch in self._bumper.touching(state):
+            where = self._directory.at(state.position_m)
+            told = f"{touch.body} in {where.node} at {where.at_m:.0f} m"
+            if told not in self.contacts:
+                self.contacts.append(told)
+
+
 class MineDrive:
     """An operator in a machine in a mine, step by step: `records` yields what the log gets."""
 
@@ -100,9 +120,7 @@ class MineDrive:
         self._operator = Operator(self.legs, machine, settings.operator, seed=settings.seed)
         self._command = self._operator.command(self.state, START_NS)
         self._shaking = Shaking(math.radians(settings.vibration_deg), settings.seed)
-        self._bumper = Bumper(machine, self.world)
-        self.distance_m, self.min_clearance_m = 0.0, 1.0
-        self.contacts: list[str] = []
+        self.gauge = DriveGauge(Bumper(machine, self.world), self.directory)
 
     @property
     def expected_s(self) -> float:
@@ -156,20 +174,9 @@ class MineDrive:
         if step % _COMMAND_STEPS == 0:
             self._command = self._operator.command(self.state, self.state.time_ns)
         self.state = self._vehicle.step(self.state, self._command, STEP_NS / SECOND_NS)
-        self.distance_m += abs(self.state.speed_mps) * STEP_NS / SECOND_NS
+        self.gauge.distance_m += abs(self.state.speed_mps) * STEP_NS / SECOND_NS
         if step % _LOOK_STEPS == 0:
-            self._look(self.state)
-
-    def _look(self, state: VehicleState) -> None:
-        """Note how near the bodies are to walls, and what they touch."""
-        self.min_clearance_m = self._bumper.clearance_m(state, self.min_clearance_m)
-        if self.min_clearance_m > 0.0:
-            return
-        for touch in self._bumper.touching(state):
-            where = self.directory.at(state.position_m)
-            told = f"{touch.body} in {where.node} at {where.at_m:.0f} m"
-            if told not in self.contacts:
-                self.contacts.append(told)
+            self.gauge.look(self.state)
 
 
 def planned(
@@ -182,7 +189,7 @@ def planned(
     Raises:
         UsageError: the route is not in the plan, there is no way, or none to drive.
     """
-    planner = Planner(network, machine)
+    planner = RouteFinder(network, machine)
     runs = planner.route(start, parse_route(route, network.plan)) if route else planner.teaching(start)
     way_m = sum(abs(run.to_m - run.from_m) for run in runs)
     pose = network.tubes[start.tube].pose(start.at_m, start.facing)
@@ -238,8 +245,8 @@ def simulate_mine(
         write_tum(files.at(truth_file), truth)
     duration_s = (drive.state.time_ns - START_NS) / SECOND_NS
     return SimulatedMineDrive(
-        path, truth_file, topology_file, nodes_file, len(truth.stamps_ns), messages, duration_s, drive.distance_m,
-        drive.min_clearance_m, tuple(drive.contacts),
+        path, truth_file, topology_file, nodes_file, len(truth.stamps_ns), messages, duration_s, drive.gauge.distance_m,
+        drive.gauge.min_clearance_m, tuple(drive.gauge.contacts),
     )  # fmt: skip
 
 

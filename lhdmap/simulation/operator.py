@@ -10,6 +10,7 @@ import math
 from collections import deque
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple, Self
 
 import numpy as np
 
@@ -56,6 +57,23 @@ def wander_of(settings: OperatorSettings, way_m: float, seed: int) -> FloatArray
     return np.stack([at, field.grid(at, np.zeros(1))[:, 0]], axis=1)
 
 
+class _Driven(NamedTuple):
+    """What the operator knows of the machine: joint to both axles, top speed, rate of the joint, lag of the drive."""
+
+    front_m: float
+    rear_m: float
+    top_mps: float
+    rate_rps: float
+    lag_s: float
+
+    @classmethod
+    def of(cls, machine: Machine) -> Self:
+        size = machine.dimensions
+        top_mps, rate_rps = size.max_speed_kmh / 3.6, math.radians(size.max_articulation_rate_dps)
+        axles_m = size.joint_to_front_axle_m, size.joint_to_rear_axle_m
+        return cls(*axles_m, top_mps, rate_rps, machine.drive.lag_s)
+
+
 class Operator:
     """Drives legs one after the other; `command` is asked at a fixed period."""
 
@@ -68,13 +86,10 @@ class Operator:
         seed: int = 0,
         period_s: float = 0.05,
     ) -> None:
-        self._legs, self._machine, self._settings, self._period_s = legs, machine, settings, period_s
-        size = machine.dimensions
-        self._front_m, self._rear_m = size.joint_to_front_axle_m, size.joint_to_rear_axle_m
-        self._top_mps, self._rate_rps = size.max_speed_kmh / 3.6, math.radians(size.max_articulation_rate_dps)
-        self._delay_s = machine.drive.dead_time_s + period_s
-        self._lag_s = machine.drive.lag_s
-        self._given: deque[float] = deque([0.0] * max(round(self._delay_s / period_s), 1))
+        self._legs, self._settings, self._period_s = legs, settings, period_s
+        self._machine = _Driven.of(machine)
+        delay_s = machine.drive.dead_time_s + period_s
+        self._given: deque[float] = deque([0.0] * max(round(delay_s / period_s), 1))  # what has not taken effect yet
         rng = np.random.default_rng([seed, 78])
         self._phase = rng.uniform(0.0, 2 * np.pi, 2)
         self._speeds = [self._profile(leg) for leg in legs]
@@ -113,7 +128,7 @@ class Operator:
             self._resting_since_ns = now_ns
             return _halt(now_ns)
         wanted = self._wanted_mps(leg, speed, remaining_m)
-        propel = leg.gear * wanted / self._top_mps
+        propel = leg.gear * wanted / self._machine.top_mps
         return Command(now_ns, propel, leg.gear * self._steer(leg, lead, speed), 0.0, 0.0, False, remaining_m < 0.03)
 
     def _ahead(self, leg: Leg, state: VehicleState) -> tuple[tuple[float, float, float, float], float]:
@@ -121,9 +136,12 @@ class Operator:
         c, s = math.cos(state.yaw_rad), math.sin(state.yaw_rad)
         bend, speed, sign = state.articulation_rad, abs(state.speed_mps), float(leg.gear)
         x, y, heading = state.x_m, state.y_m, state.yaw_rad
-        lead_m, trail_m = self._front_m, self._rear_m
+        lead_m, trail_m = self._machine.front_m, self._machine.rear_m
         if leg.gear < 0:
-            back, left = -self._front_m - self._rear_m * math.cos(bend), self._rear_m * math.sin(bend)
+            back, left = (
+                -self._machine.front_m - self._machine.rear_m * math.cos(bend),
+                self._machine.rear_m * math.sin(bend),
+            )
             x, y, heading = x + c * back - s * left, y + s * back + c * left, state.yaw_rad - bend + math.pi
             bend, lead_m, trail_m = -bend, trail_m, lead_m
         for rate in self._given:
@@ -139,22 +157,26 @@ class Operator:
         x, y, heading, bend = lead
         ahead = min(self._at + round(0.1 * speed / STEP_M), len(leg.x_m) - 1)
         off_m, turned = _errors(leg, self._at, x, y, heading)
-        back = max(self._at - round((self._front_m + self._rear_m) / STEP_M), 0)
+        back = max(self._at - round((self._machine.front_m + self._machine.rear_m) / STEP_M), 0)
         tx, ty = self._trailing(leg, lead)
         trail_off_m, _ = _errors(leg, back, tx, ty, heading)
         off_m = (1.0 - _TRAIL_SHARE) * off_m + _TRAIL_SHARE * trail_off_m if back > 0 else off_m
         look_m = _LOOK_AHEAD_M + _LOOK_AHEAD_S * speed
         curvature = -off_m / look_m**2 - 1.6 * turned / look_m
-        wanted = leg.articulation_rad[ahead] + (self._front_m + self._rear_m) * curvature
+        wanted = leg.articulation_rad[ahead] + (self._machine.front_m + self._machine.rear_m) * curvature
         following = min(ahead + 4, len(leg.x_m) - 1)
         slope = (leg.articulation_rad[following] - leg.articulation_rad[ahead]) / (STEP_M * max(following - ahead, 1))
         rate = slope * speed + _JOINT_GAIN_PS * (wanted - bend)
-        return float(np.clip(rate, -self._rate_rps, self._rate_rps))
+        return float(np.clip(rate, -self._machine.rate_rps, self._machine.rate_rps))
 
     def _trailing(self, leg: Leg, lead: tuple[float, float, float, float]) -> tuple[float, float]:
         """Return x, y of the trailing axle."""
         x, y, heading, bend = lead
-        lead_m, trail_m = (self._front_m, self._rear_m) if leg.gear > 0 else (self._rear_m, self._front_m)
+        lead_m, trail_m = (
+            (self._machine.front_m, self._machine.rear_m)
+            if leg.gear > 0
+            else (self._machine.rear_m, self._machine.front_m)
+        )
         back = heading - bend
         return (
             x - lead_m * math.cos(heading) - trail_m * math.cos(back),
@@ -169,11 +191,11 @@ class Operator:
 
     def _wanted_mps(self, leg: Leg, speed: float, remaining_m: float) -> float:
         """Return the speed to ask for: that of the way where the drive will have followed, less near the end."""
-        ahead = min(self._at + round(self._lag_s * speed / STEP_M), len(leg.x_m) - 1)
+        ahead = min(self._at + round(self._machine.lag_s * speed / STEP_M), len(leg.x_m) - 1)
         way = STEP_M * self._at
         wave = math.sin(2 * math.pi * way / 31.0 + self._phase[0]) + math.sin(2 * math.pi * way / 11.0 + self._phase[1])
         wanted = float(self._speeds[self.leg][ahead]) * (1.0 + self._settings.speed_variation * wave)
-        left_m = max(remaining_m - 0.8 * self._lag_s * speed, 0.0)
+        left_m = max(remaining_m - 0.8 * self._machine.lag_s * speed, 0.0)
         wanted = min(wanted, math.sqrt(2.0 * self._settings.braking_mps2 * left_m))
         return max(wanted, _CREEP_MPS) if remaining_m > 0.03 else 0.0
 
@@ -189,9 +211,9 @@ class Operator:
         """Return the speed (m/s) at each sample of a leg."""
         settings = self._settings
         slope = np.abs(np.gradient(leg.articulation_rad, STEP_M)) if len(leg.x_m) > 2 else np.zeros(len(leg.x_m))
-        speed = np.full(len(leg.x_m), min(settings.speed_kmh / 3.6, self._top_mps))
+        speed = np.full(len(leg.x_m), min(settings.speed_kmh / 3.6, self._machine.top_mps))
         speed = np.minimum(speed, np.sqrt(settings.lateral_mps2 / np.maximum(np.abs(leg.curvature_pm), 1e-6)))
-        speed = np.minimum(speed, settings.joint_share * self._rate_rps / np.maximum(slope, 1e-6))
+        speed = np.minimum(speed, settings.joint_share * self._machine.rate_rps / np.maximum(slope, 1e-6))
         speed = np.maximum(speed, 3.0 * _CREEP_MPS)
         speed[-1] = 0.0
         gain = 2.0 * settings.braking_mps2 * STEP_M

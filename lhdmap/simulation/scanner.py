@@ -13,7 +13,7 @@ from lhdmap.messages import Float32Array, FloatArray
 from lhdmap.simulation.history import History
 from lhdmap.simulation.ray_kernel import fill_rays
 from lhdmap.simulation.sensing.sections import ScannerSettings
-from lhdmap.simulation.surroundings import View
+from lhdmap.simulation.surroundings import SurroundingsView
 
 _PERSON_M = 1.2  # how near a person stands
 _EDGE_M, _EDGE_OVER_NEIGHBOURS = (
@@ -97,7 +97,7 @@ def rays_of(
     return rays, blocked
 
 
-def exact_ranges(history: History, world: View, stamp_ns: int, sweep: Sweep, rig: Rig) -> Float32Array:
+def exact_ranges(history: History, world: SurroundingsView, stamp_ns: int, sweep: Sweep, rig: Rig) -> Float32Array:
     """Return exact ranges (N,), metres, inf for none, of the sweep that begins at a stamp."""
     surface = world.near(history.state(stamp_ns)[:3])
     rays, blocked = rays_of(history, stamp_ns, sweep, rig, surface.origin_m)

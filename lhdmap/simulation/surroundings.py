@@ -32,7 +32,7 @@ class Ground(Protocol):
         ...
 
 
-class View(Protocol):
+class SurroundingsView(Protocol):
     """What scanners look at."""
 
     def near(self, position_m: FloatArray) -> Rays:
@@ -44,5 +44,5 @@ class View(Protocol):
         ...
 
 
-class Surroundings(Ground, View, Protocol):
+class Surroundings(Ground, SurroundingsView, Protocol):
     """A world to drive and look around in."""

@@ -21,7 +21,7 @@ from lhdmap.messages import FloatArray
 from lhdmap.smoothing.height_pairs import Joint, wall_lines
 from lhdmap.smoothing.moves import Moves
 from lhdmap.smoothing.settings import SmoothingSettings
-from lhdmap.smoothing.window import Node, Offset, Window, solved
+from lhdmap.smoothing.window import Offset, Window, WindowNode, solved
 
 _SOLVE_SHARE = 0.3  # of the lag between two solutions
 _REST_SHARE = 0.2  # of the lag in time between nodes at rest
@@ -45,6 +45,20 @@ class AlignedScan(NamedTuple):
     weak: bool
 
 
+class _Way:
+    """How far the odometry has gone; `weak`: whether a scan since the newest node was."""
+
+    def __init__(self) -> None:
+        self.travelled_m, self.weak = 0.0, False
+        self._last: FloatArray | None = None
+
+    def go_on(self, scan: AlignedScan) -> None:
+        if self._last is not None:
+            self.travelled_m += math.hypot(scan.pose[0] - self._last[0], scan.pose[1] - self._last[1])
+        self._last = scan.pose
+        self.weak |= scan.weak
+
+
 class Realigner:
     """`update` with each processed scan; `moves` holds time and `T_map_odom` (3,) of the nodes that are final.
 
@@ -54,26 +68,22 @@ class Realigner:
     def __init__(self, settings: SmoothingSettings, joint_x_m: float = 0.0) -> None:
         self._settings = settings
         self._joint, self._offset = Joint(joint_x_m, 0.0), Offset()
-        self._nodes: deque[Node] = deque()  # final ones that others are tied to, then those that are still moved
+        self._nodes: deque[WindowNode] = deque()  # final ones that others are tied to, then those that are still moved
         self._poses: deque[FloatArray] = deque()
         self._final = self._paired = 0  # so many of the nodes are final, have been compared with the others
         self._worker = ThreadPoolExecutor(max_workers=1, thread_name_prefix="realign")
         self._pending: Future[Window] | None = None
-        self._weak = False
-        self._travelled_m = self._solved_m = 0.0
-        self._last: FloatArray | None = None
+        self._way = _Way()
+        self._solved_m = 0.0
         self.moves = Moves()
 
     def update(self, scan: AlignedScan) -> None:
         """Take a processed scan, in time order."""
-        if self._last is not None:
-            self._travelled_m += math.hypot(scan.pose[0] - self._last[0], scan.pose[1] - self._last[1])
-        self._last = scan.pose
-        self._weak |= scan.weak
+        self._way.go_on(scan)
         if self._due(scan.time_ns):
             self._append(scan)
         late = self._nodes[min(self._final, len(self._nodes) - 1)].time_ns < scan.time_ns - self._settings.lag_s * 1e9
-        if late or self._travelled_m - self._solved_m >= _SOLVE_SHARE * self._settings.lag_m:
+        if late or self._way.travelled_m - self._solved_m >= _SOLVE_SHARE * self._settings.lag_m:
             # A solution is asked for when the next is due, never when it happens to be ready: the result must not depend on it.
             self._collect()
             self._settle(scan.time_ns)
@@ -93,33 +103,33 @@ class Realigner:
         if not self._nodes:
             return True
         last, settings = self._nodes[-1], self._settings
-        far = self._travelled_m - last.travelled_m >= settings.node_m
+        far = self._way.travelled_m - last.travelled_m >= settings.node_m
         return far or time_ns - last.time_ns >= _REST_SHARE * settings.lag_s * 1e9
 
     def _append(self, scan: AlignedScan) -> None:
         """Add a node, placed by the odometry's step from the one before."""
-        travelled_m = self._travelled_m
+        travelled_m = self._way.travelled_m
         if self._nodes:
             before = self._nodes[-1]
             pose = se2.compose(self._poses[-1], se2.between(before.pose, scan.pose))
             length_m = max(travelled_m - before.travelled_m, _SHORTEST_M)
         else:
             pose, length_m = scan.pose, _SHORTEST_M
-        sigmas = _WALK * math.sqrt(length_m) * (_WEAK if self._weak else 1.0)
+        sigmas = _WALK * math.sqrt(length_m) * (_WEAK if self._way.weak else 1.0)
         front, rear = _thinned(scan.front), _thinned(scan.rear)
         hits = np.concatenate([rear, front[::_FRONT_STEP]])
         serial = self._nodes[-1].serial + 1 if self._nodes else 0
         lines, pose_odom = wall_lines(front), scan.pose.copy()
-        self._nodes.append(Node(serial, scan.time_ns, travelled_m, pose_odom, sigmas, lines, hits, len(rear), []))
+        self._nodes.append(WindowNode(serial, scan.time_ns, travelled_m, pose_odom, sigmas, lines, hits, len(rear), []))
         self._poses.append(pose)
-        self._weak = False
+        self._way.weak = False
 
     def _settle(self, now_ns: int) -> None:
         """Make final what lies behind by the lag, in travel or in time."""
         settings = self._settings
         while self._final < len(self._nodes):
             node = self._nodes[self._final]
-            far = self._travelled_m - node.travelled_m > settings.lag_m
+            far = self._way.travelled_m - node.travelled_m > settings.lag_m
             if not far and now_ns - node.time_ns <= settings.lag_s * 1e9:
                 return
             self._make_final()
@@ -139,7 +149,7 @@ class Realigner:
 
     def _solve(self) -> None:
         """Give the worker what there is: it solves while the drive goes on."""
-        self._solved_m = self._travelled_m
+        self._solved_m = self._way.travelled_m
         first = max(self._final, 1)  # the first pose of all stays
         if first < len(self._nodes):
             window = Window(list(self._nodes), np.array(self._poses), self._joint, first, self._paired, self._offset)

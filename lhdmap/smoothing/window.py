@@ -31,7 +31,7 @@ class Seen(NamedTuple):
     line: Indices
 
 
-class Node(NamedTuple):
+class WindowNode(NamedTuple):
     """A scan that is aligned, `serial` counts all; `lines` of its front hits and `hits`, rear ones first, are in its own frame."""
 
     serial: int
@@ -74,7 +74,7 @@ class Window(NamedTuple):
     `offset`: what is known of the joint's encoder.
     """
 
-    nodes: Sequence[Node]
+    nodes: Sequence[WindowNode]
     poses: FloatArray
     joint: Joint
     first: int
@@ -122,7 +122,7 @@ def _pair(window: Window, lines: FloatArray, owners: Indices, starts: Indices) -
         node.seen.append(Seen(node.hits[mine], mine < node.behind, nodes[0].serial + partner, wall - starts[partner]))
 
 
-def _pairs_of(nodes: Sequence[Node], first: int, starts: Indices) -> Pairs:
+def _pairs_of(nodes: Sequence[WindowNode], first: int, starts: Indices) -> Pairs:
     """Return the pairs of the nodes from `first` on whose partner is still there; `starts` (K,): of each node's lines."""
     seen = [(row, one) for row, node in enumerate(nodes[first:], first) for one in node.seen]
     hits = np.concatenate([np.zeros((0, 3)), *(one.hits for _, one in seen)])

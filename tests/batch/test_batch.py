@@ -11,7 +11,7 @@ import pyarrow.parquet as pq
 import pytest
 from lhdmap.batch.pool import run_here
 from lhdmap.batch.run import BatchRequest, BatchResult, run_batch
-from lhdmap.batch.work import Job
+from lhdmap.batch.work import BatchJob
 from lhdmap.errors import UsageError
 
 from tests.batch.works import work
@@ -120,7 +120,7 @@ def test_one_worker_gives_the_same(tmp_path: Path) -> None:
 
 def test_a_process_that_dies_between_two_rows_costs_none(tmp_path: Path) -> None:
     """Of two workers one dies a moment after its row, while the other one is at work."""
-    jobs = [Job(name, ("pile", str(tmp_path / name))) for name in ("late", "slow", "slow_2", "good")]
+    jobs = [BatchJob(name, ("pile", str(tmp_path / name))) for name in ("late", "slow", "slow_2", "good")]
     runs = {ran.key: ran for ran in run_here(jobs, work, 2)}
     assert all(ran.outcome is not None for ran in runs.values())
     assert len(runs) == 4

@@ -6,16 +6,16 @@ from collections.abc import Iterator, Sequence
 
 import pytest
 from lhdmap.batch.cluster import run_on_cluster
-from lhdmap.batch.work import Job, Outcome
+from lhdmap.batch.work import BatchJob, JobOutcome
 from lhdmap.errors import InputError
 
 distributed = pytest.importorskip("distributed")
 
 
-def _work(words: Sequence[str]) -> Outcome:
+def _work(words: Sequence[str]) -> JobOutcome:
     if words[0] == "raise":
         raise ValueError("odd")
-    return Outcome(int(words[0]), {"asked": words[0]})
+    return JobOutcome(int(words[0]), {"asked": words[0]})
 
 
 @pytest.fixture
@@ -27,7 +27,7 @@ def address() -> Iterator[str]:
 
 
 def test_each_row_ends_once(address: str) -> None:
-    jobs = [Job(name, (word,)) for name, word in (("a", "0"), ("b", "3"), ("c", "raise"), ("d", "0"))]
+    jobs = [BatchJob(name, (word,)) for name, word in (("a", "0"), ("b", "3"), ("c", "raise"), ("d", "0"))]
     runs = {ran.key: ran for ran in run_on_cluster(jobs, _work, address, lambda _: None)}
     assert sorted(runs) == ["a", "b", "c", "d"]
     codes = {key: None if ran.outcome is None else ran.outcome.exit_code for key, ran in runs.items()}
@@ -43,4 +43,4 @@ def test_without_workers_it_gives_up() -> None:
         ) as cluster,
         pytest.raises(InputError, match="no workers"),
     ):
-        list(run_on_cluster([Job("a", ("0",))], _work, cluster.scheduler_address, told.append, patience_s=1.0))
+        list(run_on_cluster([BatchJob("a", ("0",))], _work, cluster.scheduler_address, told.append, patience_s=1.0))

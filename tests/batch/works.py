@@ -11,12 +11,12 @@ import time
 from collections.abc import Sequence
 from pathlib import Path
 
-from lhdmap.batch.work import Outcome
+from lhdmap.batch.work import JobOutcome
 
 MADE = {"kind": "pile", "software": {"name": "lhdmap", "version": "0"}}
 
 
-def work(words: Sequence[str]) -> Outcome:
+def work(words: Sequence[str]) -> JobOutcome:
     """Do what the log's name says: die always, die once, raise, fail, or write a folder; each try leaves a mark beside the log."""
     log = Path(words[1])
     with log.with_suffix(".tries").open("a") as file:
@@ -35,7 +35,9 @@ def work(words: Sequence[str]) -> Outcome:
     if log.stem.startswith("raises"):
         raise ValueError("odd")
     if log.stem.startswith("fails"):
-        return Outcome(3, {"error": {"kind": "input", "message": "not a log", "exit_code": 3}}, "lhdmap: not a log\n")
+        return JobOutcome(
+            3, {"error": {"kind": "input", "message": "not a log", "exit_code": 3}}, "lhdmap: not a log\n"
+        )
     if "-o" in words:
         if "--force" in words:
             shutil.rmtree(partial.with_suffix(""))
@@ -43,4 +45,4 @@ def work(words: Sequence[str]) -> Outcome:
         sources = [{"path": str(log), "bytes": log.stat().st_size}]
         (partial.with_suffix("") / "run.json").write_text(json.dumps({**MADE, "sources": sources}))
         (partial.with_suffix("") / "report.html").touch()
-    return Outcome(0, {"width_m": 3.5, "status": "loadable", "boulders": []})
+    return JobOutcome(0, {"width_m": 3.5, "status": "loadable", "boulders": []})

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 from lhdmap.cli.completion_scripts import bash, fish, zsh
-from lhdmap.cli.completion_tree import Node, all_nodes
+from lhdmap.cli.completion_tree import CompletionNode, all_nodes
 from lhdmap.cli.main import COMMANDS, main
 from lhdmap.config import setting_names
 
@@ -35,7 +35,7 @@ OFFERS = [
 
 
 @pytest.fixture(scope="module")
-def nodes() -> list[Node]:
+def nodes() -> list[CompletionNode]:
     return all_nodes()
 
 
@@ -67,11 +67,11 @@ printf '%s\\n' "${COMPREPLY[@]}"
 
 
 @pytest.mark.parametrize(("words", "wanted"), OFFERS, ids=" ".join)
-def test_bash_offers(words: list[str], wanted: list[str], nodes: list[Node], folder: Path) -> None:
+def test_bash_offers(words: list[str], wanted: list[str], nodes: list[CompletionNode], folder: Path) -> None:
     assert sorted(offered("bash", bash(nodes), BASH, folder, words)) == sorted(wanted)
 
 
-def test_bash_offers_behind_an_equals_sign(nodes: list[Node], folder: Path) -> None:
+def test_bash_offers_behind_an_equals_sign(nodes: list[CompletionNode], folder: Path) -> None:
     """Bash parts words at `=`."""
     assert offered("bash", bash(nodes), BASH, folder, ["build-map", "--output", "=", "su"]) == ["sub"]
     assert len(offered("bash", bash(nodes), BASH, folder, ["build-map", "--output", "="])) == 3
@@ -79,7 +79,7 @@ def test_bash_offers_behind_an_equals_sign(nodes: list[Node], folder: Path) -> N
 
 @pytest.mark.skipif(shutil.which("fish") is None, reason="fish is not installed")
 @pytest.mark.parametrize(("words", "wanted"), OFFERS, ids=" ".join)
-def test_fish_offers(words: list[str], wanted: list[str], nodes: list[Node], folder: Path) -> None:
+def test_fish_offers(words: list[str], wanted: list[str], nodes: list[CompletionNode], folder: Path) -> None:
     line = " ".join(["lhdmap", *words])
     found = offered("fish", fish(nodes), f"source ./script; complete -C '{line}'", folder, [])
     assert sorted(one.split("\t")[0].rstrip("/") for one in found) == sorted(wanted)
@@ -100,13 +100,13 @@ _lhdmap
 
 @pytest.mark.skipif(shutil.which("zsh") is None, reason="zsh is not installed")
 @pytest.mark.parametrize(("words", "wanted"), OFFERS, ids=" ".join)
-def test_zsh_offers(words: list[str], wanted: list[str], nodes: list[Node], folder: Path) -> None:
+def test_zsh_offers(words: list[str], wanted: list[str], nodes: list[CompletionNode], folder: Path) -> None:
     """With stand-ins for the functions of its completion system, which only run at a terminal."""
     assert sorted(offered("zsh", zsh(nodes), ZSH, folder, words)) == sorted(wanted)
 
 
 @pytest.mark.parametrize("write", [bash, zsh, fish])
-def test_all_commands_and_settings_are_in_the_scripts(write: object, nodes: list[Node]) -> None:
+def test_all_commands_and_settings_are_in_the_scripts(write: object, nodes: list[CompletionNode]) -> None:
     assert callable(write)
     script = write(nodes)
     assert {node.path for node in nodes} >= {*COMMANDS, "eval/trajectory", "rockbreaker/plan"}

@@ -156,10 +156,10 @@ def test_a_loaded_machine_is_braked_for_earlier() -> None:
     rig = started()
     rig.control.loaded(drive_model(Machine(), 11_000.0))
     rig.run(0.1)
-    loaded = rig.control.swept
+    loaded = rig.control.watch.swept
     rig.control.loaded(drive_model(Machine()))
     rig.run(0.1)
-    empty = rig.control.swept
+    empty = rig.control.watch.swept
     assert loaded is not None
     assert empty is not None
     assert loaded.stop_m > 1.1 * empty.stop_m

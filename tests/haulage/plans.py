@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from lhdmap.machine import Machine
 from lhdmap.messages import FloatArray
-from lhdmap.mine.network import make_network
+from lhdmap.mine.make_network import make_network
 from lhdmap.mine.plan import MinePlan, find_plan, load_plan
 from lhdmap.mine.topology import topology_json
 from lhdmap.topology.model import (

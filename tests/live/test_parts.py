@@ -13,7 +13,7 @@ from lhdmap.live.latency import Latency
 from lhdmap.live.link import Link
 from lhdmap.live.recorder import LiveRecorder
 from lhdmap.live.source import Announced, LinkLost, LiveMessage, Sink
-from lhdmap.live.tally import Tally
+from lhdmap.live.tally import MessageTally
 from lhdmap.logs.formats import open_log
 
 from tests.live.peers import messages_of
@@ -39,7 +39,7 @@ def test_quantiles_are_right_to_two_percent() -> None:
 
 
 def test_gaps_of_regular_topics_are_counted_and_pauses_of_others_are_not() -> None:
-    tally = Tally()
+    tally = MessageTally()
     at_ms = [20 * k for k in range(100)] + [3000 + 20 * k for k in range(100)]
     found = [tally.count("/scan", ms * MS, 10) for ms in at_ms]
     assert [gap for gap in found if gap is not None] == [pytest.approx(1.02)]
@@ -84,7 +84,7 @@ def test_a_log_that_was_never_closed_can_be_read(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("most", [(5, 1 << 20), (1000, 60)])
 def test_a_full_queue_drops_the_oldest_and_counts_it(tmp_path: Path, most: tuple[int, int]) -> None:
-    inbox = Inbox(LiveRecorder(tmp_path / "a.mcap"), Tally(), waits=False, most=most)
+    inbox = Inbox(LiveRecorder(tmp_path / "a.mcap"), MessageTally(), waits=False, most=most)
     for k in range(20):
         inbox.put(text("/a", k))
     kept = len(inbox)
@@ -98,7 +98,7 @@ def test_a_full_queue_drops_the_oldest_and_counts_it(tmp_path: Path, most: tuple
 
 
 def test_a_source_that_can_wait_is_held_up_and_nothing_is_dropped(tmp_path: Path) -> None:
-    inbox = Inbox(LiveRecorder(tmp_path / "a.mcap"), Tally(), waits=True, most=(5, 1 << 20))
+    inbox = Inbox(LiveRecorder(tmp_path / "a.mcap"), MessageTally(), waits=True, most=(5, 1 << 20))
 
     def send() -> None:
         for k in range(50):
@@ -129,7 +129,7 @@ class _Shaky:
 
 
 def test_a_lost_link_is_made_again_after_growing_waits(tmp_path: Path) -> None:
-    inbox, source = Inbox(LiveRecorder(tmp_path / "a.mcap"), Tally(), waits=False), _Shaky()
+    inbox, source = Inbox(LiveRecorder(tmp_path / "a.mcap"), MessageTally(), waits=False), _Shaky()
     link = Link(source, inbox)
     link.start()
     while not inbox.over:
@@ -149,7 +149,7 @@ class _Faulty:
 
 
 def test_what_ends_a_source_is_raised_where_its_messages_are_read(tmp_path: Path) -> None:
-    inbox = Inbox(LiveRecorder(tmp_path / "a.mcap"), Tally(), waits=False)
+    inbox = Inbox(LiveRecorder(tmp_path / "a.mcap"), MessageTally(), waits=False)
     link = Link(_Faulty(), inbox)
     link.start()
     with pytest.raises(ValueError, match="a fault"):

@@ -89,7 +89,7 @@ def test_a_start_is_found_and_nothing_wrong_said_before(put_down: Ran) -> None:
 
 def test_the_first_fix_is_told_by_time_and_way(put_down: Ran) -> None:
     first = next(k for k, row in enumerate(put_down.rows) if row.status == TRACKING)
-    fix = put_down.localizer.first_fix
+    fix = put_down.localizer.facts.first_fix
     assert fix is not None
     assert fix[0] == pytest.approx(first / RATE_HZ)
     way = float(np.hypot(*np.diff(put_down.poses[: first + 1, :2], axis=0).T).sum())
@@ -111,7 +111,7 @@ def test_one_that_is_carried_off_is_lost_and_says_so(carried_off: Ran) -> None:
     lost = next(k for k, row in enumerate(carried_off.rows) if row.status == LOST)
     assert lost > jump
     assert float(np.hypot(*np.diff(carried_off.poses[jump : lost + 1, :2], axis=0).T).sum()) < 4.0
-    assert carried_off.localizer.lost_stretches == 1
+    assert carried_off.localizer.facts.lost_stretches == 1
     assert {row.status for row in carried_off.rows[:jump]} == {TRACKING}
     assert all(row.status != TRACKING or k < lost for k, row in enumerate(carried_off.rows[: lost + 50]))
 

@@ -95,7 +95,9 @@ def test_a_packed_log_that_is_cut_gives_what_comes_before(tmp_path: Path, room: 
     assert list(room.iterdir()) == []
 
 
-@pytest.mark.parametrize("content", [b"", b"neither", gzip.compress(b"some text\n", mtime=0), gzip.compress(b"", mtime=0)])
+@pytest.mark.parametrize(
+    "content", [b"", b"neither", gzip.compress(b"some text\n", mtime=0), gzip.compress(b"", mtime=0)]
+)
 def test_what_is_no_packed_log(tmp_path: Path, room: Path, content: bytes) -> None:
     path = tmp_path / "log.mcap.gz"
     path.write_bytes(content)

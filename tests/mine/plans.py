@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from lhdmap.mine.network import Network, make_network
+from lhdmap.mine.make_network import make_network
+from lhdmap.mine.network import Network
 from lhdmap.mine.plan import MinePlan
 from lhdmap.settings_tree import tree_from
 

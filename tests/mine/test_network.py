@@ -123,7 +123,7 @@ def test_wrong_places_are_refused(values: dict[str, Any], told: str) -> None:
 
 @pytest.mark.parametrize(("name", "intersections", "length_m"), [("ring", 2, (600, 800)), ("level", 12, (600, 1000))])
 def test_the_plans_that_ship(name: str, intersections: int, length_m: tuple[float, float]) -> None:
-    from lhdmap.mine.network import make_network
+    from lhdmap.mine.make_network import make_network
 
     network = make_network(load_plan(find_plan(name)))
     assert sum(node.degree > 2 for node in network.nodes) == intersections

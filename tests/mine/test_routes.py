@@ -8,10 +8,11 @@ import numpy as np
 import pytest
 from lhdmap.errors import UsageError
 from lhdmap.machine import Machine
-from lhdmap.mine.network import Network, make_network
+from lhdmap.mine.make_network import make_network
+from lhdmap.mine.network import Network
 from lhdmap.mine.plan import find_plan, load_plan
 from lhdmap.mine.route import Start, parse_route, start_of
-from lhdmap.mine.routes import Planner
+from lhdmap.mine.routes import RouteFinder
 from lhdmap.mine.runs import Run
 from lhdmap.mine.ways import STEP_M, Leg, legs_of
 
@@ -27,7 +28,7 @@ def tee() -> Network:
 
 def runs_of(network: Network, route: str, start: str | None = None) -> list[Run]:
     stops = parse_route(route, network.plan)
-    return Planner(network, MACHINE).route(start_of(network, MACHINE, start), stops)
+    return RouteFinder(network, MACHINE).route(start_of(network, MACHINE, start), stops)
 
 
 def gears(network: Network, runs: list[Run]) -> list[int]:
@@ -88,7 +89,7 @@ def test_a_corner_that_is_not_cut_cannot_be_driven() -> None:
 @pytest.mark.parametrize("name", ["ring", "level"])
 def test_a_teaching_drive_goes_through_every_edge(name: str) -> None:
     network = make_network(load_plan(find_plan(name)))
-    runs = Planner(network, MACHINE).teaching(start_of(network, MACHINE, None))
+    runs = RouteFinder(network, MACHINE).teaching(start_of(network, MACHINE, None))
     legs = legs_of(network, runs, MACHINE)
     places = np.concatenate([np.stack([leg.x_m, leg.y_m], axis=1) for leg in legs])
     for edge in network.edges:
@@ -111,6 +112,6 @@ def _largest_step_m(leg: Leg) -> float:
 
 
 def test_a_start_within_a_drift_is_kept(tee: Network) -> None:
-    planner = Planner(tee, MACHINE)
+    planner = RouteFinder(tee, MACHINE)
     runs = planner.route(Start(tee.tube("A"), 20.0, -1), parse_route("-A", tee.plan))
     assert runs[0].from_m == pytest.approx(23.4)  # in reverse the rear axle leads

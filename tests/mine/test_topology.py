@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 from lhdmap.machine import Machine
-from lhdmap.mine.network import make_network
+from lhdmap.mine.make_network import make_network
 from lhdmap.mine.plan import find_plan, load_plan
 from lhdmap.mine.topology import Directory, topology_json
 

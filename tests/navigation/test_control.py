@@ -75,7 +75,7 @@ def test_what_has_come_into_the_way_is_waited_for() -> None:
     rod = Rod(at(6.0, 0.0, 0.0), ladder())
     rod.go("t1.end", "t1.start")
     rod.stops = lambda there: there[0] > 20.0
-    rod.control.sight_m = 1.0
+    rod.control.allowed.sight_m = 1.0
     rod.run(8.0 + rod.settings.wait_s - 3.0)
     assert rod.states.count(BACKING) == 0
     rod.stops = lambda _: False
@@ -86,14 +86,14 @@ def test_what_has_come_into_the_way_is_waited_for() -> None:
 def test_a_narrow_pass_in_sight_is_not_waited_for() -> None:
     rod = Rod(at(6.0, 0.0, 0.0), ladder(), stops=lambda there: there[0] > 20.0)
     rod.go("t1.end", "t1.start")
-    rod.control.sight_m = 20.0
+    rod.control.allowed.sight_m = 20.0
     assert rod.run(8.0 + rod.settings.stuck_s + 1.0, until=BACKING) == BACKING
 
 
 def test_a_machine_that_may_not_move_is_not_stuck() -> None:
     rod = Rod(at(6.0, 0.0, 0.0), ladder(), stops=lambda _: True)
     rod.go("t1.end", "t1.start")
-    rod.control.may_move = False
+    rod.control.allowed.may_move = False
     assert rod.run(60.0) == DRIVING
 
 

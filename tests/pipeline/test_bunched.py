@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from lhdmap.config import Settings
 from lhdmap.messages import LaserScan, WheelPose
-from lhdmap.pipeline.mapping import MappingPipeline
+from lhdmap.pipeline.mapping import MappingOptions, MappingPipeline
 
 PERIOD_S, SCANS, WAY_M = 0.2, 400, 0.05
 LEARNING_SCANS = 60  # until the stamps are known for what they are
@@ -32,7 +32,7 @@ def blind(stamp_ns: int) -> LaserScan:
 
 @pytest.mark.parametrize("turn_rad", [0.0, 0.01])
 def test_bunches_and_gaps_lose_nothing_of_the_wheels_way(turn_rad: float) -> None:
-    pipeline = MappingPipeline(Settings(), cloud=False)
+    pipeline = MappingPipeline(Settings(), None, MappingOptions(cloud=False))
     x = y = heading = 0.0
     for k in range(SCANS):
         stamp_ns = round(1e9 * (100.0 + delivered_s(k)))

@@ -79,7 +79,7 @@ def test_the_pipeline_grows_with_the_map_alone() -> None:
     scans = (scan for _, scan in there_and_back(24))
     with MappingPipeline(Settings()) as pipeline:
         growth = bytes_a_turn(lambda _: pipeline.update("front", next(scans)), 12 * 150)
-        keys = pipeline.smoother.keys.keys
+        keys = pipeline.evidence.smoother.keys.keys
         assert len(keys) < 0.5 * keys[-1].travelled_m
     assert growth < 600.0  # a scan of 191 beams alone has 764 bytes
 

@@ -13,7 +13,7 @@ from lhdmap.logs.source import LogSource
 from lhdmap.logs.writer import LogWriter
 from lhdmap.machine import Machine
 from lhdmap.messages import Inclination, Joints, LaserScan, Mount, PointCloud
-from lhdmap.pipeline.mapping import MappingPipeline
+from lhdmap.pipeline.mapping import MappingOptions, MappingPipeline
 from lhdmap.pipeline.mounts import SensorMounts, level_sensor, machine_of
 
 T_BASE_MAST = se3.from_rpy(0.0, 0.0, 0.3, (1.0, 0.2, 0.5))
@@ -81,7 +81,7 @@ def test_level_frame_has_the_attitude_and_no_heading() -> None:
 @pytest.mark.parametrize("first", [True, False])
 def test_the_inclinometer_s_mount_may_come_after_its_first_messages(first: bool) -> None:
     """Its rotation was then ignored for the whole drive, without a word."""
-    pipeline = MappingPipeline(Settings(), cloud=False)
+    pipeline = MappingPipeline(Settings(), None, MappingOptions(cloud=False))
     backwards = Mount(0, "base_link", "imu", se3.from_rpy(0.0, 0.0, math.pi))
     if first:
         pipeline.update("tf_static", backwards)
@@ -89,7 +89,7 @@ def test_the_inclinometer_s_mount_may_come_after_its_first_messages(first: bool)
         pipeline.update("inclinometer", Inclination(k * 10_000_000, "imu", 0.02, 0.05, None, None))
         if not first and k == 5:
             pipeline.update("tf_static", backwards)
-    assert pipeline.front_end.attitude.roll_pitch_at(10**9) == pytest.approx((-0.02, -0.05), abs=1e-9)
+    assert pipeline.front_end.inclinometer.attitude.roll_pitch_at(10**9) == pytest.approx((-0.02, -0.05), abs=1e-9)
 
 
 @pytest.mark.parametrize(("joint", "is_loader"), [("articulation", True), ("wheel_left_joint", False)])
@@ -114,14 +114,14 @@ def test_a_scanner_on_the_rear_body_is_known_as_such() -> None:
 
 def test_a_mount_that_comes_during_the_drive_of_a_3d_scanner_leaves_the_attitude() -> None:
     """`/tf_static` is often published again: the filter began anew with the first messages, and the slope was gone."""
-    pipeline = MappingPipeline(Settings(), cloud=False, primary="points")
+    pipeline = MappingPipeline(Settings(), None, MappingOptions("points", cloud=False))
     walls = np.random.default_rng(0).uniform(-10.0, 10.0, (3000, 3)).astype(np.float32)
     walls[:, 1] = np.sign(walls[:, 1]) * 2.0
     for k in range(400):
         pipeline.update("inclinometer", Inclination(k * 10_000_000, "imu", 0.0, 0.001 * k, None, None))
         if k % 10 == 0:
             pipeline.update("points", PointCloud(k * 10_000_000, "lidar", walls, np.empty(0, np.float32)))
-    before = pipeline.front_end.attitude.roll_pitch_at(3_500_000_000)
+    before = pipeline.front_end.inclinometer.attitude.roll_pitch_at(3_500_000_000)
     pipeline.update("tf_static", Mount(0, "base_link", "other", np.eye(4)))
-    assert pipeline.front_end.attitude.roll_pitch_at(3_500_000_001) == pytest.approx(before, abs=1e-6)
+    assert pipeline.front_end.inclinometer.attitude.roll_pitch_at(3_500_000_001) == pytest.approx(before, abs=1e-6)
     assert before[1] == pytest.approx(0.35, abs=0.02)

@@ -12,7 +12,7 @@ from lhdmap.logs.source import LogSource
 from lhdmap.machine import Machine
 from lhdmap.messages import Mount, Tachometer
 from lhdmap.pipeline.front_end import FrontEnd
-from lhdmap.pipeline.mapping import MappingPipeline
+from lhdmap.pipeline.mapping import MappingOptions, MappingPipeline
 from lhdmap.pipeline.pose_now import Newest, PoseNow, pose_now
 from lhdmap.pipeline.track import FinalTrack, Track
 from lhdmap.simulation.drive import SimulatedDrive
@@ -22,7 +22,7 @@ SECOND = 10**9
 
 def _asked(drive: SimulatedDrive, roles: list[str]) -> tuple[list[PoseNow], FinalTrack]:
     """Ask with each message for the pose of its time; return the answers and the path that was known in the end."""
-    pipeline, found = MappingPipeline(Settings(), Machine(), cloud=False), []
+    pipeline, found = MappingPipeline(Settings(), Machine(), MappingOptions(cloud=False)), []
     with LogSource([drive.log]) as source, pipeline:
         for role, message in source.messages(roles):
             pipeline.update(role, message)

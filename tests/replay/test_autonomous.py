@@ -37,8 +37,8 @@ def states(events: list[Event], process: str) -> list[str]:
 def once(taught: Path) -> tuple[float, list[Event]]:
     run, events = drive(tram(taught), taught)
     assert run.monitor.tally.reason == "arrived"
-    assert run.monitor.tally.min_clearance_m is not None
-    return run.monitor.tally.min_clearance_m, events
+    assert run.monitor.tally.touched.clearance_m is not None
+    return run.monitor.tally.touched.clearance_m, events
 
 
 def test_it_arrives_with_room_on_both_sides(once: tuple[float, list[Event]]) -> None:
@@ -50,7 +50,7 @@ def test_it_arrives_with_room_on_both_sides(once: tuple[float, list[Event]]) -> 
 
 def test_truth_is_not_needed_and_the_journal_is_the_same(taught: Path, once: tuple[float, list[Event]]) -> None:
     run, events = drive(tram(taught), taught, for_s=FOR_S, withhold_truth=True)
-    assert run.monitor.tally.distance_m == 0.0
+    assert run.monitor.tally.drive.distance_m == 0.0
     until_ns = START_NS + round(FOR_S * 1e9)
     seen, withheld = (
         [one for one in each if one.process not in WATCH and one.t_ns < until_ns] for each in (once[1], events)
@@ -78,10 +78,10 @@ def test_a_person_is_waited_for_a_frozen_scanner_stops_it_and_modes_change_as_th
     ]
     run, events = drive(tram(taught, start="T1", fault=faults, mode=modes, rearm_s=2.0), taught, for_s=80.0)
     assert run.monitor.tally.reason == "arrived"
-    assert run.monitor.tally.min_clearance_m is not None
-    assert run.monitor.tally.min_clearance_m > 0.1
+    assert run.monitor.tally.touched.clearance_m is not None
+    assert run.monitor.tally.touched.clearance_m > 0.1
     assert "backing" not in states(events, "navigation")
-    assert run.monitor.tally.assists == 0
+    assert run.monitor.tally.mission.assists == 0
     stops = [cause for _, after, cause in told(events, "executor", "watchdog: armed") if after == "disarmed"]
     assert len(stops) == 1
     assert "scan_front" in stops[0] or "disagree" in stops[0]
@@ -101,7 +101,7 @@ def _speeds_after(events: list[Event], from_s: float) -> list[float]:
 def test_without_arming_nothing_moves(taught: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(Station, "_arming", lambda self, now_ns, health, wanted: _silent(now_ns))
     run, events = drive(tram(taught), taught, for_s=6.0)
-    assert run.monitor.tally.distance_m < 0.01
+    assert run.monitor.tally.drive.distance_m < 0.01
     assert "driving" not in states(events, "executor")
 
 
@@ -113,8 +113,8 @@ def _silent(now_ns: int) -> Word:
 def test_runs_that_failed_once_do_not_again(taught: Path, path: Path) -> None:
     run, _ = drive(load_scenario(path, map=str(taught / "short.map")), taught)
     assert run.monitor.tally.reason == "arrived"
-    assert run.monitor.tally.min_clearance_m is not None
-    assert run.monitor.tally.min_clearance_m > 0.08
+    assert run.monitor.tally.touched.clearance_m is not None
+    assert run.monitor.tally.touched.clearance_m > 0.08
 
 
 def test_names_that_the_map_lacks_are_refused(taught: Path) -> None:

@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 from lhdmap.errors import ConfigError, UsageError
-from lhdmap.mine.network import make_network
+from lhdmap.mine.make_network import make_network
 from lhdmap.mine.plan import find_plan, load_plan
 from lhdmap.replay.bus import Bus
 from lhdmap.replay.crew_parts import errands_of, parks_of

@@ -106,7 +106,7 @@ def test_without_commands_the_machine_brakes_on_its_own() -> None:
     assert plant[2][2] == "no command"
     followed = run.faults.all[0].told()["followed"]
     assert ("plant", "braking") in [(one["process"], one["to"]) for one in followed]
-    assert run.monitor.tally.stops == 1
+    assert run.monitor.tally.drive.stops == 1
 
 
 def test_an_obstacle_stands_where_it_should_and_goes() -> None:

@@ -54,7 +54,7 @@ def once() -> tuple[Run, list[Event], LoadFilm]:
 def test_the_bucket_is_filled_and_weighed_without_a_contact(once: tuple[Run, list[Event], LoadFilm]) -> None:
     run, events, film = once
     assert run.monitor.tally.reason == "done"
-    assert run.monitor.tally.contact_count == 0
+    assert run.monitor.tally.touched.count == 0
     verdict = run.monitor.verdict()
     assert verdict["fill_true"] > 0.6
     assert verdict["fill"] == pytest.approx(verdict["fill_true"], abs=4.0 * 0.035)  # four deviations of the weighing
@@ -69,7 +69,7 @@ def test_the_bucket_is_filled_and_weighed_without_a_contact(once: tuple[Run, lis
 def test_truth_is_not_needed_and_the_journal_is_the_same(once: tuple[Run, list[Event], LoadFilm]) -> None:
     for_s = 20.0
     run, events, _ = drive(scenario(), for_s, withhold_truth=True)
-    assert run.monitor.tally.distance_m == 0.0
+    assert run.monitor.tally.drive.distance_m == 0.0
     until_ns = START_NS + round(for_s * 1e9)
     seen, withheld = (
         [one for one in each if one.process not in WATCH and one.t_ns < until_ns] for each in (once[1], events)

@@ -70,8 +70,8 @@ def test_the_pile_is_found_while_it_rolls_and_nothing_is_touched(drive: tuple[Ru
     found = next(one for one in events if one.process == "loading" and one.before == State.IDENTIFICATION)
     speed_mps = np.interp((found.t_ns - START_NS) * 1e-9, rows[:, 0], rows[:, COLUMNS.index("speed_mps")])
     assert speed_mps > 0.5
-    assert run.monitor.tally.contacts == []
-    assert run.monitor.tally.distance_m > 40.0
+    assert run.monitor.tally.touched.contacts == []
+    assert run.monitor.tally.drive.distance_m > 40.0
 
 
 def test_the_truth_is_where_the_pile_is(drive: tuple[Run, list[Event], FloatArray]) -> None:

@@ -98,7 +98,7 @@ def test_a_drive_arrives_and_one_beside_the_goal_does_not() -> None:
     whole = parts(Straight(20.0), scans=False)
     run, events = go(scenario(), whole)
     assert (run.monitor.tally.ok, run.monitor.tally.reason) == (True, "arrived")
-    assert run.monitor.tally.distance_m == pytest.approx(20.0, abs=0.3)
+    assert run.monitor.tally.drive.distance_m == pytest.approx(20.0, abs=0.3)
     states = [(one.process, one.after) for one in events if one.event == "state"]
     assert ("operator", "forward") in states
     assert states[-1] == ("monitor", "ended")
@@ -113,4 +113,4 @@ def test_a_contact_ends_the_run() -> None:
     assert not tally.ok
     assert tally.reason.startswith("contact: front_frame at")
     assert [one.cause for one in events if one.event == "contact"] == ["front_frame"]
-    assert tally.contacts[0]["speed_kmh"] == pytest.approx(7.2, abs=0.1)
+    assert tally.touched.contacts[0]["speed_kmh"] == pytest.approx(7.2, abs=0.1)

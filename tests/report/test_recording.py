@@ -13,8 +13,9 @@ from lhdmap.integration.cloud import GridCloud
 from lhdmap.machine import Machine
 from lhdmap.messages import Joints, LaserScan, Mount, Tachometer
 from lhdmap.report.log_recording import LogRecorder
-from lhdmap.report.recording import RecordingSettings, RecordingWriter
+from lhdmap.report.recording import RecordingWriter
 from lhdmap.report.recording_layout import ASPECT, FIELD_OF_VIEW_RAD, PLAN_ASPECT, eye_of, whole_of
+from lhdmap.report.recording_settings import RecordingSettings
 from lhdmap.report.run_recording import record_run
 
 from tests.report.synthetic import START_NS, drive, report_data

@@ -70,7 +70,7 @@ def test_an_empty_topology_is_no_topology(tmp_path: Path) -> None:
     data = replace(report_data(scans=300, points=100), topology=TopologicalMap())
     with RecordingWriter(tmp_path / "r.rrd", "drive", START_NS) as writer:
         record_run(writer, data, Machine())
-        assert not writer.has_topology
+        assert not writer.layout.has_topology
     assert not [name for name in read(tmp_path / "r.rrd") if name.startswith("map/topology")]
 
 

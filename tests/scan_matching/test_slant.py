@@ -15,7 +15,7 @@ from lhdmap.geometry.se3 import from_rpy
 from lhdmap.logs.source import LogSource
 from lhdmap.messages import FloatArray
 from lhdmap.pipeline.inputs import ROLES_READ
-from lhdmap.pipeline.mapping import MappingPipeline, feed
+from lhdmap.pipeline.mapping import MappingOptions, MappingPipeline, feed
 from lhdmap.pipeline.track import resample
 from lhdmap.scan_matching.slant import rise_of, slants
 from lhdmap.simulation.drive import simulate_drift
@@ -81,7 +81,9 @@ def longer_pct(seed: int, folder: Path) -> float:
         scanner=ScannerSettings(beams=381, rate_hz=25.0),
     )
     drive = simulate_drift(scenario, folder / f"{seed}.mcap")
-    pipeline = MappingPipeline(replace(Settings(), pile=replace(Settings().pile, method="off")), cloud=False)
+    pipeline = MappingPipeline(
+        replace(Settings(), pile=replace(Settings().pile, method="off")), None, MappingOptions(cloud=False)
+    )
     with LogSource([drive.log]) as source:
         roles = [role for role in ROLES_READ if role in source.roles and role not in ("rear", "tachometer", "joints")]
         feed(pipeline, source.messages(roles))

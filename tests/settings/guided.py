@@ -153,7 +153,7 @@ def trips(settings: Settings) -> list[Any]:
     barred_way = []
     for sight_m in (1.0, 5.0):
         waits = Trip(settings, loaded=False, goal="DP1", held_m=9.0)
-        waits.control.sight_m = sight_m
+        waits.control.allowed.sight_m = sight_m
         waits.go(60.0)
         barred_way.append(waits.said)
     slipping = Trip(settings, loaded=False, goal="DP1")

@@ -29,14 +29,18 @@ from lhdmap.movement.check import topology_findings
 from lhdmap.movement.route import route_json
 from lhdmap.movement.routes import RouteOptions, route
 from lhdmap.odometry.cloud.steps import CloudStep
+from lhdmap.odometry.planar import PlanarOdometry
 from lhdmap.odometry.steps import OdometryStep
 from lhdmap.pile.stage import ScanHits
 from lhdmap.pipeline.heading import gyro_correction
 from lhdmap.pipeline.inspection import Inspection
 from lhdmap.pipeline.localize import Localizer
-from lhdmap.pipeline.mapping import MappingPipeline
+from lhdmap.pipeline.mapping import MappingOptions, MappingPipeline
 from lhdmap.pipeline.pile import PileWatch, PlacedScan
+from lhdmap.pipeline.step_recorder import StepRecorder
 from lhdmap.pipeline.track import TrackRows
+from lhdmap.proprioception.slip import SlipSettings
+from lhdmap.proprioception.wheels import WheelOdometry
 from lhdmap.rockbreaker.machine import Rockbreaker
 from lhdmap.simulation.grizzly import simulate_grizzly
 from lhdmap.smoothing.trust import expected_error
@@ -82,21 +86,24 @@ def _feed(into: Any, part: Any) -> None:
         into.update(repr(part).encode())
 
 
-class _Watched(MappingPipeline):
-    """The pipeline, with the covariances that a program on the machine gets with each step."""
+class _Watched(StepRecorder):
+    """A recorder with the covariances that a program on the machine gets with each step."""
 
-    def __init__(self, settings: Settings, primary: Literal["front", "points"], machine: Machine | None) -> None:
-        super().__init__(settings, machine, primary=primary)
+    def __init__(self, wheels: WheelOdometry, settings: SlipSettings) -> None:
+        super().__init__(wheels, settings)
         self.covariances: list[FloatArray] = []
 
-    def _record(self, stamp_ns: int, time_ns: int, step: OdometryStep | CloudStep) -> None:
+    def record(
+        self, stamp_ns: int, time_ns: int, step: OdometryStep | CloudStep, odometry: PlanarOdometry | None
+    ) -> None:
         self.covariances.append(step.covariance)
-        super()._record(stamp_ns, time_ns, step)
+        super().record(stamp_ns, time_ns, step, odometry)
 
 
 def run(settings: Settings, stream: Stream, primary: Literal["front", "points"] = "front", *, own: bool = False) -> str:
     """Return the digest of a map: paths, diagnostics, curves, cloud, warnings; `own`: hits on the machine's bodies occur."""
-    pipeline = _Watched(settings, primary, Machine() if own else None)
+    pipeline = MappingPipeline(settings, Machine() if own else None, MappingOptions(primary))
+    pipeline._steps = watched = _Watched(pipeline.front_end.wheels, settings.slip)
     for role, message in stream:
         pipeline.update(role, message)
     pipeline.finish()
@@ -109,8 +116,8 @@ def run(settings: Settings, stream: Stream, primary: Literal["front", "points"] 
         records.speed(),
         records.tachometer(),
         records.articulation(),
-        pipeline.covariances,
-        expected_error(pipeline.smoother.keys, pipeline.front_end.attitude.height_std_m(10.0)),
+        watched.covariances,
+        expected_error(pipeline.evidence.smoother.keys, pipeline.front_end.inclinometer.attitude.height_std_m(10.0)),
         pipeline.sweeps.cloud(),
         pipeline.warnings,
         pipeline.sweeps.warnings,
@@ -123,8 +130,10 @@ def turning(settings: Settings) -> str:
     for k, message in enumerate(streams.turning()):
         pipeline.front_end.update("inclinometer", message)
         late_ns = message.stamp_ns - 200_000_000
-        if k % 5 == 0 and late_ns > 0 and pipeline.front_end.gyro.there:
-            pipeline.turns.append(late_ns, pipeline.front_end.gyro.turned_at(np.array([late_ns]))[0])
+        if k % 5 == 0 and late_ns > 0 and pipeline.front_end.inclinometer.gyro.there:
+            pipeline.evidence.turns.append(
+                late_ns, pipeline.front_end.inclinometer.gyro.turned_at(np.array([late_ns]))[0]
+            )
     t = np.arange(0.5, 119.0, 0.1)
     heading = 0.4 * (1.0 - np.cos(0.5 * t)) + 1e-3 * np.cumsum(np.random.default_rng(9).standard_normal(len(t)))
     x, y = 0.3 * np.cumsum(np.cos(heading)), 0.3 * np.cumsum(np.sin(heading))
@@ -135,7 +144,7 @@ def turning(settings: Settings) -> str:
 
 def lap(settings: Settings) -> str:
     """Return the digest of the smoother's corrections after a lap and a quarter around a pillar, scans each half metre."""
-    stage = MappingPipeline(settings).smoother
+    stage = MappingPipeline(settings).evidence.smoother
     for key in streams.lap_scans():
         stage.keys.update(key.time_ns, key.pose, key.points.astype(np.float64), key.error)
     return digest(stage.correction())
@@ -260,7 +269,7 @@ def localized(settings: Settings, *, way_m: float, jump_m: float = 0.0, known_st
     localizer.finish()
     rows = [row._replace(latency_ms=0.0) for row in localizer.rows]
     searches = [(one.stamp_ns, one.purpose) for one in localizer.searches]
-    return digest(rows, localizer.withheld, localizer.lost_stretches, localizer.first_fix, searches)
+    return digest(rows, localizer.facts.withheld, localizer.facts.lost_stretches, localizer.facts.first_fix, searches)
 
 
 def driven(settings: Settings) -> str:

@@ -15,7 +15,8 @@ from lhdmap.errors import LhdmapWarning, UsageError
 from lhdmap.logs.source import LogSource
 from lhdmap.machine import Machine
 from lhdmap.messages import GroundTruth, LaserScan, Message, Tachometer, Text
-from lhdmap.mine.network import Network, make_network
+from lhdmap.mine.make_network import make_network
+from lhdmap.mine.network import Network
 from lhdmap.mine.plan import find_plan, load_plan
 from lhdmap.simulation.history import Column
 from lhdmap.simulation.mine_drive import MineDrive, MineDriveSettings, SimulatedMineDrive, simulate_mine
@@ -121,8 +122,8 @@ def test_the_operator_touches_nothing(name: str, route: str, start: str, speed_k
     settings = MineDriveSettings(route=route, start=start, operator=OperatorSettings(speed_kmh=speed_kmh))
     drive = MineDrive(make_network(load_plan(find_plan(name))), MACHINE, settings)
     drive.drive()
-    assert drive.contacts == []
-    assert drive.min_clearance_m > 0.09
+    assert drive.gauge.contacts == []
+    assert drive.gauge.min_clearance_m > 0.09
 
 
 def test_wandering_is_as_wide_as_asked(network: Network) -> None:

@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 from lhdmap.machine import Machine
-from lhdmap.mine.network import make_network
+from lhdmap.mine.make_network import make_network
 from lhdmap.mine.plan import DriftPlan, MinePlan, WallPlan
 from lhdmap.simulation.mine_drive import MineDriveSettings, simulate_mine
 from lhdmap.simulation.operator import OperatorSettings

@@ -56,9 +56,9 @@ def driven(log: Path, changes: dict[str, Any] | None = None) -> Driven:
         np.array([one.stamp_ns for one in truth], dtype=np.int64),
         np.column_stack([np.array([one.position_m for one in truth]), rpy]),
     )
-    keys = [key._replace(points=key.points[:0]) for key in pipeline.smoother.keys.keys]
+    keys = [key._replace(points=key.points[:0]) for key in pipeline.evidence.smoother.keys.keys]
     times = odometry.times_ns
-    return Driven(odometry, pipeline.path.final.rows(), resample(true, times), keys, pipeline.turns.at(times))
+    return Driven(odometry, pipeline.path.final.rows(), resample(true, times), keys, pipeline.evidence.turns.at(times))
 
 
 def kept(seed: int, folder: Path, length_m: float) -> Driven:

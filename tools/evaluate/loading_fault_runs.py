@@ -105,7 +105,7 @@ def _came(live: Live, fault: FaultSettings, later: Sequence[Event]) -> dict[str,
     states = [one for one in later if one.process == "loading" and one.event == "state"]
     missed, worst = stops_missed(rows[rows[:, 0] >= fault.at_s], later, live.model)
     missed += _stale(fault, rows, live.events) + _too_long(live)
-    missed += [f"contact: {one['body']}" for one in tally.contacts]
+    missed += [f"contact: {one['body']}" for one in tally.touched.contacts]
     return {
         "stopped_after_s": stopped_s,
         "why": why,
@@ -114,7 +114,7 @@ def _came(live: Live, fault: FaultSettings, later: Sequence[Event]) -> dict[str,
         "ways": [one.after for one in states],
         "ended": tally.reason if tally.ended else "under way",
         "worst_stop": round(worst, 2),
-        "clearance_m": round(float(tally.min_clearance_m or 0.0), 3),
+        "clearance_m": round(float(tally.touched.clearance_m or 0.0), 3),
         "missed": missed,
     }
 

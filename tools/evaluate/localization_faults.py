@@ -18,7 +18,7 @@ from lhdmap.logs.source import LogSource
 from lhdmap.machine import Machine
 from lhdmap.mapfolder import MapFolder
 from lhdmap.messages import FloatArray, Joints, LaserScan, Message, Tachometer
-from lhdmap.mine.network import make_network
+from lhdmap.mine.make_network import make_network
 from lhdmap.mine.plan import load_plan
 from lhdmap.pipeline.build import BuildRequest, build_map
 from lhdmap.pipeline.inputs import ROLES_READ
@@ -287,7 +287,7 @@ def row(fault: Fault, known: KnownMap, messages: Messages, drive: Any, truth: Ma
         f"{1e3 * math.sqrt(float((off[tracks] ** 2).mean())):.0f}, {1e3 * off[tracks].max():.0f} mm",
         f"{np.abs(np.degrees(error[tracks, 2])).max():.2f}°",
         f"{100 * inside[:, 0].mean():.0f} / {100 * inside[:, 1].mean():.0f} %",
-        str(localizer.lost_stretches),
+        str(localizer.facts.lost_stretches),
         str(int(silent.sum())),
         _again(fault, stamps, drive, tracks & (off < _RIGHT_M)),
     )

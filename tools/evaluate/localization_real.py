@@ -85,8 +85,8 @@ def row(log: Log, data: Path, folder: Path) -> str:
         f"{100 * log.teaches:.0f} %",
         str(len(rows)),
         f"{tracked:.0f} % (lost {lost:.0f} %)",
-        str(localizer.lost_stretches),
-        str(localizer.withheld),
+        str(localizer.facts.lost_stretches),
+        str(localizer.facts.withheld),
         f"{np.quantile(supports, 0.05):.2f} / {np.median(supports):.2f}" if supports else "",
         *_agreement(MapFolder.open(made).trajectory(), rows, read_relations(data / log.relations)),
     )

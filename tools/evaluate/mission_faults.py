@@ -82,7 +82,7 @@ def run(scenario: Scenario, folder: Path) -> Outcome:
     stops, _ = drives.stops_missed(rows, events, drive_model(parts.machine, parts.machine.drive.payload_kg))
     missed = [one for one in stops if "before it was armed" in one]
     missed += drives.stale_missed(scenario.faults, rows, events)
-    missed += [f"contact: {found.reason}"] if found.contacts else []
+    missed += [f"contact: {found.reason}"] if found.touched.contacts else []
     missed += _lost(events, np.array(ore.loads))
     wanted = sum(one.buckets for one in scenario.mission)
     duration_s = (run.engine.now_ns - START_NS) / SECOND_NS
@@ -93,8 +93,8 @@ def run(scenario: Scenario, folder: Path) -> Outcome:
     if abs(sum(told["time_by_phase_s"].values()) - duration_s) > 1e-6:
         missed.append(f"phases sum up to {sum(phases.values()):.1f} s of {duration_s:.1f} s")
     count = len(drives.told_at(events, "watchdog: armed", "disarmed"))
-    clear_m = float(found.min_clearance_m or 0.0)
-    return Outcome(found.reason, missed, clear_m, told["cycles"], count, found.assists, round(duration_s, 1), phases)
+    clear_m = float(found.touched.clearance_m or 0.0)
+    return Outcome(found.reason, missed, clear_m, told["cycles"], count, found.mission.assists, round(duration_s, 1), phases)
 
 
 def _lost(events: Sequence[Event], loads: FloatArray) -> list[str]:

@@ -20,7 +20,7 @@ from lhdmap.config import Settings
 from lhdmap.geometry import se2
 from lhdmap.machine import Machine
 from lhdmap.messages import FloatArray
-from lhdmap.mine.network import make_network
+from lhdmap.mine.make_network import make_network
 from lhdmap.mine.plan import load_plan
 from lhdmap.replay.assemble import parts_of
 from lhdmap.replay.parts import Parts
@@ -104,7 +104,7 @@ def measured(plan: Path) -> float:
         make_network(load_plan(plan)), Machine(), MineDriveSettings(operator=OperatorSettings(speed_kmh=_SLOW_KMH))
     )
     drive.drive()
-    return drive.min_clearance_m
+    return drive.gauge.min_clearance_m
 
 
 def as_mapped(parts: Parts, scenario: Scenario, folder: Path) -> Parts:

@@ -18,7 +18,7 @@ from lhdmap.geometry import se3
 from lhdmap.logs.source import LogSource
 from lhdmap.machine import Machine
 from lhdmap.messages import FloatArray
-from lhdmap.pipeline.mapping import MappingPipeline
+from lhdmap.pipeline.mapping import MappingOptions, MappingPipeline
 from lhdmap.pipeline.pose_now import PoseNow
 from lhdmap.pipeline.track import FinalTrack, TrackRows
 from lhdmap.simulation.drive import simulate_drift
@@ -51,7 +51,7 @@ class Asked(NamedTuple):
 
 def answers(log: Path, *, wheels: bool) -> tuple[list[Asked], TrackRows]:
     """Drive through a log and ask at each new pose; return the answers, and the path that was known in the end."""
-    pipeline, asked, newest_ns = MappingPipeline(Settings(), Machine(), cloud=False), [], 0
+    pipeline, asked, newest_ns = MappingPipeline(Settings(), Machine(), MappingOptions(cloud=False)), [], 0
     roles = ["front", "inclinometer", "tf_static", *(["joints", "tachometer"] if wheels else [])]
     with LogSource([log]) as source, pipeline:
         for role, message in source.messages(roles):

@@ -109,8 +109,8 @@ def _came(live: Live) -> dict[str, Any]:
         "ended": ended or "still under way",
         "why": last[-1].cause if last else "",
         "seconds": round(at_s, 1),
-        "contacts": tally.contact_count,
-        "room_m": round(float(tally.min_clearance_m or 0.0), 3),
+        "contacts": tally.touched.count,
+        "room_m": round(float(tally.touched.clearance_m or 0.0), 3),
         "stops": stops,
     }
 

@@ -127,9 +127,9 @@ def run(scenario: Scenario, folder: Path) -> Outcome:
     model = drive_model(parts.machine, 1000.0 * scenario.load)
     missed, worst = stops_missed(rows, events, model)
     missed += stale_missed(scenario.faults, rows, events)
-    missed += [f"contact: {tally.reason}"] if tally.contacts else []
+    missed += [f"contact: {tally.reason}"] if tally.touched.contacts else []
     stops = sum(1 for _ in told_at(events, "watchdog: armed", "disarmed"))
-    return Outcome(tally.reason, missed, float(tally.min_clearance_m or 0.0), worst, stops, tally.assists)
+    return Outcome(tally.reason, missed, float(tally.touched.clearance_m or 0.0), worst, stops, tally.mission.assists)
 
 
 def told_at(events: Sequence[Event], event: str, after: str) -> list[float]:

@@ -18,7 +18,7 @@ from lhdmap.geometry import se3
 from lhdmap.logs.source import LogSource
 from lhdmap.machine import Machine
 from lhdmap.messages import GroundTruth, LaserScan, Message, PointCloud
-from lhdmap.mine.network import make_network
+from lhdmap.mine.make_network import make_network
 from lhdmap.mine.plan import MinePlan, find_plan, load_plan
 from lhdmap.mine.topology import topology_json
 from lhdmap.pipeline.driven import ways_of

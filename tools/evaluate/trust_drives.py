@@ -16,7 +16,7 @@ from lhdmap.messages import FloatArray
 from lhdmap.odometry.planar import PlanarOdometry
 from lhdmap.odometry.steps import OdometryStep
 from lhdmap.pipeline.inputs import ROLES_READ
-from lhdmap.pipeline.mapping import MappingPipeline, feed
+from lhdmap.pipeline.mapping import MappingOptions, MappingPipeline, feed
 from lhdmap.pipeline.track import TrackRows, resample
 from lhdmap.simulation.drive import simulate_drift
 from lhdmap.simulation.planar import PlanarScanner, drift_world, drive_along, simulate_scans
@@ -120,13 +120,15 @@ def _scenario(walls: str, seed: int) -> DriftScenario:
 
 
 def _mapped(log: Path, truth: TrackRows, sensors: Sensors) -> Driven:
-    pipeline = MappingPipeline(Settings(), Machine(), cloud=sensors.rear)
+    pipeline = MappingPipeline(Settings(), Machine(), MappingOptions(cloud=sensors.rear))
     with LogSource([log]) as source:
         feed(pipeline, source.messages([role for role in sensors.roles if role in source.roles]))
     rows = pipeline.path.final.rows()
     true = resample(truth, rows.times_ns).poses
-    height_std_m = pipeline.front_end.attitude.height_std_m(_SPACE_M) if pipeline.has_inclinometer else None
-    expected = expected_error(pipeline.smoother.keys, height_std_m)
+    height_std_m = (
+        pipeline.front_end.inclinometer.attitude.height_std_m(_SPACE_M) if pipeline.has_inclinometer else None
+    )
+    expected = expected_error(pipeline.evidence.smoother.keys, height_std_m)
     assert expected is not None
     flat, flat_true = rows.poses[:, [0, 1, 5]], true[:, [0, 1, 5]]
     risen_m = float((rows.poses[-1, 2] - rows.poses[0, 2]) - (true[-1, 2] - true[0, 2]))

@@ -46,6 +46,14 @@ _TELLS_NS = 200 * MILLISECOND_NS
 _GUARD_RANGE_M = 20.0
 
 
+class _Guidance:
+    """What guidance and navigation last wanted: a stop, help (empty: none), a gear."""
+
+    def __init__(self) -> None:
+        self.wanted = Stop.GO
+        self.asks, self.gear = "", 1
+
+
 class Execute(Process):
     """A command each 20 ms. `models`: of the empty and the loaded machine, where a mission says which it is."""
 
@@ -64,8 +72,7 @@ class Execute(Process):
         self._models, self._loaded = models, False
         self.control, self._machine, self._mode, self._scribe = control, machine, mode, scribe
         self._feed = MotionFeed()
-        self._wanted = Stop.GO
-        self._asks, self._gear = "", 1
+        self._guidance = _Guidance()
         self._told_ns = 0
         self._pull_mps2 = 0.0
         self._takes: dict[str, Callable[[Any, int], None]] = {
@@ -84,7 +91,7 @@ class Execute(Process):
         for received in inbox:
             self._take(received, now_ns)
         follows = self.control.modes.mode.source == "guidance" and not self.control.digs(now_ns)
-        wanted = self._wanted if follows else Stop.GO
+        wanted = self._guidance.wanted if follows else Stop.GO
         command = self.control.step(now_ns, self._feed.motion, wanted, "navigation", self._pull_mps2)
         for who, note in self.control.take_notes():
             self._scribe.event(
@@ -111,7 +118,7 @@ class Execute(Process):
     def _plan(self, plan: Plan | Idle, now_ns: int) -> None:
         self.control.watchdog.saw(GUIDANCE, plan.stamp_ns, now_ns)
         if not isinstance(plan, Idle):
-            self._gear = plan.gear
+            self._guidance.gear = plan.gear
             self.control.plan("guidance", plan.setpoints, plan.stamp_ns, now_ns)
 
     def _dig(self, digs: Digs, now_ns: int) -> None:
@@ -130,9 +137,9 @@ class Execute(Process):
         self.control.watchdog.disagreement(seen.stamp_ns, now_ns, *apart)
 
     def _ask(self, asked: Asked, now_ns: int) -> None:
-        self._wanted = Stop.SERVICE if asked.directive is None else Stop.GO
+        self._guidance.wanted = Stop.SERVICE if asked.directive is None else Stop.GO
         self.control.touches(asked.touched_m)
-        self._asks = asked.cause if asked.cause.startswith("assistance") else ""
+        self._guidance.asks = asked.cause if asked.cause.startswith("assistance") else ""
 
     def _scan(self, scan: LaserScan, now_ns: int, *, front: bool) -> None:
         points, _ = scan_points(scan)
@@ -176,4 +183,6 @@ class Execute(Process):
         control = self.control
         watchdog = control.watchdog
         standing, causes = control.executor.standing, watchdog.causes
-        return Health(now_ns, watchdog.armed, control.modes.name, standing, causes, self._asks, self._gear)
+        return Health(
+            now_ns, watchdog.armed, control.modes.name, standing, causes, self._guidance.asks, self._guidance.gear
+        )

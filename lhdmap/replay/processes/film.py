@@ -39,6 +39,28 @@ _BATCH, _LIVE_BATCH = 100, 5  # rows of a tenth of a second
 _GRAVE = ("contact", "overrun", "inbox full", "begins")
 
 
+class _Batch:
+    """Rows and attitudes that go into the recording so many at a time."""
+
+    def __init__(self, recording: ReplayRecording, most: int) -> None:
+        self._recording, self._most = recording, most
+        self._rows: list[tuple[float, ...]] = []
+        self._attitudes: list[tuple[float, float]] = []
+
+    def add(self, row: tuple[float, ...], attitude: tuple[float, float]) -> None:
+        """Take a row with roll and pitch."""
+        self._rows.append(row)
+        self._attitudes.append(attitude)
+        if len(self._rows) >= self._most:
+            self.flush()
+
+    def flush(self) -> None:
+        """Record what there is."""
+        if self._rows:
+            self._recording.add_rows(np.array(self._rows), np.array(self._attitudes))
+            self._rows, self._attitudes = [], []
+
+
 class Film(Process):
     """A row each 0.1 s; `recording` is None where none is wanted."""
 
@@ -58,9 +80,7 @@ class Film(Process):
         """`drive`, `load`: what is watched of a machine that drives itself, and of one that loads; None: it does not."""
         self.series, self._believed = Series(len(COLUMNS)), Series(4)
         self._machine, self._recording = machine, recording
-        self._most = _LIVE_BATCH if live else _BATCH
-        self._batch: list[tuple[float, ...]] = []
-        self._attitudes: list[tuple[float, float]] = []
+        self._batch = None if recording is None else _Batch(recording, _LIVE_BATCH if live else _BATCH)
         self.drive, self.load = drive, load
         self._wanted_mps = self._steering_rps = self._clearance_m = math.nan
         self._start: State | None = None
@@ -95,7 +115,8 @@ class Film(Process):
     def finish(self, now_ns: int, inbox: Sequence[Received]) -> None:
         """Take what is left."""
         self.step(now_ns, inbox)
-        self._flush()
+        if self._batch is not None:
+            self._batch.flush()
 
     def take(self, event: Event) -> None:
         """Take a line of the journal as a text of the recording."""
@@ -120,17 +141,10 @@ class Film(Process):
         own = (state.yaw_rad, state.articulation_rad, state.speed_mps)
         row = (time_s, *_place(state), *own, self._wanted_mps, self._clearance_m, self._steering_rps)
         self.series.add(row)
-        if self._recording is not None:
-            planned = (math.nan,) * 2 if self.drive is None else (self.drive.planned_mps, self.drive.predicted_m)
-            self._batch.append((*row, *planned))
-            self._attitudes.append((state.roll_rad, state.pitch_rad))
-            if len(self._batch) >= self._most:
-                self._flush()
-
-    def _flush(self) -> None:
-        if self._recording is not None and self._batch:
-            self._recording.add_rows(np.array(self._batch), np.array(self._attitudes))
-            self._batch, self._attitudes = [], []
+        if self._batch is not None:
+            plans = None if self.drive is None else self.drive.plans
+            planned = (math.nan,) * 2 if plans is None else (plans.planned_mps, plans.predicted_m)
+            self._batch.add((*row, *planned), (state.roll_rad, state.pitch_rad))
 
     def _watch(self, topic: str, message: Any) -> None:
         """Let what is watched of a drive see it, the true states first."""

@@ -67,6 +67,54 @@ class Truth:
         return pose
 
 
+class PlanFilm:
+    """The plans of guidance: `planned_mps` and `predicted_m` (clearance) of the newest; NaN where there is none."""
+
+    def __init__(self) -> None:
+        self.planned_mps = self.predicted_m = math.nan
+        self._plan: Plan | None = None
+        self._rows = Series(len(PLAN_COLUMNS))
+        self._limits: dict[str, int] = {}
+        self._horizons = _Thinned(_MOST_HORIZONS)
+
+    def take(self, plan: Plan | None) -> None:
+        """Take a plan; None: nothing is planned any more."""
+        self._plan = plan
+        self.planned_mps = self.predicted_m = math.nan
+        if plan is not None:
+            self.planned_mps = plan.gear * float(plan.speeds.speed_mps[0])
+            self.predicted_m = plan.clearance_m
+
+    def look(self, now_ns: int, here: FloatArray, T_true_odom: FloatArray, pitch_rad: float) -> FloatArray:
+        """Return the way (K, 3) that is predicted now from the true pose `here` (4,); empty where nothing is planned."""
+        plan = self._plan
+        if plan is None:
+            return np.empty((0, 3))
+        limit = self._limits.setdefault(plan.speeds.by, len(self._limits))
+        time_s = (now_ns - START_NS) / SECOND_NS
+        self._rows.add((time_s, self.planned_mps, plan.clearance_m, plan.speeds.sight_m, float(limit)))
+        way = se2.transform(T_true_odom, np.ascontiguousarray(plan.solution.states[:, :2]))
+        ahead = (way - here[:2]) @ np.array([math.cos(here[3]), math.sin(here[3])])
+        line = np.column_stack([way, here[2] + _ABOVE_M - math.sin(pitch_rad) * ahead])
+        self._horizons.add(line)
+        return line
+
+    @property
+    def rows(self) -> FloatArray:
+        """Rows of `PLAN_COLUMNS`."""
+        return self._rows.rows()
+
+    @property
+    def limits(self) -> tuple[str, ...]:
+        """What limited the speed, by the number in the rows."""
+        return tuple(self._limits)
+
+    @property
+    def horizons(self) -> list[FloatArray]:
+        """Ways (K, 3) that were predicted, evenly thinned."""
+        return self._horizons.kept
+
+
 class DriveFilm:
     """Takes true states and messages of `TOPICS`; `look` gives each 0.2 s what is to be drawn of the newest plan."""
 
@@ -74,17 +122,14 @@ class DriveFilm:
         self._topology = topology
         self.truth = Truth()
         self.map: TopologicalMap | None = None
-        self.planned_mps = self.predicted_m = math.nan
-        self._plans, self._places = Series(len(PLAN_COLUMNS)), Series(_PLACED)
-        self._limits: dict[str, int] = {}
-        self._horizons, self._looked_ns = _Thinned(_MOST_HORIZONS), 0
+        self.plans, self._places = PlanFilm(), Series(_PLACED)
+        self._looked_ns = 0
         self._T_true_map: FloatArray | None = None
         self._T_true_odom: FloatArray | None = None
         self._located: Located | None = None
         self._legs: list[tuple[str, list[FloatArray]]] = []
         self._leg: tuple[int, float] = (0, 0.0)
         self._along_m = -math.inf
-        self._plan: Plan | None = None
 
     def take(self, topic: str, message: Any) -> None:
         """Take a message."""
@@ -95,28 +140,17 @@ class DriveFilm:
         elif topic == DIRECTIVE and message.directive is not None:
             self._ask(message.directive)
         elif topic == PLAN:
-            self._plan = message if isinstance(message, Plan) else None
-            self.planned_mps = self.predicted_m = math.nan
-            if self._plan is not None:
-                self.planned_mps = self._plan.gear * float(self._plan.speeds.speed_mps[0])
-                self.predicted_m = self._plan.clearance_m
+            self.plans.take(message if isinstance(message, Plan) else None)
 
     def look(self, now_ns: int, pitch_rad: float) -> FloatArray | None:
         """Return the way (K, 3) that is predicted now, where one is due; empty where nothing is planned any more."""
         if now_ns - self._looked_ns < _EACH_NS:
             return None
         self._looked_ns = now_ns
-        plan, here = self._plan, self.truth.at(now_ns)
-        if plan is None or here is None or self._T_true_odom is None:
+        here = self.truth.at(now_ns)
+        if here is None or self._T_true_odom is None:
             return np.empty((0, 3))
-        limit = self._limits.setdefault(plan.speeds.by, len(self._limits))
-        time_s = (now_ns - START_NS) / SECOND_NS
-        self._plans.add((time_s, self.planned_mps, plan.clearance_m, plan.speeds.sight_m, float(limit)))
-        way = se2.transform(self._T_true_odom, np.ascontiguousarray(plan.solution.states[:, :2]))
-        ahead = (way - here[:2]) @ np.array([math.cos(here[3]), math.sin(here[3])])
-        line = np.column_stack([way, here[2] + _ABOVE_M - math.sin(pitch_rad) * ahead])
-        self._horizons.add(line)
-        return line
+        return self.plans.look(now_ns, here, self._T_true_odom, pitch_rad)
 
     def leg(self) -> Leg | None:
         """Return the leg that is driven, as far as it has been asked for."""
@@ -131,8 +165,8 @@ class DriveFilm:
         if self._T_true_map is not None:
             places = _off(told, self._T_true_map)
         bodies = outlines(rows, machine, _BODIES_M) if len(rows) else []
-        plans, legs = self._plans.rows(), self._drawn_legs(self._legs)
-        return DriveData(self.map, legs, plans, tuple(self._limits), self._horizons.kept, places, bodies)
+        plans, legs = self.plans, self._drawn_legs(self._legs)
+        return DriveData(self.map, legs, plans.rows, plans.limits, plans.horizons, places, bodies)
 
     def _pose(self, stamp_ns: int, T_odom_base: FloatArray) -> None:
         true = self.truth.at(stamp_ns)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
+from typing import Any
 
 import numpy as np
 
@@ -42,6 +43,42 @@ _IN_THE_PILE = (State.CHARGING, State.EXCAVATION, State.PULL_BACK)
 _BEFORE_M, _BEHIND_M, _BESIDE_M = 1.2, 8.0, 0.1
 
 
+class _Heard:
+    """The newest of what others say: orders and way of a mission, the pile, the machine's health, the station's answer.
+
+    `request`: number of the open request, 0: none.
+    """
+
+    def __init__(self) -> None:
+        self.orders: Orders | None = None
+        self.approach: Directive | None = None
+        self.pile: Snapshot | None = None
+        self.health: Health | None = None
+        self.answer: Answer | None = None
+        self.request = 0
+        self.emergency = False
+
+    def take(self, topic: str, message: Any) -> None:
+        """Take a message."""
+        if topic == ORDERS:
+            self.orders = message
+        elif topic == APPROACH:
+            self.approach = message.directive
+        elif topic == PILE:
+            self.pile = message
+        elif topic == MACHINE_SAYS:
+            self.health = message
+        elif topic == STATION_SAYS:
+            self.answer = message.answer or self._said_go_on(message) or self.answer
+            self.emergency = bool(message.emergency) or (self.emergency and not message.release)
+
+    def _said_go_on(self, word: Word) -> Answer | None:
+        """Return what the station says as an answer to the open request."""
+        if not self.request or not (word.go_on or word.gave_up):
+            return None
+        return Answer(self.request, ABORT if word.gave_up else GO_ON, by="station")
+
+
 class Loads(Process):
     """Pedals each 20 ms or a directive each 100 ms; begins once the machine is armed and its pose has held for a second.
 
@@ -56,13 +93,7 @@ class Loads(Process):
         self.task, self._way, self._scribe = task, way, scribe
         self._feed, self._signals = MotionFeed(), SignalFeed()
         self._wanted = None if way is None else Mission(1, draw_point_of(way))
-        self._orders: Orders | None = None
-        self._approach: Directive | None = None
-        self._pile: Snapshot | None = None
-        self._health: Health | None = None
-        self._answer: Answer | None = None
-        self._request = 0
-        self._emergency = False
+        self._heard = _Heard()
         self._since_ns: int | None = None
         self._asked_ns, self._mission, self._fill_std, self._number = 0, "", math.nan, 1
 
@@ -72,7 +103,7 @@ class Loads(Process):
             self._take(received)
         out = self.task.update(self._told(now_ns))
         self._note(out)
-        self._request = 0 if out.request is None else out.request.number
+        self._heard.request = 0 if out.request is None else out.request.number
         around = np.zeros((0, 2)) if out.target is None else mouth_of(out.target)
         if out.pedals is not None:
             p = out.pedals
@@ -97,38 +128,23 @@ class Loads(Process):
             self._feed.take(received)
         if topic in SIGNAL_TOPICS:
             self._signals.take(received)
-        elif topic == ORDERS:
-            self._orders = message
-        elif topic == APPROACH:
-            self._approach = message.directive
-        elif topic == PILE:
-            self._pile = message
-        elif topic == MACHINE_SAYS:
-            self._health = message
-        elif topic == STATION_SAYS:
-            self._answer = message.answer or self._said_go_on(message) or self._answer
-            self._emergency = bool(message.emergency) or (self._emergency and not message.release)
-
-    def _said_go_on(self, word: Word) -> Answer | None:
-        """Return what the station says as an answer to the open request."""
-        if not self._request or not (word.go_on or word.gave_up):
-            return None
-        return Answer(self._request, ABORT if word.gave_up else GO_ON, by="station")
+        else:
+            self._heard.take(topic, message)
 
     def _told(self, now_ns: int) -> LoadingInput:
-        motion, health = self._feed.motion, self._health
-        answer, self._answer = self._answer, None
-        way = self._approach if self._way is None else self._way._replace(stamp_ns=now_ns)
+        motion, health = self._feed.motion, self._heard.health
+        answer, self._heard.answer = self._heard.answer, None
+        way = self._heard.approach if self._way is None else self._way._replace(stamp_ns=now_ns)
         return LoadingInput(
             now_ns,
             self._signals.signals(),
             motion,
-            self._pile,
+            self._heard.pile,
             None if motion is None else self._signals.walls_m(motion),
             "idle" if health is None else health.mode,
             health is not None and health.armed,
             answer,
-            self._emergency,
+            self._heard.emergency,
             self._mission_now(now_ns),
             way,
             evidence=(("log", f"run.mcap@{now_ns}"),),
@@ -137,12 +153,16 @@ class Loads(Process):
     @property
     def _has_orders(self) -> bool:
         """Whether the machine is this task's."""
-        return self._way is not None or (self._orders is not None and self._orders.loading > 0)
+        return self._way is not None or (self._heard.orders is not None and self._heard.orders.loading > 0)
 
     def _mission_now(self, now_ns: int) -> Mission | None:
         if self._way is not None:
             return self._wanted if self._settled(now_ns) else None
-        return Mission(self._orders.loading) if self._orders is not None and self._orders.loading else None
+        return (
+            Mission(self._heard.orders.loading)
+            if self._heard.orders is not None and self._heard.orders.loading
+            else None
+        )
 
     def _settled(self, now_ns: int) -> bool:
         """Return whether the machine has been there for a while, with a pose: the mission begins."""
@@ -152,8 +172,8 @@ class Loads(Process):
         return now_ns - self._since_ns >= _SETTLED_NS
 
     def _now(self, now_ns: int, out: LoadingOutput) -> LoadingNow:
-        if self._orders is not None and self._orders.loading:
-            self._number = self._orders.loading
+        if self._heard.orders is not None and self._heard.orders.loading:
+            self._number = self._heard.orders.loading
         return LoadingNow(
             now_ns, self._number, out.state, out.phase, out.attempts, out.fill, self._fill_std, out.request
         )

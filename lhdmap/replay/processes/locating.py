@@ -88,7 +88,7 @@ class Locating(Process):
     def _feed(self, inbox: Sequence[Received]) -> None:
         for received in inbox:
             if received.topic == LOADING:
-                self.localizer.digs = received.message.state in _DIGS
+                self.localizer.keeper.digs = received.message.state in _DIGS
             else:
                 self.localizer.update(_ROLE_OF[received.topic], received.message)
 

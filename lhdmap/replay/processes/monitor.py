@@ -49,10 +49,10 @@ class Monitor(Process):
 
     def step(self, now_ns: int, inbox: Sequence[Received]) -> Iterable[Outgoing]:
         """Take what has come and judge."""
-        before = len(self.tally.contacts)
+        before = len(self.tally.touched.contacts)
         for received in inbox:
             self._take(received)
-        for contact in self.tally.contacts[before:]:
+        for contact in self.tally.touched.contacts[before:]:
             self._scribe.event("contact", contact["body"], **contact)
         self.tally.judge(now_ns)
         if self.tally.ended:

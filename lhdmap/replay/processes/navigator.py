@@ -27,7 +27,7 @@ from lhdmap.replay.process import (
     Received,
 )
 from lhdmap.replay.processes.feed import MOTION_TOPICS, MotionFeed
-from lhdmap.replay.processes.told import Asked, Idle
+from lhdmap.replay.processes.told import Asked, Idle, Word
 
 NAVIGATION = "navigation"
 _SETTLED_NS = 1_000_000_000
@@ -43,6 +43,21 @@ class Errand(NamedTuple):
     loaded: bool
 
 
+class _Station:
+    """What the station last said: to go on, that it gives up, another goal, the speed of an operator."""
+
+    def __init__(self) -> None:
+        self.asked_on = False
+        self.gave_up = self.goal = ""
+        self.speed_mps = 0.0
+
+    def take(self, word: Word) -> None:
+        """Take a word; a goal holds until another one is named."""
+        self.asked_on, self.gave_up = word.go_on, word.gave_up
+        self.goal = word.goal or self.goal
+        self.speed_mps = abs(word.speed_mps or 0.0)
+
+
 class Navigator(Process):
     """Plans once the place is known and the machine is armed; then a directive each 100 ms.
 
@@ -56,9 +71,9 @@ class Navigator(Process):
         self.control, self._errand, self._scribe = control, errand, scribe
         self._feed = MotionFeed()
         self._located: Located | None = None
-        self._mission = self._gave_up = ""
-        self._asked_on = self._away = False
-        self._goal, self._mode, self._speed_mps = "", "", 0.0
+        self._station = _Station()
+        self._mission = self._mode = ""
+        self._away = False
         self._since_ns: int | None = None
 
     def step(self, now_ns: int, inbox: Sequence[Received]) -> Iterator[Outgoing]:
@@ -85,13 +100,13 @@ class Navigator(Process):
             return None
         if control.state == IDLE:
             self._begin(now_ns, located)
-        elif control.knows(located) and (self._away or self._asked_on):
-            control.go_on(located, reopened=self._asked_on)
-            self._away = self._asked_on = False
-        elif self._goal not in ("", control.goal) and control.knows(located):
-            control.go("", self._goal, located, loaded=self._errand.loaded)
+        elif control.knows(located) and (self._away or self._station.asked_on):
+            control.go_on(located, reopened=self._station.asked_on)
+            self._away = self._station.asked_on = False
+        elif self._station.goal not in ("", control.goal) and control.knows(located):
+            control.go("", self._station.goal, located, loaded=self._errand.loaded)
         directive = control.step(now_ns, motion, located)
-        return directive if self._mode == "autonomous" else _no_faster(directive, self._speed_mps)
+        return directive if self._mode == "autonomous" else _no_faster(directive, self._station.speed_mps)
 
     def _take(self, received: Received) -> None:
         topic, _, message = received
@@ -99,14 +114,12 @@ class Navigator(Process):
             self._located = message
         elif topic == MACHINE_SAYS:
             self._mode = message.mode
-            waits = message.mode == "assisted" and self._speed_mps < _CREEPS_MPS
-            self.control.may_move = message.armed and message.mode in _MOVES and not waits
+            waits = message.mode == "assisted" and self._station.speed_mps < _CREEPS_MPS
+            self.control.allowed.may_move = message.armed and message.mode in _MOVES and not waits
         elif topic == PLAN:
-            self.control.sight_m = math.inf if isinstance(message, Idle) else message.speeds.sight_m
+            self.control.allowed.sight_m = math.inf if isinstance(message, Idle) else message.speeds.sight_m
         elif topic == STATION_SAYS:
-            self._asked_on, self._gave_up = message.go_on, message.gave_up
-            self._goal = message.goal or self._goal
-            self._speed_mps = abs(message.speed_mps or 0.0)
+            self._station.take(message)
         else:
             self._feed.take(received)
 
@@ -122,8 +135,8 @@ class Navigator(Process):
 
     def _told(self) -> str:
         state = self.control.state
-        if self._gave_up:
-            return f"aborted: {self._gave_up}"
+        if self._station.gave_up:
+            return f"aborted: {self._station.gave_up}"
         if state == ARRIVED:
             return "done"
         return f"assistance: {self.control.reason}" if state == ASSISTANCE else "driving"

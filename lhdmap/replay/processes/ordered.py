@@ -95,12 +95,12 @@ class OrderedNavigation(Process):
         if topic == LOCATED:
             self._located = message
         elif topic == ORDERS:
-            self._orders, self.control.free = message, message.free
+            self._orders, self.control.allowed.free = message, message.free
         elif topic == MACHINE_SAYS:
             self._mode = message.mode
-            self.control.may_move = message.armed and message.mode == _AUTONOMOUS
+            self.control.allowed.may_move = message.armed and message.mode == _AUTONOMOUS
         elif topic == PLAN:
-            self.control.sight_m = math.inf if isinstance(message, Idle) else message.speeds.sight_m
+            self.control.allowed.sight_m = math.inf if isinstance(message, Idle) else message.speeds.sight_m
         elif topic == STATION_SAYS:
             self._asked_on = message.go_on
         else:

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 from lhdmap.config import Settings
 from lhdmap.machine import Machine
-from lhdmap.pipeline.mapping import MappingPipeline
+from lhdmap.pipeline.mapping import MappingOptions, MappingPipeline
 from lhdmap.replay.journal import Scribe
 from lhdmap.replay.process import MILLISECOND_NS, POSE, Outgoing, Process, Received
 from lhdmap.roles import BUILD_MAP, ROLES, read_by
@@ -27,7 +27,7 @@ class Perception(Process):
 
     def __init__(self, settings: Settings, machine: Machine, scribe: Scribe) -> None:
         without_pile = replace(settings, pile=replace(settings.pile, method="off"))
-        self.pipeline = MappingPipeline(without_pile, machine, cloud=False)
+        self.pipeline = MappingPipeline(without_pile, machine, MappingOptions(cloud=False))
         self._scribe = scribe
         scribe.goes("waiting", "no scan yet")
 

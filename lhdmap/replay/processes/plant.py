@@ -28,6 +28,15 @@ _LOOK_STEPS = 10  # how often the clearance is taken
 _AHEAD_M = 12.0  # where a thing appears that has no place
 
 
+class _Heard:
+    """The newest command and when it came; `stuck`: whether the steering does not do what it says."""
+
+    def __init__(self) -> None:
+        self.command: Command | None = None
+        self.at_ns = START_NS
+        self.stuck = False
+
+
 class Plant(Process):
     """A turn takes the machine from now to 10 ms later; what its sensors have complete by then appears at its own time."""
 
@@ -43,9 +52,7 @@ class Plant(Process):
         by_time = [one.settings for one in faults.all if one.settings.of_sensor and one.known_time]
         self._sensors = with_faults(parts.sensors, by_time, seed=seed)
         self._due = Due(self._sensors)
-        self._command: Command | None = None
-        self._heard_ns = START_NS
-        self._stuck = False
+        self._heard = _Heard()
         self._steps = 0
         self._touches: tuple[Touch, ...] = ()
         faults.watchers.append(self._on_fault)
@@ -53,7 +60,7 @@ class Plant(Process):
     def step(self, now_ns: int, inbox: Sequence[Received]) -> Iterator[Outgoing]:
         """Take the newest command and step."""
         for received in inbox:
-            self._command, self._heard_ns = received.message, now_ns
+            self._heard.command, self._heard.at_ns = received.message, now_ns
         if self._steps == 0:
             yield from self._seen(now_ns)
         self._steps += 1
@@ -82,12 +89,12 @@ class Plant(Process):
 
     def _acted_on(self, now_ns: int) -> Command:
         """Return what the machine does: the command, less what is broken; without one for long it brakes."""
-        command = self._command
-        if command is None or now_ns - self._heard_ns > COMMAND_LIMIT_NS:
+        command = self._heard.command
+        if command is None or now_ns - self._heard.at_ns > COMMAND_LIMIT_NS:
             self._scribe.goes("braking", "no command")
             return Command(now_ns, 0.0, 0.0, 0.0, 0.0, False, True)
         self._scribe.goes("commanded", "command")
-        return command._replace(steering_rate_rps=0.0) if self._stuck else command
+        return command._replace(steering_rate_rps=0.0) if self._heard.stuck else command
 
     def _position(self) -> Position:
         return self._state.x_m, self._state.y_m, self._state.z_m
@@ -95,7 +102,7 @@ class Plant(Process):
     def _on_fault(self, fault: Fault, begins: bool) -> None:
         kind = fault.settings.kind
         if kind == "steering_stuck":
-            self._stuck = begins
+            self._heard.stuck = begins
         elif kind in THINGS and self._parts.changing is not None:
             name = f"{kind} {fault.number}"
             if begins:

@@ -15,7 +15,7 @@ from lhdmap.odometry.planar import PlanarOdometry
 from lhdmap.odometry.steps import OdometryStep
 from lhdmap.pile.result import PileReport, Snapshot
 from lhdmap.pile.stage import PileStage
-from lhdmap.pipeline.mapping import MappingPipeline
+from lhdmap.pipeline.mapping import MappingOptions, MappingPipeline
 from lhdmap.pipeline.pile import PlacedScan
 from lhdmap.replay.journal import Scribe
 from lhdmap.replay.process import MILLISECOND_NS, PILE, POSE, SEEN, Outgoing, Process, Received
@@ -61,7 +61,9 @@ class Scouting(Process):
 
     def __init__(self, settings: Settings, machine: Machine, scribe: Scribe) -> None:
         self.pile = PileAhead(settings)
-        self.pipeline = MappingPipeline(live(settings), machine, cloud=False, pile=self.pile, on_step=self._listen)
+        self.pipeline = MappingPipeline(
+            live(settings), machine, MappingOptions(cloud=False, pile=self.pile, on_step=self._listen)
+        )
         self._agreement = Agreement(self.pipeline.front_end.wheels.motion_between)
         self._scribe, self._seen = scribe, list[Seen]()
         self._told_ns = 0

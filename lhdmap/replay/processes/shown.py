@@ -24,6 +24,32 @@ _ASKS = "see to it that the machine can go on, then say so; or abort"
 _PREFIX = "assistance: "
 
 
+class _RequestNumbers:
+    """Counts the open requests of a run, of the loading task and of navigation alike."""
+
+    def __init__(self) -> None:
+        self.count = 0
+        self._open, self._ended = "", ""
+
+    def key(self, request: Request | None, asks: str) -> str:
+        """Return what tells a request from others; empty where none is open."""
+        if request is not None:
+            self._ended = request.why
+            return f"{request.number}: {request.why}"
+        if asks == self._ended:
+            return ""  # what the machine says is a little older than what the task says
+        self._ended = ""
+        return asks
+
+    def is_new(self, key: str) -> bool:
+        """Return whether it is another one than before, which is counted then."""
+        new = key != self._open
+        if new:
+            self._open = key
+            self.count += bool(key)
+        return new
+
+
 class Shown:
     """Takes the machine's messages; of the simulator's truth it gets nothing."""
 
@@ -35,7 +61,7 @@ class Shown:
         self._located: Located | None = None
         self._seen: Seen | None = None
         self._pile: Snapshot | None = None
-        self._asks, self._ended, self._count = "", "", 0
+        self._numbers = _RequestNumbers()
         self.task_number = 0  # of the open request, as the loading task counts; 0: it is navigation's
         self._ask: Ask | None = None
 
@@ -71,16 +97,8 @@ class Shown:
         """Return the open request: the loading task's, else what navigation asks for. Its number is that of this run."""
         request = None if self.loading is None else self.loading.request
         asks = "" if self.health is None else self.health.asks.removeprefix(_PREFIX)
-        if request is not None:
-            self._ended = request.why
-        elif asks == self._ended:
-            asks = ""  # what the machine says is a little older than what the task says
-        else:
-            self._ended = ""
-        key = asks if request is None else f"{request.number}: {request.why}"
-        if key != self._asks:
-            self._asks = key
-            self._count += bool(key)
+        key = self._numbers.key(request, asks)
+        if self._numbers.is_new(key):
             self.task_number = 0 if request is None else request.number
             self._ask = self._ask_of(request, asks) if key else None
         return self._ask
@@ -88,12 +106,12 @@ class Shown:
     def _ask_of(self, request: Request | None, asks: str) -> Ask:
         hits, pile = self._hits(), self._toe()
         if request is None:
-            return Ask(self._count, "navigation", self._mission, asks, _ASKS, cloud_m=hits, pile_m=pile)
+            return Ask(self._numbers.count, "navigation", self._mission, asks, _ASKS, cloud_m=hits, pile_m=pile)
         evidence = tuple(
             (name, value if isinstance(value, str) else f"{value:.4g}") for name, value in request.evidence.items()
         )
         told = (request.kind, request.during, request.why, request.asks, request.tried)
-        return Ask(self._count, *told, evidence, hits, pile)
+        return Ask(self._numbers.count, *told, evidence, hits, pile)
 
     def _place(self) -> Pose | None:
         """Return the pose of now (x, y, heading) on the plan."""

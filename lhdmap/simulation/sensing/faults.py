@@ -23,7 +23,7 @@ from lhdmap.simulation.history import SECOND_NS, START_NS, History
 from lhdmap.simulation.sensing.chance import Chance
 from lhdmap.simulation.sensing.distortions import MEASURED, shifted, unreadable, with_noise
 from lhdmap.simulation.sensing.sensor import Sensor
-from lhdmap.simulation.surroundings import View
+from lhdmap.simulation.surroundings import SurroundingsView
 
 SENSOR_KINDS = ("dead", "frozen", "delayed", "biased", "noisy", "nan", "dropped", "jump")
 REPLAY_KINDS = ("overrun", "link_lost", "link_degraded", "obstacle", "person", "steering_stuck")
@@ -145,7 +145,7 @@ class _Distorted:
     def next_ns(self) -> int:
         return self._sensor.next_ns
 
-    def read(self, history: History, world: View) -> list[Record]:
+    def read(self, history: History, world: SurroundingsView) -> list[Record]:
         """Return what is left of the reading that is due."""
         now_ns = self._sensor.next_ns
         records = self._sensor.read(history, world)
@@ -184,7 +184,7 @@ class _Frozen:
     def next_ns(self) -> int:
         return self._sensor.next_ns
 
-    def read(self, history: History, world: View) -> list[Record]:
+    def read(self, history: History, world: SurroundingsView) -> list[Record]:
         """Return what is left of the reading that is due."""
         frozen = self._window.holds(self._sensor.next_ns)
         records = self._sensor.read(history, world)
@@ -210,7 +210,7 @@ class _Delayed:
     def next_ns(self) -> int:
         return min(self._sensor.next_ns, self._late[0][0]) if self._late else self._sensor.next_ns
 
-    def read(self, history: History, world: View) -> list[Record]:
+    def read(self, history: History, world: SurroundingsView) -> list[Record]:
         """Return what is left of the reading that is due."""
         now_ns = self._sensor.next_ns
         if self._late and self._late[0][0] <= now_ns:

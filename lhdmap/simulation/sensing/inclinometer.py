@@ -15,7 +15,7 @@ from lhdmap.simulation.history import SECOND_NS, Column, History
 from lhdmap.simulation.sensing.chance import Chance
 from lhdmap.simulation.sensing.sections import ImuSettings, InclinometerSettings
 from lhdmap.simulation.sensing.sensor import Beat
-from lhdmap.simulation.surroundings import View
+from lhdmap.simulation.surroundings import SurroundingsView
 
 _GRAVITY_MPS2 = 9.81
 _GYRO_NS, _ACCELEROMETER_NS = 10_000_000, 20_000_000
@@ -44,7 +44,7 @@ class Inclinometer:
         """Log time of the next reading."""
         return self._beat.stamp_ns
 
-    def read(self, history: History, world: View) -> list[Record]:
+    def read(self, history: History, world: SurroundingsView) -> list[Record]:
         """Return the reading that is due."""
         stamp_ns, rng = self._beat.stamp_ns, self._chance.of(self._beat.index)
         noise = math.radians(self._settings.noise_deg) * rng.standard_normal(2)

@@ -13,7 +13,7 @@ from lhdmap.simulation.scanner import Rig, Sweep, beams_of, exact_ranges, measur
 from lhdmap.simulation.sensing.chance import Chance
 from lhdmap.simulation.sensing.sections import CloudSettings, ScannerSettings
 from lhdmap.simulation.sensing.sensor import Beat
-from lhdmap.simulation.surroundings import View
+from lhdmap.simulation.surroundings import SurroundingsView
 
 
 class Scanner:
@@ -33,7 +33,7 @@ class Scanner:
         """Log time of the next scan."""
         return self.beat.stamp_ns + self.sweep_ns
 
-    def read(self, history: History, world: View) -> list[Record]:
+    def read(self, history: History, world: SurroundingsView) -> list[Record]:
         """Return the scan that is due."""
         stamp_ns, due_ns = self.beat.stamp_ns, self.next_ns
         time_s = np.array([(stamp_ns - START_NS) / SECOND_NS])
@@ -44,7 +44,7 @@ class Scanner:
         self.beat.advance()
         return [Record(self.topic, due_ns, self._scan(stamp_ns, ranges))]
 
-    def exact_m(self, history: History, world: View, stamp_ns: int) -> Float32Array:
+    def exact_m(self, history: History, world: SurroundingsView, stamp_ns: int) -> Float32Array:
         """Return exact ranges, shape (N,), metres, inf for none, of a scan."""
         return exact_ranges(history, world, stamp_ns, self._sweep, self.rig)
 
@@ -83,7 +83,7 @@ class CloudScanner:
         """Log time of the next cloud."""
         return self._beat.stamp_ns + self._sweep_ns
 
-    def read(self, history: History, world: View) -> list[Record]:
+    def read(self, history: History, world: SurroundingsView) -> list[Record]:
         """Return the cloud that is due."""
         stamp_ns, due_ns, settings = self._beat.stamp_ns, self.next_ns, self._settings
         rng = self._chance.of(self._beat.index)

@@ -12,7 +12,7 @@ from lhdmap.messages import FloatArray, Message, Record
 from lhdmap.roles import ROLES
 from lhdmap.simulation.history import SECOND_NS, START_NS, History
 from lhdmap.simulation.sensing.chance import Chance
-from lhdmap.simulation.surroundings import View
+from lhdmap.simulation.surroundings import SurroundingsView
 
 NEVER_NS = 2**63 - 1
 """When a sensor is due that has nothing more to say."""
@@ -40,7 +40,7 @@ class Sensor(Protocol):
         """Log time at which the next reading is complete."""
         ...
 
-    def read(self, history: History, world: View) -> list[Record]:
+    def read(self, history: History, world: SurroundingsView) -> list[Record]:
         """Return the reading that is due at `next_ns` (none where there is nothing to say), and go on to the next."""
         ...
 
@@ -81,7 +81,7 @@ class Sampled:
         """Log time of the next reading."""
         return self._beat.stamp_ns + self._delay_ns
 
-    def read(self, history: History, world: View) -> list[Record]:
+    def read(self, history: History, world: SurroundingsView) -> list[Record]:
         """Return the reading that is due."""
         beat, due_ns = self._beat, self.next_ns
         message = self._measure(beat.stamp_ns, history.state(beat.stamp_ns), self._chance.of(beat.index))
@@ -97,7 +97,7 @@ class Due:
         self._heap = [(sensor.next_ns, order) for order, sensor in enumerate(self._sensors)]
         heapq.heapify(self._heap)
 
-    def read(self, history: History, world: View) -> Iterator[Record]:
+    def read(self, history: History, world: SurroundingsView) -> Iterator[Record]:
         """Yield all that is complete by the end of the history, in the order of log time."""
         heap, last_ns = self._heap, history.last_ns
         while heap and heap[0][0] <= last_ns:
@@ -108,6 +108,6 @@ class Due:
             yield from records
 
 
-def read_all(sensors: Sequence[Sensor], history: History, world: View) -> Iterator[Record]:
+def read_all(sensors: Sequence[Sensor], history: History, world: SurroundingsView) -> Iterator[Record]:
     """Yield what sensors say of a whole history, in the order of log time."""
     return Due(sensors).read(history, world)

@@ -12,7 +12,7 @@ from lhdmap.messages import FloatArray, Mount, Record, Text
 from lhdmap.roles import ROLES
 from lhdmap.simulation.history import START_NS, History
 from lhdmap.simulation.sensing.sensor import NEVER_NS
-from lhdmap.simulation.surroundings import View
+from lhdmap.simulation.surroundings import SurroundingsView
 
 Told = Callable[[int, FloatArray], str]
 """A text for a stamp and the machine's state at it, shape (20,); empty for nothing to say."""
@@ -37,7 +37,7 @@ class Mounts:
         self.name, self.topic, self.next_ns = "tf_static", ROLES["tf_static"].topic, START_NS
         self._mounts = mounts
 
-    def read(self, history: History, world: View) -> list[Record]:
+    def read(self, history: History, world: SurroundingsView) -> list[Record]:
         """Return all of them."""
         stamp_ns, self.next_ns = self.next_ns, NEVER_NS
         told = (Mount(stamp_ns, one.parent, name, one.T_parent_sensor) for name, one in self._mounts.items())

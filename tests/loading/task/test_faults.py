@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 from lhdmap.driving.motion import Motion
 from lhdmap.loading.follows import Follows
-from lhdmap.loading.health import NEEDS, Health
+from lhdmap.loading.health import NEEDS, LoadingHealth
 from lhdmap.loading.moment import LoadingInput
 from lhdmap.loading.signals import Pedals, Signals
 from lhdmap.loading.states import ASSISTANCE, State
@@ -228,7 +228,7 @@ def test_short_lifts_of_a_frozen_boom_count_together_and_a_change_ends_it() -> N
 
 @pytest.mark.parametrize(("tacho_mps", "held"), [(0.7, True), (0.0, False)])
 def test_wheels_that_say_the_same_are_frozen_unless_they_stand(tacho_mps: float, held: bool) -> None:
-    health = Health(SETTINGS)
+    health = LoadingHealth(SETTINGS)
     found: tuple[str, ...] = ()
     for k in range(60):
         now_ns = k * 40_000_000

@@ -10,7 +10,7 @@ from lhdmap.errors import InputError
 from lhdmap.integration.cloud import GridCloud
 from lhdmap.integration.cloud_io import write_cloud
 from lhdmap.machine import Machine
-from lhdmap.mine.network import make_network
+from lhdmap.mine.make_network import make_network
 from lhdmap.mine.plan import find_plan, load_plan
 from lhdmap.simulation.drift import Mesh
 from lhdmap.simulation.mesh_file import write_ply

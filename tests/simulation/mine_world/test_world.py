@@ -10,7 +10,8 @@ import numpy.typing as npt
 import pytest
 from lhdmap.machine import Machine
 from lhdmap.messages import FloatArray, LaserScan
-from lhdmap.mine.network import Network, make_network
+from lhdmap.mine.make_network import make_network
+from lhdmap.mine.network import Network
 from lhdmap.mine.plan import find_plan, load_plan
 from lhdmap.simulation.history import Column, History
 from lhdmap.simulation.mine_world.hollow import Volume

@@ -10,7 +10,7 @@ from lhdmap.roles import ROLES
 from lhdmap.simulation.history import START_NS, Column, History
 from lhdmap.simulation.raycast import Surface
 from lhdmap.simulation.sensing.sensor import Sensor, read_all
-from lhdmap.simulation.surroundings import View
+from lhdmap.simulation.surroundings import SurroundingsView
 
 
 class Room:
@@ -42,7 +42,7 @@ def history(seconds: float, rate_hz: float = 100.0, **columns: Callable[[FloatAr
     return History(rate_hz, rows)
 
 
-def readings(sensors: Sensor | Sequence[Sensor], past: History, world: View | None = None) -> list[Record]:
+def readings(sensors: Sensor | Sequence[Sensor], past: History, world: SurroundingsView | None = None) -> list[Record]:
     """Return all that sensors say of a history."""
     listed = [sensors] if not isinstance(sensors, Sequence) else list(sensors)
     return list(read_all(listed, past, world or Room()))
