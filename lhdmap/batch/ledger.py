@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Literal
 
+from lhdmap.batch.figures import folder_figures
 from lhdmap.batch.manifest import Task
 from lhdmap.batch.work import Ran
 from lhdmap.descriptions import described
@@ -21,7 +22,7 @@ Status = Literal["done", "failed", "skipped"]
 
 @dataclass(frozen=True, slots=True)
 class RowResult:
-    """A row of the table: status and why, where the result is, figures of the command, retries, seconds."""
+    """A row of the table: status and why, where the result is, values of the command, retries, seconds, figures of its folder."""
 
     task: Task
     status: Status
@@ -30,6 +31,7 @@ class RowResult:
     values: Mapping[str, Any] = field(default_factory=dict)
     retried: int = 0
     wall_s: float = 0.0
+    figures: Mapping[str, Any] = field(default_factory=dict)
 
     @property
     def map(self) -> Path | None:
@@ -67,7 +69,8 @@ class Ledger:
         if not same:
             return None
         folder = target if task.kind.writes else None
-        return RowResult(task, "skipped", "complete already", folder, known.get("values") or {})
+        values, figures = known.get("values") or {}, known.get("figures") or {}
+        return RowResult(task, "skipped", "complete already", folder, values, figures=figures)
 
     def stands(self, task: Task) -> bool:
         """Whether there is a result that a new one replaces."""
@@ -84,7 +87,7 @@ class Ledger:
         result = _result(task, ran, self.folder)
         table: dict[str, Any] = {"log": task.log, "command": task.command, "asked": task.asked, "source": _stamp(task)}
         table |= {"status": result.status, "reason": result.reason, "retried": result.retried, "wall_s": ran.wall_s}
-        write_json(self._path(task, ".json"), table | {"values": result.values})
+        write_json(self._path(task, ".json"), table | {"values": result.values, "figures": result.figures})
         if ran.outcome is not None and ran.outcome.said:
             self._path(task, ".txt").write_text(ran.outcome.said, encoding="utf-8", errors="backslashreplace")
         return result
@@ -113,7 +116,8 @@ def _of_folder(task: Task, target: Path, info: Mapping[str, Any]) -> RowResult |
     for source in info.get("sources", ()):
         same = isinstance(source, Mapping) and Path(str(source.get("path"))) == task.path
         if same and task.path.is_file() and source.get("bytes") == task.path.stat().st_size and not task.options:
-            return RowResult(task, "skipped", "complete already", target, info.get("counts") or {})
+            counts, figures = info.get("counts") or {}, folder_figures(target)
+            return RowResult(task, "skipped", "complete already", target, counts, figures=figures)
     return None
 
 
@@ -126,6 +130,6 @@ def _result(task: Task, ran: Ran, folder: Path) -> RowResult:
     if outcome.exit_code:
         reason = str(error.get("message")) if isinstance(error, Mapping) else f"exit code {outcome.exit_code}"
         made = folder / task.name if task.kind.writes and described(folder / task.name) is not None else None
-        return RowResult(task, "failed", reason, made, outcome.values, ran.killed, ran.wall_s)
+        return RowResult(task, "failed", reason, made, outcome.values, ran.killed, ran.wall_s, outcome.figures)
     made = folder / task.name if task.kind.writes else None
-    return RowResult(task, "done", "", made, outcome.values, ran.killed, ran.wall_s)
+    return RowResult(task, "done", "", made, outcome.values, ran.killed, ran.wall_s, outcome.figures)

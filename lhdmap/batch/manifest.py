@@ -12,9 +12,9 @@ from lhdmap.errors import InputError, UsageError
 from lhdmap.names import beside
 from lhdmap.settings import nearest
 
-LOG, COMMAND, NAME = "log", "command", "name"
+LOG, COMMAND, NAME, SHIFT = "log", "command", "name", "shift"
 OPTIONS = ("map", "machine", "config")
-COLUMNS = (LOG, *OPTIONS, COMMAND, NAME)
+COLUMNS = (LOG, *OPTIONS, COMMAND, NAME, SHIFT)
 DEFAULT = "build-map"
 RESERVED = ("rows", "batch.parquet", "report.html", "run.json")
 
@@ -39,18 +39,25 @@ KINDS: Mapping[str, Kind] = {
 
 
 class Task(NamedTuple):
-    """A row: the log as it is named and where it is, the command, its options (files), and the name of its result."""
+    """A row: the log as it is named and where it is, the command, its options (files), the name of its result, and its shift."""
 
     log: str
     path: Path
     command: str
     options: tuple[tuple[str, Path], ...]
     name: str
+    shift: str = ""
 
     @property
     def kind(self) -> Kind:
         """What is known of the command."""
         return KINDS[self.command]
+
+    @property
+    def machine(self) -> str:
+        """What the machine is called: the name of its file without the ending, empty for the default one."""
+        path = dict(self.options).get("machine")
+        return "" if path is None else path.stem
 
     @property
     def asked(self) -> list[str]:
@@ -124,7 +131,7 @@ def _task(path: Path, number: int, row: Mapping[str, str]) -> Task:
         raise UsageError(
             f"{where}: name = '{name}': a name for a folder was wanted, without a path, none of {RESERVED}"
         )
-    return Task(row[LOG], log, command, tuple(options.items()), name or beside(log, kind.what).name)
+    return Task(row[LOG], log, command, tuple(options.items()), name or beside(log, kind.what).name, row.get(SHIFT, ""))
 
 
 def _named(tasks: Sequence[Task]) -> list[Task]:

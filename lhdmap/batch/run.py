@@ -131,8 +131,17 @@ def _page_rows(rows: Sequence[RowResult]) -> list[dict[str, Any]]:
     for row in rows:
         report = None if row.folder is None else row.folder / "report.html"
         link = None if report is None or not report.is_file() else f"{row.task.name}/report.html"
-        told.append({**row.to_json(), "name": row.task.name, "link": link, "wall_s": row.wall_s, "values": row.values})
+        told.append(
+            {**row.to_json(), "name": row.task.name, "link": link, "wall_s": row.wall_s, "values": row.values}
+            | _trend(row)
+        )
     return told
+
+
+def _trend(row: RowResult) -> dict[str, Any]:
+    """Return what the trends want of a row; its shift is the day on which its log begins where the manifest has none."""
+    shift = row.task.shift or str(row.figures.get("began", ""))[:10]
+    return {"machine": row.task.machine or "default", "shift": shift, "figures": row.figures}
 
 
 def _describe(request: BatchRequest, counts: dict[str, int]) -> None:

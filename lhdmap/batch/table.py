@@ -30,7 +30,9 @@ def _cells(row: RowResult) -> dict[str, Any]:
     }
     own |= {"reason": row.reason or None, "map": None if row.map is None else str(row.map)}
     own |= {"run": None if row.folder is None else str(row.folder), "retried": row.retried, "seconds": row.wall_s}
-    figures = {key: value for key, value in row.values.items() if isinstance(value, (bool, int, float, str))}
+    own |= {"machine": row.task.machine or None, "shift": row.task.shift or None}
+    told = {**row.figures, **row.values}
+    figures = {key: value for key, value in told.items() if isinstance(value, (bool, int, float, str))}
     return own | {key: value for key, value in figures.items() if key not in own}
 
 

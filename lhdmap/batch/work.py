@@ -7,11 +7,12 @@ from typing import Any, NamedTuple
 
 
 class Outcome(NamedTuple):
-    """What came of a command line: exit code, the object of `--json`, what it said on standard error."""
+    """What came of a command line: exit code, the object of `--json`, what it said on standard error, figures of its folder."""
 
     exit_code: int
     values: Mapping[str, Any]
     said: str = ""
+    figures: Mapping[str, Any] = {}
 
 
 class Job(NamedTuple):

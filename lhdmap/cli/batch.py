@@ -31,7 +31,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "manifest",
         type=Path,
         metavar="MANIFEST.csv",
-        help="a line a log: log, optionally map, machine, config, command (build-map, localize, pile, doctor, replay), name",
+        help="a line a log: log, optionally map, machine, config, command (build-map, localize, pile, doctor, replay), "
+        "name, shift",
     )
     parser.add_argument(
         "-o",
@@ -67,6 +68,7 @@ def run(arguments: argparse.Namespace, console: Console) -> int:
 
 def run_words(words: Sequence[str]) -> Outcome:
     """Run one command line in this process and return what came of it: what workers do."""
+    from lhdmap.batch.figures import folder_figures
     from lhdmap.batch.work import Outcome
     from lhdmap.cli.main import main
 
@@ -77,7 +79,8 @@ def run_words(words: Sequence[str]) -> Outcome:
         values = json.loads(printed.getvalue() or "{}")
     except ValueError:
         values = {}
-    return Outcome(exit_code, values if isinstance(values, dict) else {}, said.getvalue()[-_SAID:])
+    figures = folder_figures(Path(words[words.index("-o") + 1])) if "-o" in words else {}
+    return Outcome(exit_code, values if isinstance(values, dict) else {}, said.getvalue()[-_SAID:], figures)
 
 
 def _runner(arguments: argparse.Namespace, console: Console) -> Runner:

@@ -168,7 +168,9 @@ def figures(told: dict[str, Any], plain: dict[str, Any], damaged: set[str]) -> I
     yield Figure(group, "whole logs without a map", float(len(whole) - len(complete)), "", 0.0, f"of {len(whole)}")
     bad = [row for row in rows if row["status"] == "failed"]
     broken = sum(Path(row["log"]).name in damaged for row in bad)
-    note = f"{len(bad)} failed, {broken} of them damaged; the other {len(damaged) - broken} of the damaged gave a map of what was left"
+    note = (
+        f"{len(bad)} failed, {broken} of them damaged; {len(damaged) - broken} damaged ones gave a map of what was left"
+    )
     yield Figure(group, "failed without a reason", float(sum(not row["reason"] for row in bad)), "", 0.0, note)
     left = list(Path(told["batch"]).glob("*.partial"))
     yield Figure(group, "`.partial` folders left", float(len(left)), "", 0.0)
