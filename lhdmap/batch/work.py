@@ -36,3 +36,15 @@ Work = Callable[[Sequence[str]], Outcome]
 """A function that can be sent to another process."""
 Runner = Callable[[Sequence[Job], Work], Iterator[Ran]]
 """Yields each job once, as it ends, in any order."""
+
+
+class Warm(NamedTuple):
+    """What makes kernels ready on a node, a function that can be sent there, and who hears of it."""
+
+    call: Callable[[], object]
+    told: Callable[[str], None]
+
+
+def needs_kernels(jobs: Sequence[Job]) -> bool:
+    """Return whether any of the jobs matches scans: the others start at once."""
+    return any(job.words[0] in ("build-map", "localize") for job in jobs)

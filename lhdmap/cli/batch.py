@@ -45,6 +45,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     where = parser.add_mutually_exclusive_group()
     where.add_argument("--jobs", type=int, metavar="N", help="processes at the same time (default: one a core)")
     where.add_argument("--cluster", metavar="ADDRESS", help="scheduler of dask.distributed, e.g. tcp://10.0.0.1:8786")
+    parser.add_argument(
+        "--row-time-s", type=float, metavar="S", help="a row that takes longer is ended (default: none)"
+    )
+    parser.add_argument(
+        "--memory-limit-gib", type=float, metavar="GIB", help="a row whose process takes more is ended (default: none)"
+    )
     parser.epilog = "What is complete is skipped; --force runs all rows anew. Exit code 1 where a row failed."
 
 
@@ -83,17 +89,33 @@ def run_words(words: Sequence[str]) -> Outcome:
     return Outcome(exit_code, values if isinstance(values, dict) else {}, said.getvalue()[-_SAID:], figures)
 
 
+def warm_node() -> None:
+    """Compile and load the kernels of mapping on a node."""
+    from lhdmap.config import Settings
+    from lhdmap.live.warm_up import warm_up
+
+    warm_up(Settings(), None)
+
+
 def _runner(arguments: argparse.Namespace, console: Console) -> Runner:
+    from lhdmap.batch.limits import Limits
+    from lhdmap.batch.work import Warm
+
+    limits, warm = Limits(arguments.row_time_s, arguments.memory_limit_gib), Warm(warm_node, console.note)
     if arguments.cluster:
         from lhdmap.batch.cluster import check_installed, run_on_cluster
 
         check_installed()
-        return partial(run_on_cluster, address=arguments.cluster, told=console.note)
+        if limits.any:
+            raise UsageError(
+                "--row-time-s and --memory-limit-gib are of this machine; dask worker has its own --memory-limit"
+            )
+        return partial(run_on_cluster, address=arguments.cluster, told=console.note, warm=warm)
     from lhdmap.batch.pool import run_here
 
     if arguments.jobs is not None and arguments.jobs < 1:
         raise UsageError(f"--jobs {arguments.jobs}: 1 or more was wanted")
-    return partial(run_here, workers=arguments.jobs or _cores())
+    return partial(run_here, workers=arguments.jobs or _cores(), limits=limits, warm=warm)
 
 
 def _cores() -> int:

@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from typing import Any
 
+import lhdmap
 import pytest
-from lhdmap.batch.cluster import run_on_cluster
-from lhdmap.batch.work import Job, Outcome
+from lhdmap.batch.cluster import _timed, run_on_cluster
+from lhdmap.batch.nodes import check_versions
+from lhdmap.batch.work import Job, Outcome, Warm
 from lhdmap.errors import InputError
 
 distributed = pytest.importorskip("distributed")
@@ -44,3 +47,67 @@ def test_without_workers_it_gives_up() -> None:
         pytest.raises(InputError, match="no workers"),
     ):
         list(run_on_cluster([Job("a", ("0",))], _work, cluster.scheduler_address, told.append, patience_s=1.0))
+
+
+def _fails() -> None:
+    raise ValueError("no compiler")
+
+
+def _nothing() -> None:
+    pass
+
+
+def test_kernels_are_made_ready_once_a_node(address: str) -> None:
+    jobs = [Job("a", ("build-map",))]
+    for call, ending in ((_nothing, "s"), (_fails, "kernels are left to the rows: ValueError: no compiler")):
+        told: list[str] = []
+        (ran,) = run_on_cluster(jobs, _first, address, told.append, warm=Warm(call, told.append))
+        assert ran.outcome is not None
+        assert told[0] == "kernels are made ready, once on each of 1 node"
+        assert len(told) == 2
+        assert told[1].startswith("node 127.0.0.1: ")
+        assert told[1].endswith(ending)
+
+
+def _first(words: Sequence[str]) -> Outcome:
+    return Outcome(0, {"asked": words[0]})
+
+
+class _Nodes:
+    """A client of a cluster whose workers are told of: what one process cannot be, several versions."""
+
+    def __init__(self, **workers: dict[str, str]) -> None:
+        self._own = {"python": "3.11.7.final.0", "lhdmap": "1.2", "numpy": "2.1", "dask": "2026.8"}
+        self._workers = {name: self._own | different for name, different in workers.items()}
+
+    def get_versions(self, packages: Sequence[str]) -> dict[str, Any]:
+        assert "lhdmap" in packages
+        workers = {f"tcp://{name}:1": {"packages": versions} for name, versions in self._workers.items()}
+        scheduler = {"python": "3.11.2.final.0", "dask": "2026.8"}  # it needs no lhdmap
+        return {"client": {"packages": self._own}, "scheduler": {"packages": scheduler}, "workers": workers}
+
+    def scheduler_info(self, n_workers: int) -> dict[str, Any]:
+        return {"workers": {f"tcp://{name}:1": {"name": name} for name in self._workers}}
+
+
+def test_nodes_of_other_versions_are_named() -> None:
+    check_versions(_Nodes(one={}, two={"python": "3.11.9.final.0"}))
+    with pytest.raises(InputError) as caught:
+        check_versions(_Nodes(one={}, two={"lhdmap": "1.1"}, three={"lhdmap": ""}, four={"python": "3.12.1.final.0"}))
+    told = str(caught.value)
+    assert "worker two at tcp://two:1 has lhdmap 1.1, here 1.2" in told
+    assert "worker three at tcp://three:1 has no lhdmap, here 1.2" in told
+    assert "worker four at tcp://four:1 has python 3.12, here 3.11" in told
+    assert "worker one" not in told
+
+
+def test_a_worker_that_comes_later_is_looked_at_too() -> None:
+    with pytest.raises(InputError, match=r"9\.9 was wanted"):
+        _timed(_first, ("a",), "9.9")
+
+
+def test_versions_of_a_real_cluster_agree(address: str) -> None:
+    with distributed.Client(address) as client:
+        check_versions(client)
+        found = client.get_versions(packages=["lhdmap"])
+    assert [info["packages"]["lhdmap"] for info in found["workers"].values()] == [lhdmap.__version__]
