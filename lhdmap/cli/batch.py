@@ -42,6 +42,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="folder (default: MANIFEST_batch beside it); gone on with if there",
     )
     add_force(parser)
+    parser.add_argument(
+        "--store", default="", metavar="URL", help="results go here, on an object store: s3://bucket/night"
+    )
     where = parser.add_mutually_exclusive_group()
     where.add_argument("--jobs", type=int, metavar="N", help="processes at the same time (default: one a core)")
     where.add_argument("--cluster", metavar="ADDRESS", help="scheduler of dask.distributed, e.g. tcp://10.0.0.1:8786")
@@ -60,7 +63,9 @@ def run(arguments: argparse.Namespace, console: Console) -> int:
 
     runner = _runner(arguments, console)
     target = arguments.output or beside(arguments.manifest, "batch")
-    request = BatchRequest(arguments.manifest, target.absolute(), run_words, runner, arguments.force, console.note)
+    request = BatchRequest(
+        arguments.manifest, target.absolute(), run_words, runner, arguments.force, console.note, arguments.store
+    )
     result = run_batch(request)
     values = result.to_json()
     failed = [row for row in result.rows if row.status == "failed"]
