@@ -6,28 +6,35 @@ import time
 from collections.abc import Callable, Iterator, Mapping
 from typing import Any
 
+from lhdmap import __version__
 from lhdmap.batch.work import Warm
 from lhdmap.errors import InputError
 from lhdmap.extras import library
 
 _TALK = ("python", "distributed", "dask", "cloudpickle", "msgpack")
 """What the scheduler must have in common with the others, to understand them."""
-_WORK = (*_TALK, "lhdmap", "numpy", "scipy", "numba")
+_LIBRARIES = ("numpy", "scipy", "numba")
+_WORK = (*_TALK, "lhdmap", *_LIBRARIES)
 """And the workers, to come to the same digits."""
+OWN_VERSION = "__import__('lhdmap').__version__"
+"""Asked of each worker in words: an older lhdmap does not have the functions of this one, and may be no installed distribution."""
 _LOOK_S = 2.0
 
 
 def check_versions(client: Any) -> None:
     """Raise InputError with the names of the nodes whose versions are not those of this process.
 
-    `get_versions(check=True)` itself warns only, and names no worker.
+    `get_versions(check=True)` itself warns only, names no worker, and knows installed distributions, not what is imported.
     """
-    found = client.get_versions(packages=[name for name in _WORK if name not in _TALK])
+    found = client.get_versions(packages=list(_LIBRARIES))
+    own = client.run(eval, OWN_VERSION, on_error="return")
     names = {address: info.get("name", address) for address, info in workers_of(client).items()}
-    here = found["client"]["packages"]
+    here = {**found["client"]["packages"], "lhdmap": __version__}
     different = list(_differences("the scheduler", found["scheduler"], here, _TALK))
     for address, info in found["workers"].items():
-        different += _differences(f"worker {names.get(address, '')} at {address}", info, here, _WORK)
+        told = own.get(address)
+        there = {**((info or {}).get("packages") or {}), "lhdmap": told if isinstance(told, str) else ""}
+        different += _differences(f"worker {names.get(address, '')} at {address}", {"packages": there}, here, _WORK)
     if different:
         raise InputError(f"versions differ: {'; '.join(different)}\ninstall the same lhdmap and libraries on all nodes")
 

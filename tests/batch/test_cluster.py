@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
 import lhdmap
 import pytest
 from lhdmap.batch.cluster import _timed, run_on_cluster
-from lhdmap.batch.nodes import check_versions
+from lhdmap.batch.nodes import OWN_VERSION, check_versions
 from lhdmap.batch.work import Job, Outcome, Warm
 from lhdmap.errors import InputError
 
@@ -77,14 +77,19 @@ class _Nodes:
     """A client of a cluster whose workers are told of: what one process cannot be, several versions."""
 
     def __init__(self, **workers: dict[str, str]) -> None:
-        self._own = {"python": "3.11.7.final.0", "lhdmap": "1.2", "numpy": "2.1", "dask": "2026.8"}
+        self._own = {"python": "3.11.7.final.0", "lhdmap": lhdmap.__version__, "numpy": "2.1", "dask": "2026.8"}
         self._workers = {name: self._own | different for name, different in workers.items()}
 
     def get_versions(self, packages: Sequence[str]) -> dict[str, Any]:
-        assert "lhdmap" in packages
+        assert "numba" in packages
         workers = {f"tcp://{name}:1": {"packages": versions} for name, versions in self._workers.items()}
         scheduler = {"python": "3.11.2.final.0", "dask": "2026.8"}  # it needs no lhdmap
         return {"client": {"packages": self._own}, "scheduler": {"packages": scheduler}, "workers": workers}
+
+    def run(self, call: Callable[[str], str], words: str, on_error: str) -> dict[str, object]:
+        assert (call(words), on_error) == (lhdmap.__version__, "return")
+        told = {name: versions["lhdmap"] or ImportError("lhdmap") for name, versions in self._workers.items()}
+        return {f"tcp://{name}:1": version for name, version in told.items()}
 
     def scheduler_info(self, n_workers: int) -> dict[str, Any]:
         return {"workers": {f"tcp://{name}:1": {"name": name} for name in self._workers}}
@@ -93,10 +98,10 @@ class _Nodes:
 def test_nodes_of_other_versions_are_named() -> None:
     check_versions(_Nodes(one={}, two={"python": "3.11.9.final.0"}))
     with pytest.raises(InputError) as caught:
-        check_versions(_Nodes(one={}, two={"lhdmap": "1.1"}, three={"lhdmap": ""}, four={"python": "3.12.1.final.0"}))
+        check_versions(_Nodes(one={}, two={"lhdmap": "0.0.9"}, three={"lhdmap": ""}, four={"python": "3.12.1.final.0"}))
     told = str(caught.value)
-    assert "worker two at tcp://two:1 has lhdmap 1.1, here 1.2" in told
-    assert "worker three at tcp://three:1 has no lhdmap, here 1.2" in told
+    assert f"worker two at tcp://two:1 has lhdmap 0.0.9, here {lhdmap.__version__}" in told
+    assert f"worker three at tcp://three:1 has no lhdmap, here {lhdmap.__version__}" in told
     assert "worker four at tcp://four:1 has python 3.12, here 3.11" in told
     assert "worker one" not in told
 
@@ -109,5 +114,4 @@ def test_a_worker_that_comes_later_is_looked_at_too() -> None:
 def test_versions_of_a_real_cluster_agree(address: str) -> None:
     with distributed.Client(address) as client:
         check_versions(client)
-        found = client.get_versions(packages=["lhdmap"])
-    assert [info["packages"]["lhdmap"] for info in found["workers"].values()] == [lhdmap.__version__]
+        assert list(client.run(eval, OWN_VERSION).values()) == [lhdmap.__version__]
