@@ -64,7 +64,7 @@ class Store:
 
     def send(self, folder: Path, names: Sequence[str]) -> None:
         """Copy files and folders of a folder there, in that order; raise InputError where that fails."""
-        files, root = library("fsspec").core.url_to_fs(self.url.rstrip("/"))
+        files, root = _files_at(self.url)
         with _told_of(self.url):
             for name in names:
                 for path in _files(folder / name):
@@ -74,7 +74,7 @@ class Store:
 
     def fetch(self, name: str, folder: Path) -> None:
         """Copy the folder of a name from there; nothing where it is not there."""
-        files, root = library("fsspec").core.url_to_fs(self.at(name))
+        files, root = _files_at(self.at(name))
         with _told_of(self.url):
             there = files.isdir(root)
         if there:
@@ -119,7 +119,7 @@ class Staged:
 def stamp_of(url: str) -> list[str] | None:
     """Return size and time or tag of something on a store: that it is another one now; None where it is not there."""
     try:
-        files, path = library("fsspec").core.url_to_fs(url)
+        files, path = _files_at(url)
         info = files.info(path)
     except Exception:  # noqa: BLE001  # each store has errors of its own; the row itself will tell
         return None
@@ -128,7 +128,7 @@ def stamp_of(url: str) -> list[str] | None:
 
 def _fetch(url: str, target: Path) -> None:
     """Copy a file, or a folder with all that is in it."""
-    files, root = library("fsspec").core.url_to_fs(url.rstrip("/"))
+    files, root = _files_at(url)
     with _told_of(url):
         if not files.isdir(root):
             target.parent.mkdir(parents=True, exist_ok=True)
@@ -151,7 +151,7 @@ def _send_result(folder: Path, url: str, urls: Mapping[str, str]) -> None:
     for name in last:
         described = folder / name
         described.write_text(_renamed(described.read_text(encoding="utf-8"), urls), encoding="utf-8")
-    files, path = library("fsspec").core.url_to_fs(url)
+    files, path = _files_at(url)
     with _told_of(url):
         for name in DESCRIPTIONS:
             if files.exists(f"{path}/{name}"):
@@ -159,6 +159,13 @@ def _send_result(folder: Path, url: str, urls: Mapping[str, str]) -> None:
         if files.exists(path):
             files.rm(path, recursive=True)
     Store(url).send(folder, [*sorted(names - set(last)), *last])
+
+
+def _files_at(url: str) -> tuple[Any, str]:
+    """Return the store of a URL and the path in it; listings that it has kept may be of before another node wrote."""
+    files, path = library("fsspec").core.url_to_fs(url.rstrip("/"))
+    files.invalidate_cache()
+    return files, path
 
 
 def _files(path: Path) -> Iterator[Path]:
