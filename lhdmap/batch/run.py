@@ -11,7 +11,8 @@ from typing import Any
 
 from lhdmap.batch.ledger import ROWS, Ledger, RowResult
 from lhdmap.batch.manifest import Task, read_manifest
-from lhdmap.batch.store import Staged, Store, check_store, is_url
+from lhdmap.batch.staged import Staged
+from lhdmap.batch.store import Store, check_store, is_url
 from lhdmap.batch.table import write_table
 from lhdmap.batch.work import Job, Runner, Work
 from lhdmap.descriptions import SOFTWARE, description_name, kind_of

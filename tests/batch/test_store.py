@@ -12,7 +12,8 @@ from typing import Any
 import pytest
 from lhdmap.batch.pool import run_here
 from lhdmap.batch.run import BatchRequest, BatchResult, run_batch
-from lhdmap.batch.store import Staged, Store, check_store, is_url
+from lhdmap.batch.staged import Staged
+from lhdmap.batch.store import Store, check_store, is_url
 from lhdmap.batch.work import Outcome
 from lhdmap.errors import UsageError
 
