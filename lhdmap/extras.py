@@ -31,6 +31,7 @@ LIBRARIES = {
     "ezdxf": Library("ezdxf", "export"),
     "pye57": Library("pye57", "e57"),
     "distributed": Library("distributed", "cluster"),
+    "fsspec": Library("fsspec", "store"),
     "zenoh": Library("eclipse-zenoh", "live"),
     "websockets": Library("websockets", "live"),
     "cyclonedds": Library("cyclonedds", "dds"),

@@ -8,13 +8,14 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
+from lhdmap.batch.store import is_url
 from lhdmap.errors import InputError, UsageError
 from lhdmap.names import beside
 from lhdmap.settings import nearest
 
-LOG, COMMAND, NAME = "log", "command", "name"
+LOG, COMMAND, NAME, SHIFT = "log", "command", "name", "shift"
 OPTIONS = ("map", "machine", "config")
-COLUMNS = (LOG, *OPTIONS, COMMAND, NAME)
+COLUMNS = (LOG, *OPTIONS, COMMAND, NAME, SHIFT)
 DEFAULT = "build-map"
 RESERVED = ("rows", "batch.parquet", "report.html", "run.json")
 
@@ -39,13 +40,17 @@ KINDS: Mapping[str, Kind] = {
 
 
 class Task(NamedTuple):
-    """A row: the log as it is named and where it is, the command, its options (files), and the name of its result."""
+    """A row: the log as it is named and where it is, the command, its options (files), the name of its result, its shift.
+
+    Logs and files are paths, or URLs as they are named.
+    """
 
     log: str
     path: Path
     command: str
-    options: tuple[tuple[str, Path], ...]
+    options: tuple[tuple[str, str], ...]
     name: str
+    shift: str = ""
 
     @property
     def kind(self) -> Kind:
@@ -53,17 +58,28 @@ class Task(NamedTuple):
         return KINDS[self.command]
 
     @property
+    def place(self) -> str:
+        """The log as its command is given it."""
+        return self.log if is_url(self.log) else str(self.path)
+
+    @property
+    def machine(self) -> str:
+        """What the machine is called: the name of its file without the ending, empty for the default one."""
+        path = dict(self.options).get("machine")
+        return "" if path is None else Path(path).stem
+
+    @property
     def asked(self) -> list[str]:
         """What is asked for, whatever it is called and wherever it goes."""
-        return [self.command, str(self.path), *(f"{name}={path}" for name, path in self.options)]
+        return [self.command, self.place, *(f"{name}={path}" for name, path in self.options)]
 
-    def words(self, folder: Path, *, force: bool = False) -> list[str]:
-        """Return the words of the command line whose result goes into `folder`."""
-        words = [self.command, str(self.path), "--json", *self.kind.words]
+    def words(self, folder: Path | str, *, force: bool = False) -> list[str]:
+        """Return the words of the command line whose result goes into `folder`, a path or a URL."""
+        words = [self.command, self.place, "--json", *self.kind.words]
         for name, path in self.options:
-            words += [f"--{name}", str(path)]
+            words += [f"--{name}", path]
         if self.kind.writes:
-            words += ["-o", str(folder / self.name), *(["--force"] if force else [])]
+            words += ["-o", f"{folder}/{self.name}", *(["--force"] if force else [])]
         return words
 
 
@@ -114,17 +130,22 @@ def _task(path: Path, number: int, row: Mapping[str, str]) -> Task:
     if command not in KINDS:
         raise UsageError(f"{where}: unknown command '{command}'{nearest(command, KINDS)}; known: {', '.join(KINDS)}")
     kind = KINDS[command]
-    options = {name: (path.parent / row[name]).absolute() for name in OPTIONS if row.get(name)}
+    options = {name: _placed(path, row[name]) for name in OPTIONS if row.get(name)}
     for name in sorted(set(options) - kind.takes):
         raise UsageError(f"{where}: '{command}' takes no {name}; leave the cell empty")
     for name in sorted(kind.wants - set(options)):
         raise UsageError(f"{where}: '{command}' wants a {name}")
-    log, name = (path.parent / row[LOG]).absolute(), row.get(NAME, "")
+    log, name = Path(_placed(path, row[LOG])), row.get(NAME, "")
     if name and (Path(name).name != name or name.startswith(".") or name in RESERVED):
         raise UsageError(
             f"{where}: name = '{name}': a name for a folder was wanted, without a path, none of {RESERVED}"
         )
-    return Task(row[LOG], log, command, tuple(options.items()), name or beside(log, kind.what).name)
+    return Task(row[LOG], log, command, tuple(options.items()), name or beside(log, kind.what).name, row.get(SHIFT, ""))
+
+
+def _placed(manifest: Path, cell: str) -> str:
+    """Return a URL as it is, a path relative to the manifest as an absolute one."""
+    return cell if is_url(cell) else str((manifest.parent / cell).absolute())
 
 
 def _named(tasks: Sequence[Task]) -> list[Task]:

@@ -11,6 +11,8 @@ from typing import Any
 
 from lhdmap.batch.ledger import ROWS, Ledger, RowResult
 from lhdmap.batch.manifest import Task, read_manifest
+from lhdmap.batch.staged import Staged
+from lhdmap.batch.store import Store, check_store, is_url
 from lhdmap.batch.table import write_table
 from lhdmap.batch.work import BatchJob, Runner, Work
 from lhdmap.descriptions import SOFTWARE, description_name, kind_of
@@ -30,7 +32,8 @@ Told = Callable[[str], None]
 class BatchRequest:
     """The manifest, the folder that it goes to, what runs a command line and where; `force`: all rows anew.
 
-    `told` hears a line for each row that is over.
+    `told` hears a line for each row that is over. `store` is the URL of a folder that results go to instead, with a copy of all
+    else at the end.
     """
 
     manifest: Path
@@ -39,6 +42,7 @@ class BatchRequest:
     runner: Runner
     force: bool = False
     told: Told = lambda _: None
+    store: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,13 +76,31 @@ def run_batch(request: BatchRequest) -> BatchResult:
             raise UsageError(f"{request.target}: another batch is writing it; wait for that one, or -o OTHER")
         _describe(request, {})
         held.enter_context(before_interrupt(lambda: _kept(request.target)))
-        rows = _run(request, tasks, Ledger(request.target))
+        store = _store(request, tasks)
+        rows = _run(request, tasks, Ledger(request.target, store))
         result = BatchResult(request.target, rows)
         write_table(request.target / TABLE, rows)
         write_batch_report(request.target / REPORT, request.manifest.name, result.to_json(), _page_rows(rows))
         told = result.to_json()
         _describe(request, {key: told[key] for key in ("total", "done", "failed", "skipped", "retried")})
+        if store is not None:
+            store.send(request.target, [ROWS, TABLE, REPORT, description_name(KIND)])
     return result
+
+
+def _store(request: BatchRequest, tasks: Sequence[Task]) -> Store | None:
+    """Return where results go, after what is needed for all URLs has been looked for; rows of an earlier batch are fetched."""
+    urls = [request.store, *(task.log for task in tasks), *(value for task in tasks for _, value in task.options)]
+    for url in {f"{one.partition('://')[0]}://": one for one in urls if is_url(one)}.values():
+        check_store(url)
+    if not request.store:
+        return None
+    if not is_url(request.store):
+        raise UsageError(f"--store {request.store}: a URL was wanted, such as s3://bucket/night")
+    store = Store(request.store)
+    if not any((request.target / ROWS).glob("*.json")):
+        store.fetch(ROWS, request.target)
+    return store
 
 
 def _kept(target: Path) -> Path | None:
@@ -103,9 +125,12 @@ def _run(request: BatchRequest, tasks: Sequence[Task], ledger: Ledger) -> list[R
         request.told(f"{skipped} of {len(tasks)} rows are complete already")
     for task in wanted:
         ledger.clear(task)
-    jobs = [BatchJob(task.name, tuple(task.words(request.target, force=ledger.stands(task)))) for task in wanted]
+    jobs = [
+        BatchJob(task.name, tuple(task.words(request.store or request.target, force=ledger.stands(task))))
+        for task in wanted
+    ]
     by_name, began_s = {task.name: task for task in wanted}, time.monotonic()
-    runs = request.runner(jobs, request.work) if jobs else iter(())
+    runs = request.runner(jobs, Staged(request.work)) if jobs else iter(())
     for number, ran in enumerate(runs, start=1):
         result = ledger.write(by_name[ran.key], ran)
         found[ran.key] = result
@@ -129,10 +154,19 @@ def _page_rows(rows: Sequence[RowResult]) -> list[dict[str, Any]]:
     """Return rows for the page, with links relative to it."""
     told = []
     for row in rows:
-        report = None if row.folder is None else row.folder / "report.html"
-        link = None if report is None or not report.is_file() else f"{row.task.name}/report.html"
-        told.append({**row.to_json(), "name": row.task.name, "link": link, "wall_s": row.wall_s, "values": row.values})
+        there = row.folder is not None and (is_url(row.folder) or (Path(row.folder) / REPORT).is_file())
+        link = f"{row.task.name}/{REPORT}" if there else None
+        told.append(
+            {**row.to_json(), "name": row.task.name, "link": link, "wall_s": row.wall_s, "values": row.values}
+            | _trend(row)
+        )
     return told
+
+
+def _trend(row: RowResult) -> dict[str, Any]:
+    """Return what the trends want of a row; its shift is the day on which its log begins where the manifest has none."""
+    shift = row.task.shift or str(row.figures.get("began", ""))[:10]
+    return {"machine": row.task.machine or "default", "shift": shift, "figures": row.figures}
 
 
 def _describe(request: BatchRequest, counts: dict[str, int]) -> None:

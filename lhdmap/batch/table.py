@@ -28,9 +28,11 @@ def _cells(row: RowResult) -> dict[str, Any]:
         "command": row.task.command,
         "status": row.status,
     }
-    own |= {"reason": row.reason or None, "map": None if row.map is None else str(row.map)}
-    own |= {"run": None if row.folder is None else str(row.folder), "retried": row.retried, "seconds": row.wall_s}
-    figures = {key: value for key, value in row.values.items() if isinstance(value, (bool, int, float, str))}
+    own |= {"reason": row.reason or None, "map": row.map}
+    own |= {"run": row.folder, "retried": row.retried, "seconds": row.wall_s}
+    own |= {"machine": row.task.machine or None, "shift": row.task.shift or None}
+    told = {**row.figures, **row.values}
+    figures = {key: value for key, value in told.items() if isinstance(value, (bool, int, float, str))}
     return own | {key: value for key, value in figures.items() if key not in own}
 
 

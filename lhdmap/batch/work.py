@@ -7,11 +7,12 @@ from typing import Any, NamedTuple
 
 
 class JobOutcome(NamedTuple):
-    """What came of a command line: exit code, the object of `--json`, what it said on standard error."""
+    """What came of a command line: exit code, the object of `--json`, what it said on standard error, figures of its folder."""
 
     exit_code: int
     values: Mapping[str, Any]
     said: str = ""
+    figures: Mapping[str, Any] = {}
 
 
 class BatchJob(NamedTuple):
@@ -35,3 +36,15 @@ Work = Callable[[Sequence[str]], JobOutcome]
 """A function that can be sent to another process."""
 Runner = Callable[[Sequence[BatchJob], Work], Iterator[Ran]]
 """Yields each job once, as it ends, in any order."""
+
+
+class Warm(NamedTuple):
+    """What makes kernels ready on a node, a function that can be sent there, and who hears of it."""
+
+    call: Callable[[], object]
+    told: Callable[[str], None]
+
+
+def needs_kernels(jobs: Sequence[BatchJob]) -> bool:
+    """Return whether any of the jobs matches scans: the others start at once."""
+    return any(job.words[0] in ("build-map", "localize") for job in jobs)

@@ -31,7 +31,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "manifest",
         type=Path,
         metavar="MANIFEST.csv",
-        help="a line a log: log, optionally map, machine, config, command (build-map, localize, pile, doctor, replay), name",
+        help="a line a log: log, optionally map, machine, config, command (build-map, localize, pile, doctor, replay), "
+        "name, shift",
     )
     parser.add_argument(
         "-o",
@@ -41,9 +42,18 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="folder (default: MANIFEST_batch beside it); gone on with if there",
     )
     add_force(parser)
+    parser.add_argument(
+        "--store", default="", metavar="URL", help="results go here, on an object store: s3://bucket/night"
+    )
     where = parser.add_mutually_exclusive_group()
     where.add_argument("--jobs", type=int, metavar="N", help="processes at the same time (default: one a core)")
     where.add_argument("--cluster", metavar="ADDRESS", help="scheduler of dask.distributed, e.g. tcp://10.0.0.1:8786")
+    parser.add_argument(
+        "--row-time-s", type=float, metavar="S", help="a row that takes longer is ended (default: none)"
+    )
+    parser.add_argument(
+        "--memory-limit-gib", type=float, metavar="GIB", help="a row whose process takes more is ended (default: none)"
+    )
     parser.epilog = "What is complete is skipped; --force runs all rows anew. Exit code 1 where a row failed."
 
 
@@ -53,7 +63,9 @@ def run(arguments: argparse.Namespace, console: Console) -> int:
 
     runner = _runner(arguments, console)
     target = arguments.output or beside(arguments.manifest, "batch")
-    request = BatchRequest(arguments.manifest, target.absolute(), run_words, runner, arguments.force, console.note)
+    request = BatchRequest(
+        arguments.manifest, target.absolute(), run_words, runner, arguments.force, console.note, arguments.store
+    )
     result = run_batch(request)
     values = result.to_json()
     failed = [row for row in result.rows if row.status == "failed"]
@@ -67,6 +79,7 @@ def run(arguments: argparse.Namespace, console: Console) -> int:
 
 def run_words(words: Sequence[str]) -> JobOutcome:
     """Run one command line in this process and return what came of it: what workers do."""
+    from lhdmap.batch.figures import folder_figures
     from lhdmap.batch.work import JobOutcome
     from lhdmap.cli.main import main
 
@@ -77,20 +90,37 @@ def run_words(words: Sequence[str]) -> JobOutcome:
         values = json.loads(printed.getvalue() or "{}")
     except ValueError:
         values = {}
-    return JobOutcome(exit_code, values if isinstance(values, dict) else {}, said.getvalue()[-_SAID:])
+    figures = folder_figures(Path(words[words.index("-o") + 1])) if "-o" in words else {}
+    return JobOutcome(exit_code, values if isinstance(values, dict) else {}, said.getvalue()[-_SAID:], figures)
+
+
+def warm_node() -> None:
+    """Compile and load the kernels of mapping on a node."""
+    from lhdmap.config import Settings
+    from lhdmap.live.warm_up import warm_up
+
+    warm_up(Settings(), None)
 
 
 def _runner(arguments: argparse.Namespace, console: Console) -> Runner:
+    from lhdmap.batch.limits import Limits
+    from lhdmap.batch.work import Warm
+
+    limits, warm = Limits(arguments.row_time_s, arguments.memory_limit_gib), Warm(warm_node, console.note)
     if arguments.cluster:
         from lhdmap.batch.cluster import check_installed, run_on_cluster
 
         check_installed()
-        return partial(run_on_cluster, address=arguments.cluster, told=console.note)
+        if limits.any:
+            raise UsageError(
+                "--row-time-s and --memory-limit-gib are of this machine; dask worker has its own --memory-limit"
+            )
+        return partial(run_on_cluster, address=arguments.cluster, told=console.note, warm=warm)
     from lhdmap.batch.pool import run_here
 
     if arguments.jobs is not None and arguments.jobs < 1:
         raise UsageError(f"--jobs {arguments.jobs}: 1 or more was wanted")
-    return partial(run_here, workers=arguments.jobs or _cores())
+    return partial(run_here, workers=arguments.jobs or _cores(), limits=limits, warm=warm)
 
 
 def _cores() -> int:

@@ -1,4 +1,4 @@
-"""The page of a batch: how many logs, what failed and why, and a line for each with a link to its report."""
+"""The page of a batch: how many logs, what failed and why, trends, and a line for each with a link to its report."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from typing import Any
 from urllib.parse import quote
 
 from lhdmap.report import markup
+from lhdmap.report.batch_trends import trend_section
 
 _FIGURES = (
     ("distance_m", "way, m", 1),
@@ -19,12 +20,16 @@ _FIGURES = (
 
 
 def write_batch_report(path: Path, manifest: str, values: Mapping[str, Any], rows: Sequence[Mapping[str, Any]]) -> None:
-    """Write one HTML page; `values` are those of `--json`, a row has besides `name`, `link`, `wall_s` and `values`."""
+    """Write one HTML page; `values` are those of `--json`.
+
+    A row has besides `name`, `link`, `wall_s`, `values`, `machine`, `shift` and `figures` (those of `lhdmap.batch.figures`).
+    """
     failed = [row for row in rows if row["status"] == "failed"]
     reasons = [(str(row["log"]), str(row["command"]), str(row["reason"])) for row in failed]
     parts = [
         markup.section("What happened", markup.cards(_cards(values))),
         markup.section("Failed", markup.table(("log", "command", "why"), reasons) if reasons else ""),
+        trend_section(rows),
         markup.section("All logs", _table(rows)),
     ]
     path.write_text(markup.document(f"Batch {html.escape(manifest)}", "".join(parts)), encoding="utf-8")

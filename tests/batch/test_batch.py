@@ -79,7 +79,7 @@ def test_table_page_and_folder(first: tuple[Path, BatchResult, list[str]]) -> No
     assert not list((folder / "out").glob("*.partial"))
     assert (folder / "out" / "rows" / "fails_pile.txt").read_text() == "lhdmap: not a log\n"
     assert json.loads((folder / "out" / "run.json").read_text())["counts"]["failed"] == 3
-    assert result.rows[0].folder == folder / "out" / "good_pile"
+    assert result.rows[0].folder == str(folder / "out" / "good_pile")
 
 
 def test_a_second_run_takes_what_is_missing(tmp_path: Path) -> None:

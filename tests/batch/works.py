@@ -16,6 +16,15 @@ from lhdmap.batch.work import JobOutcome
 MADE = {"kind": "pile", "software": {"name": "lhdmap", "version": "0"}}
 
 
+def warm() -> None:
+    """Succeed."""
+
+
+def warm_dies() -> None:
+    """Take the process along."""
+    os.kill(os.getpid(), signal.SIGKILL)
+
+
 def work(words: Sequence[str]) -> JobOutcome:
     """Do what the log's name says: die always, die once, raise, fail, or write a folder; each try leaves a mark beside the log."""
     log = Path(words[1])
@@ -26,14 +35,7 @@ def work(words: Sequence[str]) -> JobOutcome:
         partial = Path(f"{words[words.index('-o') + 1]}.partial")
         partial.mkdir(exist_ok=True)
         (partial / ".lhdmap").touch()
-    if log.stem.startswith("killed") or (log.stem.startswith("once") and tries == 1):
-        os.kill(os.getpid(), signal.SIGKILL)
-    if log.stem.startswith("late"):
-        threading.Timer(0.1, os.kill, (os.getpid(), signal.SIGKILL)).start()
-    if log.stem.startswith("slow"):
-        time.sleep(0.5)
-    if log.stem.startswith("raises"):
-        raise ValueError("odd")
+    _go_wrong(log, tries)
     if log.stem.startswith("fails"):
         return JobOutcome(
             3, {"error": {"kind": "input", "message": "not a log", "exit_code": 3}}, "lhdmap: not a log\n"
@@ -46,3 +48,19 @@ def work(words: Sequence[str]) -> JobOutcome:
         (partial.with_suffix("") / "run.json").write_text(json.dumps({**MADE, "sources": sources}))
         (partial.with_suffix("") / "report.html").touch()
     return JobOutcome(0, {"width_m": 3.5, "status": "loadable", "boulders": []})
+
+
+def _go_wrong(log: Path, tries: int) -> None:
+    if log.stem.startswith("killed") or (log.stem.startswith("once") and tries == 1):
+        os.kill(os.getpid(), signal.SIGKILL)
+    if log.stem.startswith("late"):
+        threading.Timer(0.1, os.kill, (os.getpid(), signal.SIGKILL)).start()
+    if log.stem.startswith("long"):
+        time.sleep(60.0)
+    if log.stem.startswith("fat"):
+        held = b"x" * 400_000_000
+        time.sleep(60.0 + len(held[:0]))
+    if log.stem.startswith("slow"):
+        time.sleep(0.5)
+    if log.stem.startswith("raises"):
+        raise ValueError("odd")
