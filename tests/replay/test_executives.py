@@ -176,6 +176,15 @@ def test_a_machine_among_others_is_told_where_it_may_be() -> None:
     assert orders.free == frozenset({"T1.1", "I1"})
 
 
+@pytest.mark.parametrize(("its_own", "begun"), [({"T1.1"}, 0), ({"T1.1", "I1", "T1.2"}, 1)])
+def test_loading_is_not_begun_before_the_draw_point_is_its_own(its_own: set[str], begun: int) -> None:
+    task, topology = Scripted(TO_LOAD), map_of_plan("cycle")
+    made = Executive(task, [], topology, 10.0, Journal().of("mission"), free=lambda: frozenset(its_own))
+    bench = Bench(made, task, [])
+    number = bench.orders(TO_LOAD, (LOCATED, located()), (MACHINE_SAYS, HEALTH)).number
+    assert bench.orders(TO_LOAD, navigating(number, 20.0)).loading == begun
+
+
 @pytest.mark.parametrize("bench", ["underground", "surface"])
 def test_both_write_the_same_lines_and_say_how_far_it_is(bench: str, request: pytest.FixtureRequest) -> None:
     made: Bench = request.getfixturevalue(bench)
