@@ -53,6 +53,21 @@ def ways_of(errand: Errand) -> list[tuple[str, str]]:
     ]
 
 
+def check_pull_back(layout: Layout, errands: Mapping[str, Errand], room_m: float) -> None:
+    """Check that a machine that has pulled back from its pile by `room_m`, its length with it, is in the draw point's section.
+
+    Raises:
+        UsageError: it would reach into the next one, in which another machine may be.
+    """
+    for point in dict.fromkeys(errand.load for errand in errands.values()):
+        edge = layout.edges[layout.entering[point][0]]
+        if edge.length_m < room_m:
+            raise UsageError(
+                f"draw point {point}: its section {edge.held} has {edge.length_m:.1f} m behind it, a machine that pulls back "
+                f"needs {room_m:.1f} m: sections cannot be held"
+            )
+
+
 def _edges(layout: Layout, start: str, goal: str) -> list[Edge]:
     route = layout.route(start, goal)
     if route is None:

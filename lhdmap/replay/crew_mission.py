@@ -11,7 +11,7 @@ from lhdmap.driving.bodies import bodies_of
 from lhdmap.driving.model import drive_model
 from lhdmap.errors import UsageError
 from lhdmap.haulage.fleet import Fleet, Member
-from lhdmap.haulage.joining import ways_of, with_sections
+from lhdmap.haulage.joining import check_pull_back, ways_of, with_sections
 from lhdmap.haulage.layout import Layout, checked
 from lhdmap.haulage.machine import Errand
 from lhdmap.haulage.mission_io import Buckets
@@ -74,6 +74,7 @@ def crew_mission(scenario: Scenario, crew: Mapping[str, Parts]) -> CrewMission:
     drives = {way: legs(*way) for errand in errands.values() for way in ways_of(errand)}
     least_m = tail_m + _OUT_M + tail_m + ROOM_M  # in reverse the rear is ahead of `base_link` by so much
     layout = with_sections(checked(layout_of_map(topology, scenario.mine)), topology, errands, drives, least_m)
+    check_pull_back(layout, errands, parts.settings.loading.pull_back_m + tail_m)
     fleet = Fleet(layout, errands, parts.settings.haulage, tail_m + _OUT_M)
     orders = {name: [Buckets(one.source, one.to, one.buckets) for one in ones] for name, ones in wanted.items()}
     return CrewMission({name: Job(fleet.member(name), orders[name], avoid) for name in crew}, layout)

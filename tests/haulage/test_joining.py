@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from lhdmap.errors import UsageError
 from lhdmap.haulage.fleet import Fleet
-from lhdmap.haulage.joining import Drives, ways_of, with_sections
+from lhdmap.haulage.joining import Drives, check_pull_back, ways_of, with_sections
 from lhdmap.haulage.layout import Layout, checked
 from lhdmap.haulage.machine import Errand
 from lhdmap.haulage.of_map import layout_of_map
@@ -87,6 +87,15 @@ def test_a_change_of_gear_where_another_one_works_is_refused(topology: Topologic
     turns = leg(["T1.3", "I2"], ["", "I2.B1.0"], inversion=True)
     with pytest.raises(UsageError, match="from DP1 to OP1 machines change gear in B1, where another one may stand"):
         with_sections(layout, topology, ERRANDS, {**no_turns(), ("DP1", "OP1"): [turns]}, 0.0)
+
+
+def test_a_draw_point_without_room_to_pull_back_in_is_refused(layout: Layout) -> None:
+    behind_m = min(layout.edges[layout.entering[point][0]].length_m for point in ("DP1", "DP2", "DP3"))
+    check_pull_back(layout, ERRANDS, behind_m - 0.1)
+    with pytest.raises(
+        UsageError, match=r"draw point DP\d: its section .* has .* m behind it, a machine that pulls back"
+    ):
+        check_pull_back(layout, ERRANDS, behind_m + 0.1)
 
 
 def test_a_short_section_between_two_places_of_work_is_refused() -> None:
