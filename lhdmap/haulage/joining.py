@@ -54,17 +54,20 @@ def ways_of(errand: Errand) -> list[tuple[str, str]]:
 
 
 def check_pull_back(layout: Layout, errands: Mapping[str, Errand], room_m: float) -> None:
-    """Check that a machine that has pulled back from its pile by `room_m`, its length with it, is in the draw point's section.
+    """Check that a machine that has pulled back from its pile by `room_m`, its length with it, reaches into nobody's section.
 
     Raises:
-        UsageError: it would reach into the next one, in which another machine may be.
+        UsageError: the draw point's section is shorter, and another machine drives through the one behind it.
     """
-    for point in dict.fromkeys(errand.load for errand in errands.values()):
-        edge = layout.edges[layout.entering[point][0]]
-        if edge.length_m < room_m:
+    for name, errand in errands.items():
+        edge = layout.edges[layout.entering[errand.load][0]]
+        behind = [one.held for one in _edges(layout, errand.load, errand.dump) if one.held != edge.held][:1]
+        others = [ways_of(one) for other, one in errands.items() if other != name]
+        used = {one.held for ways in others for way in ways for one in _edges(layout, *way)}
+        if edge.length_m < room_m and used.intersection(behind):
             raise UsageError(
-                f"draw point {point}: its section {edge.held} has {edge.length_m:.1f} m behind it, a machine that pulls back "
-                f"needs {room_m:.1f} m: sections cannot be held"
+                f"draw point {errand.load}: its section {edge.held} has {edge.length_m:.1f} m behind it, a machine that "
+                f"pulls back into {behind[0]} needs {room_m:.1f} m: sections cannot be held"
             )
 
 
