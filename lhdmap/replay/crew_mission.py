@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
@@ -59,9 +60,15 @@ def crew_mission(scenario: Scenario, crew: Mapping[str, Parts]) -> CrewMission:
     nose_m, tail_m = float(bodies.front_m[:, 0].max()), model.wheelbase_m - float(bodies.rear_m[:, 0].min())
     planner = RoutePlanner(topology, parts.settings.movement)
 
+    faces = {own.park: _heading_of(own) for own in crew.values()}
+
     def legs(start: str, goal: str) -> list[Leg]:
         begin, end = _waypoint(topology, start), _waypoint(topology, goal)
-        way = Way(goal, float(begin.pose[3]), tuple(node for node in avoid if node not in (begin.node, end.node)))
+        way = Way(
+            goal,
+            faces.get(start, float(begin.pose[3])),
+            tuple(node for node in avoid if node not in (begin.node, end.node)),
+        )
         route = route_from(planner, begin.id, way, Reach(nose_m, tail_m, navigation.room_m))
         if not route.feasible:
             raise UsageError(f"mission: {route.reason}")
@@ -90,6 +97,12 @@ def section_watch(given: CrewMission, crew: Mapping[str, Parts], scribe: Scribe)
     origin = np.zeros(4) if parts.T_mine_map is None else parts.T_mine_map
     topology, bodies = parts.autonomous.known.topology, (bodies_of(parts.machine), parts.machine)
     return SectionWatch(spaces, topology, section_of, origin, bodies, scribe)
+
+
+def _heading_of(parts: Parts) -> float:
+    """Return how a machine stands at first, in the map: not always as it stood there in the teaching drive."""
+    origin = np.zeros(4) if parts.T_mine_map is None else parts.T_mine_map
+    return math.remainder(parts.start.yaw_rad - float(origin[3]), 2.0 * math.pi)
 
 
 def _waypoint(topology: TopologicalMap, name: str) -> Waypoint:
