@@ -32,6 +32,7 @@ from lhdmap.replay.process import (
 )
 from lhdmap.replay.processes.executive import Executive
 from lhdmap.replay.processes.site_executive import SiteExecutive
+from lhdmap.replay.processes.ordered import straight_left_m
 from lhdmap.replay.processes.told import DumpingNow, Health, LoadingNow, Navigating, Orders, Word
 from lhdmap.simulation.history import START_NS
 
@@ -130,6 +131,13 @@ def test_the_pile_is_looked_for_while_the_machine_still_drives(underground: Benc
     assert underground.heard.navigation.state == "driving"
     underground.turn(TO_LOAD, loading(1, Loading.CHARGING))
     assert underground.heard.navigation.state == "arrived"  # the loading task has the machine
+
+
+def test_the_pile_is_not_looked_for_before_the_last_change_of_gear(underground: Bench) -> None:
+    number = underground.orders(TO_LOAD).number
+    turning = navigating(number, straight_left_m(20.0, leg=1, legs=3))
+    assert underground.orders(TO_LOAD, turning).loading == 0
+    assert underground.orders(TO_LOAD, navigating(number, straight_left_m(20.0, leg=2, legs=3))).loading == 1
 
 
 def test_a_report_of_another_task_is_not_heard(underground: Bench) -> None:
