@@ -31,8 +31,8 @@ from lhdmap.replay.process import (
     Received,
 )
 from lhdmap.replay.processes.executive import Executive
-from lhdmap.replay.processes.site_executive import SiteExecutive
 from lhdmap.replay.processes.ordered import straight_left_m
+from lhdmap.replay.processes.site_executive import SiteExecutive
 from lhdmap.replay.processes.told import DumpingNow, Health, LoadingNow, Navigating, Orders, Word
 from lhdmap.simulation.history import START_NS
 
