@@ -7,7 +7,7 @@ Sections of draw points, dumps and parks stay alone: others have to pass them.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 from itertools import groupby
 
@@ -37,8 +37,9 @@ def with_sections(
             arm = beyond_of(topology, leg) if leg.inversion else ""
             if arm:
                 joined.join(leg.targets[-1].node, arm, f"from {start} to {goal} machines change gear")
-    for start, goal in drives:
-        _join_short(joined, _edges(layout, start, goal), least_m)
+    for (start, goal), legs in drives.items():
+        turns = {leg.targets[-1].node for leg in legs if leg.inversion}
+        _join_short(joined, _edges(layout, start, goal), least_m, {layout.ids.get(one, one) for one in turns})
     return replace(layout, edges=tuple(edge._replace(section=joined.name(edge.node)) for edge in layout.edges))
 
 
@@ -52,6 +53,24 @@ def ways_of(errand: Errand) -> list[tuple[str, str]]:
     ]
 
 
+def check_pull_back(layout: Layout, errands: Mapping[str, Errand], room_m: float) -> None:
+    """Check that a machine that has pulled back from its pile by `room_m`, its length with it, reaches into nobody's section.
+
+    Raises:
+        UsageError: the draw point's section is shorter, and another machine drives through the one behind it.
+    """
+    for name, errand in errands.items():
+        edge = layout.edges[layout.entering[errand.load][0]]
+        behind = [one.held for one in _edges(layout, errand.load, errand.dump) if one.held != edge.held][:1]
+        others = [ways_of(one) for other, one in errands.items() if other != name]
+        used = {one.held for ways in others for way in ways for one in _edges(layout, *way)}
+        if edge.length_m < room_m and used.intersection(behind):
+            raise UsageError(
+                f"draw point {errand.load}: its section {edge.held} has {edge.length_m:.1f} m behind it, a machine that "
+                f"pulls back into {behind[0]} needs {room_m:.1f} m: sections cannot be held"
+            )
+
+
 def _edges(layout: Layout, start: str, goal: str) -> list[Edge]:
     route = layout.route(start, goal)
     if route is None:
@@ -59,14 +78,24 @@ def _edges(layout: Layout, start: str, goal: str) -> list[Edge]:
     return [layout.edges[layout.entering[start][0]], *(layout.edges[k] for k in route)]
 
 
-def _join_short(joined: _Joined, edges: Sequence[Edge], least_m: float) -> None:
-    """Join what is too short between two others on a way; the first and the last section of a way are not driven through."""
+def _join_short(joined: _Joined, edges: Sequence[Edge], least_m: float, turns: Collection[str]) -> None:
+    """Join what is too short between two others on a way; the first and the last section of a way are not driven through.
+
+    `turns`: nodes (names) at which machines change gear on this way: they are wholly in the arm's section then, however short
+    the way through it.
+    """
+
+    def turned(section: str) -> bool:
+        return not set(turns).isdisjoint(section.split("+"))
+
     while True:
         parts = [
             (name, sum(edge.length_m for edge in group))
             for name, group in groupby(edges, key=lambda edge: joined.name(edge.node))
         ]
-        short = next((k for k, (_, length_m) in enumerate(parts[1:-1], start=1) if length_m < least_m), None)
+        short = next(
+            (k for k, part in enumerate(parts[1:-1], start=1) if part[1] < least_m and not turned(part[0])), None
+        )
         if short is None:
             return
         name = parts[short][0]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
@@ -11,7 +12,7 @@ from lhdmap.driving.bodies import bodies_of
 from lhdmap.driving.model import drive_model
 from lhdmap.errors import UsageError
 from lhdmap.haulage.fleet import Fleet, Member
-from lhdmap.haulage.joining import ways_of, with_sections
+from lhdmap.haulage.joining import check_pull_back, ways_of, with_sections
 from lhdmap.haulage.layout import Layout, checked
 from lhdmap.haulage.machine import Errand
 from lhdmap.haulage.mission_io import Buckets
@@ -59,9 +60,15 @@ def crew_mission(scenario: Scenario, crew: Mapping[str, Parts]) -> CrewMission:
     nose_m, tail_m = float(bodies.front_m[:, 0].max()), model.wheelbase_m - float(bodies.rear_m[:, 0].min())
     planner = RoutePlanner(topology, parts.settings.movement)
 
+    faces = {own.park: _heading_of(own) for own in crew.values()}
+
     def legs(start: str, goal: str) -> list[Leg]:
         begin, end = _waypoint(topology, start), _waypoint(topology, goal)
-        way = Way(goal, float(begin.pose[3]), tuple(node for node in avoid if node not in (begin.node, end.node)))
+        way = Way(
+            goal,
+            faces.get(start, float(begin.pose[3])),
+            tuple(node for node in avoid if node not in (begin.node, end.node)),
+        )
         route = route_from(planner, begin.id, way, Reach(nose_m, tail_m, navigation.room_m))
         if not route.feasible:
             raise UsageError(f"mission: {route.reason}")
@@ -74,6 +81,7 @@ def crew_mission(scenario: Scenario, crew: Mapping[str, Parts]) -> CrewMission:
     drives = {way: legs(*way) for errand in errands.values() for way in ways_of(errand)}
     least_m = tail_m + _OUT_M + tail_m + ROOM_M  # in reverse the rear is ahead of `base_link` by so much
     layout = with_sections(checked(layout_of_map(topology, scenario.mine)), topology, errands, drives, least_m)
+    check_pull_back(layout, errands, parts.settings.loading.pull_back_m + tail_m)
     fleet = Fleet(layout, errands, parts.settings.haulage, tail_m + _OUT_M)
     orders = {name: [Buckets(one.source, one.to, one.buckets) for one in ones] for name, ones in wanted.items()}
     return CrewMission({name: Job(fleet.member(name), orders[name], avoid) for name in crew}, layout)
@@ -89,6 +97,12 @@ def section_watch(given: CrewMission, crew: Mapping[str, Parts], scribe: Scribe)
     origin = np.zeros(4) if parts.T_mine_map is None else parts.T_mine_map
     topology, bodies = parts.autonomous.known.topology, (bodies_of(parts.machine), parts.machine)
     return SectionWatch(spaces, topology, section_of, origin, bodies, scribe)
+
+
+def _heading_of(parts: Parts) -> float:
+    """Return how a machine stands at first, in the map: not always as it stood there in the teaching drive."""
+    origin = np.zeros(4) if parts.T_mine_map is None else parts.T_mine_map
+    return math.remainder(parts.start.yaw_rad - float(origin[3]), 2.0 * math.pi)
 
 
 def _waypoint(topology: TopologicalMap, name: str) -> Waypoint:

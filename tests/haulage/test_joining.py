@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from lhdmap.errors import UsageError
 from lhdmap.haulage.fleet import Fleet
-from lhdmap.haulage.joining import Drives, ways_of, with_sections
+from lhdmap.haulage.joining import Drives, check_pull_back, ways_of, with_sections
 from lhdmap.haulage.layout import Layout, checked
 from lhdmap.haulage.machine import Errand
 from lhdmap.haulage.of_map import layout_of_map
@@ -71,10 +71,31 @@ def test_each_section_between_two_others_has_room_for_a_machine(topology: Topolo
     Fleet(made, ERRANDS)  # nobody is always in another one's way
 
 
+def test_a_section_in_which_a_way_changes_gear_is_not_short_on_it(topology: TopologicalMap, layout: Layout) -> None:
+    """It is wholly in the arm there, whatever the way through the intersection measures."""
+    turns = [leg(["I2", "T1.2", "I1"], [""] * 2 + ["I1.T1.1.1"], inversion=True)]
+    made = {
+        name: with_sections(layout, topology, {"lhd3": ERRANDS["lhd3"]}, {("OP1", "DP3"): legs}, LEAST_M)
+        for name, legs in (("turns", turns), ("passes", []))
+    }
+    lengths = {name: dict(sections_on(one, "OP1", "DP3")) for name, one in made.items()}
+    assert lengths["turns"]["I1+T1.1"] < LEAST_M
+    assert all(length_m >= LEAST_M for length_m in list(lengths["passes"].values())[1:-1])
+
+
 def test_a_change_of_gear_where_another_one_works_is_refused(topology: TopologicalMap, layout: Layout) -> None:
     turns = leg(["T1.3", "I2"], ["", "I2.B1.0"], inversion=True)
     with pytest.raises(UsageError, match="from DP1 to OP1 machines change gear in B1, where another one may stand"):
         with_sections(layout, topology, ERRANDS, {**no_turns(), ("DP1", "OP1"): [turns]}, 0.0)
+
+
+def test_a_draw_point_without_room_to_pull_back_in_is_refused(layout: Layout) -> None:
+    behind_m = min(layout.edges[layout.entering[point][0]].length_m for point in ("DP1", "DP2", "DP3"))
+    check_pull_back(layout, ERRANDS, behind_m - 0.1)
+    with pytest.raises(
+        UsageError, match=r"draw point DP\d: its section .* has .* m behind it, a machine that pulls back"
+    ):
+        check_pull_back(layout, ERRANDS, behind_m + 0.1)
 
 
 def test_a_short_section_between_two_places_of_work_is_refused() -> None:

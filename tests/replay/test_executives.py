@@ -31,6 +31,7 @@ from lhdmap.replay.process import (
     Received,
 )
 from lhdmap.replay.processes.executive import Executive
+from lhdmap.replay.processes.ordered import straight_left_m
 from lhdmap.replay.processes.site_executive import SiteExecutive
 from lhdmap.replay.processes.told import DumpingNow, Health, LoadingNow, Navigating, Orders, Word
 from lhdmap.simulation.history import START_NS
@@ -132,6 +133,13 @@ def test_the_pile_is_looked_for_while_the_machine_still_drives(underground: Benc
     assert underground.heard.navigation.state == "arrived"  # the loading task has the machine
 
 
+def test_the_pile_is_not_looked_for_before_the_last_change_of_gear(underground: Bench) -> None:
+    number = underground.orders(TO_LOAD).number
+    turning = navigating(number, straight_left_m(20.0, leg=1, legs=3))
+    assert underground.orders(TO_LOAD, turning).loading == 0
+    assert underground.orders(TO_LOAD, navigating(number, straight_left_m(20.0, leg=2, legs=3))).loading == 1
+
+
 def test_a_report_of_another_task_is_not_heard(underground: Bench) -> None:
     number = underground.orders(TO_LOAD).number
     underground.turn(TO_LOAD, navigating(number, 20.0))
@@ -174,6 +182,15 @@ def test_a_machine_among_others_is_told_where_it_may_be() -> None:
     )
     orders = Bench(made, task, []).orders(TO_LOAD, (LOCATED, located()), (MACHINE_SAYS, HEALTH))
     assert orders.free == frozenset({"T1.1", "I1"})
+
+
+@pytest.mark.parametrize(("its_own", "begun"), [({"T1.1"}, 0), ({"T1.1", "I1", "T1.2"}, 1)])
+def test_loading_is_not_begun_before_the_draw_point_is_its_own(its_own: set[str], begun: int) -> None:
+    task, topology = Scripted(TO_LOAD), map_of_plan("cycle")
+    made = Executive(task, [], topology, 10.0, Journal().of("mission"), free=lambda: frozenset(its_own))
+    bench = Bench(made, task, [])
+    number = bench.orders(TO_LOAD, (LOCATED, located()), (MACHINE_SAYS, HEALTH)).number
+    assert bench.orders(TO_LOAD, navigating(number, 20.0)).loading == begun
 
 
 @pytest.mark.parametrize("bench", ["underground", "surface"])

@@ -140,18 +140,19 @@ class Executive(Process):
         if out.goal:
             self._key = key
         near = self._navigating is not None and self._navigating.number == number and self._navigating.left_m < _NEAR_M
-        begins = not out.loaded and near and self._draws(out.goal)
+        free = None if self._free is None else self._free()
+        begins = not out.loaded and near and self._draws(out.goal, free)
         if (begins or out.begin == "load") and not self._orders.loading:
             self._loads += 1
         runs = out.begin == "load" or (not out.loaded and (begins or bool(self._orders.loading)))
         goal = out.goal or (self._orders.goal if out.begin == "load" else "")
         loading, dumping = self._loads if runs else 0, out.task if out.begin == "dump" else 0
-        free = None if self._free is None else self._free()
         return Orders(now_ns, number, goal, out.loaded, loading, dumping, free)
 
-    def _draws(self, goal: str) -> bool:
+    def _draws(self, goal: str, free: frozenset[str] | None) -> bool:
+        """Return whether a goal is a draw point that may be driven to: the loading task drives there without asking anybody."""
         found = self._topology.called(goal) if goal else None
-        return getattr(found, "purpose", "") == "draw_point"
+        return getattr(found, "purpose", "") == "draw_point" and (free is None or getattr(found, "node", "") in free)
 
     def _drive(self, place_m: FloatArray) -> None:
         """Count the way, by steps that are no noise."""

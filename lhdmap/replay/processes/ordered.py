@@ -66,8 +66,9 @@ class OrderedNavigation(Process):
         cause = f"assistance: {self.control.reason}" if self.control.state == ASSISTANCE else self.control.state
         yield Outgoing(APPROACH if loads else DIRECTIVE, Asked(now_ns, directive, cause))
         control = self.control
+        left_m = straight_left_m(control.left_m, control.leg, len(control.legs))
         yield Outgoing(
-            NAVIGATING, Navigating(now_ns, control.state, self._number, control.goal, control.reason, control.left_m)
+            NAVIGATING, Navigating(now_ns, control.state, self._number, control.goal, control.reason, left_m)
         )
 
     def _obey(self, orders: Orders, located: Located) -> None:
@@ -105,3 +106,8 @@ class OrderedNavigation(Process):
             self._asked_on = message.go_on
         else:
             self._feed.take(received)
+
+
+def straight_left_m(left_m: float, leg: int, legs: int) -> float:
+    """Return the way to the goal, infinite before the last leg: the machine looks elsewhere, what is ahead is not its pile."""
+    return left_m if leg == legs - 1 else math.inf
