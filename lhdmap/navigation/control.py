@@ -122,6 +122,11 @@ class NavigationControl:
         return self._drive(now_ns, motion, located, standing)
 
     @property
+    def on_last_leg(self) -> bool:
+        """Whether the leg to the goal is driven."""
+        return self._way.leg == len(self.legs) - 1
+
+    @property
     def left_m(self) -> float:
         """Way to the end of the last leg; infinite where there is none."""
         if self.state not in (DRIVING, WAITING, RESTING, BACKING, HALTED) or not self.legs:

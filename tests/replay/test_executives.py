@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -11,7 +12,7 @@ from lhdmap.haulage.mission_io import Buckets, MissionInput, MissionOutput
 from lhdmap.haulage.records import Cycle, Interval, Phase
 from lhdmap.haulage.states import Event, State
 from lhdmap.loading.states import State as Loading
-from lhdmap.messages import Text
+from lhdmap.messages import Joints, Text
 from lhdmap.navigation.along import Located
 from lhdmap.replay.journal import Event as Line
 from lhdmap.replay.journal import Journal
@@ -24,6 +25,7 @@ from lhdmap.replay.process import (
     MISSION,
     NAVIGATING,
     ORDERS,
+    POSE,
     SITE_POSE,
     STATION_SAYS,
     Outgoing,
@@ -31,7 +33,8 @@ from lhdmap.replay.process import (
     Received,
 )
 from lhdmap.replay.processes.executive import Executive
-from lhdmap.replay.processes.ordered import straight_left_m
+from lhdmap.replay.processes.feed import JOINTS
+from lhdmap.replay.processes.ordered import OrderedNavigation, straight_left_m
 from lhdmap.replay.processes.site_executive import SiteExecutive
 from lhdmap.replay.processes.told import DumpingNow, Health, LoadingNow, Navigating, Orders, Word
 from lhdmap.simulation.history import START_NS
@@ -82,6 +85,24 @@ class Bench:
 
 def located(x_m: float = 3.0, status: str = "tracking") -> Located:
     return Located(START_NS, status, np.array([x_m, 1.0, 0.5]), np.zeros(3), np.eye(3) * 1e-4, 0.0)
+
+
+class Control:
+    """A drive that counts how often it is asked for a directive."""
+
+    state, goal, reason, leg, legs, left_m = "driving", "DP1", "", 0, ("leg",), 20.0
+
+    def __init__(self) -> None:
+        self.steps = 0
+
+    def knows(self, _located: Located) -> bool:
+        return True
+
+    def go(self, *_told: Any, **_more: Any) -> None:
+        pass
+
+    def step(self, *_told: Any) -> None:
+        self.steps += 1
 
 
 HEALTH = Health(START_NS, True, "autonomous", True, ())
@@ -135,9 +156,28 @@ def test_the_pile_is_looked_for_while_the_machine_still_drives(underground: Benc
 
 def test_the_pile_is_not_looked_for_before_the_last_change_of_gear(underground: Bench) -> None:
     number = underground.orders(TO_LOAD).number
-    turning = navigating(number, straight_left_m(20.0, leg=1, legs=3))
+    turning = navigating(number, straight_left_m(20.0, last_leg=False))
     assert underground.orders(TO_LOAD, turning).loading == 0
-    assert underground.orders(TO_LOAD, navigating(number, straight_left_m(20.0, leg=2, legs=3))).loading == 1
+    assert underground.orders(TO_LOAD, navigating(number, straight_left_m(20.0, last_leg=True))).loading == 1
+
+
+@pytest.mark.parametrize(
+    ("state", "number", "stepped"),
+    [(Loading.IDENTIFICATION, 1, 1), (Loading.EXCAVATION, 1, 0), (Loading.EXCAVATION, 2, 1), (Loading.DONE, 1, 1)],
+)
+def test_navigation_does_not_count_a_machine_that_digs_as_stuck(state: Loading, number: int, stepped: int) -> None:
+    control = Control()
+    made = OrderedNavigation(control, Journal().of("navigation"))  # type: ignore[arg-type]
+    said = [
+        (JOINTS, Joints(START_NS, {"articulation": 0.0}, {"articulation": 0.0})),
+        (POSE, SimpleNamespace(stamp_ns=START_NS, T_odom_base=np.eye(4))),
+        (LOCATED, located()),
+        (MACHINE_SAYS, HEALTH),
+        (ORDERS, Orders(START_NS, 1, "DP1", loaded=False, loading=1)),
+        loading(number, state),
+    ]
+    list(made.step(START_NS, [Received(topic, START_NS, message) for topic, message in said]))
+    assert control.steps == stepped
 
 
 def test_a_report_of_another_task_is_not_heard(underground: Bench) -> None:

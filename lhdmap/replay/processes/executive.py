@@ -32,7 +32,8 @@ from lhdmap.topology.model import TopologicalMap
 EXECUTIVE = "mission"
 _STEP_M = 0.1
 _NEAR_M = 26.0  # of the way to the draw point: from here on the pile is looked for while the machine rolls
-_HAS_THE_MACHINE = frozenset(State) - {State.IDLE, State.IDENTIFICATION, State.DONE, State.ABORTED}
+HAS_THE_MACHINE = frozenset(State) - {State.IDLE, State.IDENTIFICATION, State.DONE, State.ABORTED}
+"""States of the loading task in which it drives the machine, and navigation does not."""
 
 
 class Executive(Process):
@@ -108,7 +109,7 @@ class Executive(Process):
 
     def _takes_over(self) -> bool:
         now = self._loading
-        return now is not None and self._orders.loading == now.number > 0 and now.state in _HAS_THE_MACHINE
+        return now is not None and self._orders.loading == now.number > 0 and now.state in HAS_THE_MACHINE
 
     def _loaded(self) -> Report:
         """Return what the loading task says, by the numbers of the mission's tasks."""

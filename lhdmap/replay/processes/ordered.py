@@ -13,6 +13,7 @@ from lhdmap.replay.journal import Scribe
 from lhdmap.replay.process import (
     APPROACH,
     DIRECTIVE,
+    LOADING,
     LOCATED,
     MACHINE_SAYS,
     MILLISECOND_NS,
@@ -24,9 +25,10 @@ from lhdmap.replay.process import (
     Process,
     Received,
 )
+from lhdmap.replay.processes.executive import HAS_THE_MACHINE
 from lhdmap.replay.processes.feed import MOTION_TOPICS, MotionFeed
 from lhdmap.replay.processes.navigator import NAVIGATION
-from lhdmap.replay.processes.told import Asked, Idle, Navigating, Orders
+from lhdmap.replay.processes.told import Asked, Idle, LoadingNow, Navigating, Orders
 
 _AUTONOMOUS = "autonomous"
 
@@ -38,13 +40,14 @@ class OrderedNavigation(Process):
     """
 
     name, period_ns, latency_ns, priority = NAVIGATION, 100 * MILLISECOND_NS, 5 * MILLISECOND_NS, 20
-    reads = (*MOTION_TOPICS, LOCATED, MACHINE_SAYS, PLAN, STATION_SAYS, ORDERS)
+    reads = (*MOTION_TOPICS, LOCATED, MACHINE_SAYS, PLAN, STATION_SAYS, ORDERS, LOADING)
 
     def __init__(self, control: NavigationControl, scribe: Scribe) -> None:
         self.control, self._scribe = control, scribe
         self._feed = MotionFeed()
         self._located: Located | None = None
         self._orders: Orders | None = None
+        self._loading: LoadingNow | None = None
         self._number = 0  # of the order that it is at
         self._asked_on = self._away = False
         self._mode = ""
@@ -60,16 +63,21 @@ class OrderedNavigation(Process):
         directive = None
         if self._mode != _AUTONOMOUS:
             self._away = self.control.state not in (IDLE, ARRIVED, ASSISTANCE)
-        elif orders.goal:
+        elif orders.goal and not self._yields(orders):
             directive = self._directive(now_ns, located)
         loads = orders.loading > 0
         cause = f"assistance: {self.control.reason}" if self.control.state == ASSISTANCE else self.control.state
         yield Outgoing(APPROACH if loads else DIRECTIVE, Asked(now_ns, directive, cause))
         control = self.control
-        left_m = straight_left_m(control.left_m, control.leg, len(control.legs))
+        left_m = straight_left_m(control.left_m, last_leg=control.on_last_leg)
         yield Outgoing(
             NAVIGATING, Navigating(now_ns, control.state, self._number, control.goal, control.reason, left_m)
         )
+
+    def _yields(self, orders: Orders) -> bool:
+        """Return whether the loading task has the machine: one that digs stands, and is not stuck on its way."""
+        now = self._loading
+        return now is not None and orders.loading == now.number > 0 and now.state in HAS_THE_MACHINE
 
     def _obey(self, orders: Orders, located: Located) -> None:
         """Begin another drive, once the place is known."""
@@ -97,6 +105,8 @@ class OrderedNavigation(Process):
             self._located = message
         elif topic == ORDERS:
             self._orders, self.control.allowed.free = message, message.free
+        elif topic == LOADING:
+            self._loading = message
         elif topic == MACHINE_SAYS:
             self._mode = message.mode
             self.control.allowed.may_move = message.armed and message.mode == _AUTONOMOUS
@@ -108,6 +118,6 @@ class OrderedNavigation(Process):
             self._feed.take(received)
 
 
-def straight_left_m(left_m: float, leg: int, legs: int) -> float:
+def straight_left_m(left_m: float, *, last_leg: bool) -> float:
     """Return the way to the goal, infinite before the last leg: the machine looks elsewhere, what is ahead is not its pile."""
-    return left_m if leg == legs - 1 else math.inf
+    return left_m if last_leg else math.inf
