@@ -14,6 +14,7 @@ from lhdmap.haulage.states import Event, State
 from lhdmap.loading.states import State as Loading
 from lhdmap.messages import Joints, Text
 from lhdmap.navigation.along import Located
+from lhdmap.navigation.progress import Allowed
 from lhdmap.replay.journal import Event as Line
 from lhdmap.replay.journal import Journal
 from lhdmap.replay.process import (
@@ -90,10 +91,10 @@ def located(x_m: float = 3.0, status: str = "tracking") -> Located:
 class Control:
     """A drive that counts how often it is asked for a directive."""
 
-    state, goal, reason, leg, legs, left_m = "driving", "DP1", "", 0, ("leg",), 20.0
+    state, goal, reason, on_last_leg, left_m = "driving", "DP1", "", True, 20.0
 
     def __init__(self) -> None:
-        self.steps = 0
+        self.steps, self.allowed = 0, Allowed()
 
     def knows(self, _located: Located) -> bool:
         return True
