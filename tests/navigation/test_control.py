@@ -144,3 +144,13 @@ def test_another_goal_in_the_other_gear_rests_first() -> None:
     assert rod.control.state == RESTING
     assert rod.run() == ARRIVED
     assert rod.pose[:2] == pytest.approx([20.0, 0.0], abs=0.4)
+
+
+def test_time_in_which_somebody_else_had_the_machine_is_no_sign_of_being_stuck() -> None:
+    """A machine that had dug for half a minute was taken for stuck as it looked at its pile again."""
+    rod = Rod(at(6.0, 0.0, 0.0), ladder(), stops=lambda there: there[0] > 20.0)
+    rod.go("t1.end", "t1.start")
+    rod.run(8.0)
+    rod.now_ns += 30_000_000_000
+    assert rod.run(0.5 * rod.settings.stuck_s, until=BACKING) == DRIVING
+    assert rod.run(rod.settings.stuck_s, until=BACKING) == BACKING
