@@ -1,4 +1,4 @@
-"""The state machine as a diagram in Mermaid's language, drawn from its tables: `docs/haulage.md` shows it."""
+"""The state machine as a diagram in Mermaid's language, drawn from its tables: `docs/haulage_states.md` shows it."""
 
 from __future__ import annotations
 

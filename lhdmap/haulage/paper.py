@@ -1,7 +1,7 @@
 """The paper's own machine, Table 1 as printed and as recovered: to show what it does, not to drive by.
 
 Figure 2 is missing from the text and the cells of Table 1 are shifted: an OR belongs between the lines of a cell. The reading
-here is the most coherent one (`docs/haulage.md` lists its faults); `lhdmap.haulage.states` is the machine that is used.
+here is the most coherent one (`docs/haulage_site.md` lists its faults); `lhdmap.haulage.states` is the machine that is used.
 """
 
 from __future__ import annotations

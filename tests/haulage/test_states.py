@@ -63,5 +63,5 @@ def test_a_dock_is_never_followed_by_the_road() -> None:
 
 
 def test_the_page_shows_the_diagram_of_the_code() -> None:
-    page = (Path(__file__).resolve().parents[2] / "docs" / "haulage.md").read_text(encoding="utf-8")
+    page = (Path(__file__).resolve().parents[2] / "docs" / "haulage_states.md").read_text(encoding="utf-8")
     assert f"```mermaid\n{mermaid()}```" in page
