@@ -108,7 +108,9 @@ class NavigationControl:
     def step(self, now_ns: int, motion: Motion, located: Located) -> Directive | None:
         """Return the directive of now."""
         if now_ns - self._asked_ns > _PAUSE_NS:
-            self._since_ns = now_ns  # somebody else had the machine meanwhile: that it stood then is no sign of being stuck
+            self._since_ns = (
+                now_ns  # somebody else had the machine meanwhile: that it stood then is no sign of being stuck
+            )
         self._asked_ns = now_ns
         self._way.count(motion, backs=self.state == BACKING)
         if self.state in (IDLE, ARRIVED, ASSISTANCE):

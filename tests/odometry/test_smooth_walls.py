@@ -48,7 +48,7 @@ def begun(velocity: FloatArray | None) -> PlanarOdometry:
 @pytest.mark.parametrize(("speed_mps", "rate_hz"), [(12.0 / 3.6, 25.0), (12.0 / 3.6, 50.0), (24.0 / 3.6, 25.0)])
 def test_the_first_scans_tell_the_speed_of_a_machine_that_drives_already(speed_mps: float, rate_hz: float) -> None:
     """A map of a few scans held any speed fast, zero before all: one drive in ten was taken to stand for its first 10 s."""
-    for seed in range(411, 419):
+    for seed in range(411, 415):
         world = drift_world(seed, rms_m=0.005)
         poses = drive_along(world.centre_line_m, speed_mps, rate_hz)[:WARM_SCANS]
         scans = simulate_scans(world, poses, PlanarScanner(noise_m=0.012), rate_hz, seed)
@@ -59,7 +59,7 @@ def test_the_first_scans_tell_the_speed_of_a_machine_that_drives_already(speed_m
 
 @pytest.mark.parametrize("speed_mps", [0.0, -2.0])
 def test_a_machine_that_stands_or_reverses_is_seen_to(speed_mps: float) -> None:
-    for seed in range(421, 425):
+    for seed in range(421, 423):
         world = drift_world(seed, rms_m=0.005)
         start = drive_along(world.centre_line_m, 5.0, 1.0)[8]
         back = speed_mps / RATE_HZ * np.arange(WARM_SCANS)
