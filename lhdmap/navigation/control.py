@@ -33,7 +33,6 @@ IDLE, DRIVING, RESTING, BACKING, ARRIVED, ASSISTANCE = "idle", "driving", "resti
 HALTED, WAITING = "halted", "waiting"
 _HELD_M = 1.0  # a machine that stands so near its hold waits for it
 _STUCK_RESET_M = 8.0  # so far on from where it was stuck, the tries count anew
-_PAUSE_NS = 1_000_000_000  # ten turns: one that overruns is none
 
 Say = Callable[..., None]
 """`say(state, cause, **values)`: told of each change of state (`lhdmap.replay.journal.Scribe.goes`)."""
@@ -52,7 +51,7 @@ class NavigationControl:
         self.goal, self._loaded = "", False
         self.allowed = Allowed()
         self._way, self._backs = LegProgress(), BackUps()
-        self._since_ns = self._asked_ns = 0
+        self._since_ns = 0
 
     @property
     def legs(self) -> list[Leg]:
@@ -107,11 +106,8 @@ class NavigationControl:
 
     def step(self, now_ns: int, motion: Motion, located: Located) -> Directive | None:
         """Return the directive of now."""
-        if now_ns - self._asked_ns > _PAUSE_NS:
-            self._since_ns = (
-                now_ns  # somebody else had the machine meanwhile: that it stood then is no sign of being stuck
-            )
-        self._asked_ns = now_ns
+        if self._way.paused(now_ns):  # somebody else had the machine: that it stood is no sign of being stuck
+            self._since_ns = now_ns
         self._way.count(motion, backs=self.state == BACKING)
         if self.state in (IDLE, ARRIVED, ASSISTANCE):
             return None

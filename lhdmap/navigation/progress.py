@@ -16,6 +16,8 @@ from lhdmap.messages import FloatArray
 from lhdmap.navigation.hold import ROOM_M
 from lhdmap.navigation.leg import Leg
 
+_PAUSE_NS = 1_000_000_000  # ten turns: one that overruns is none
+
 
 class Allowed:
     """What others say of the way: it is set from outside, and asked in each step.
@@ -59,6 +61,7 @@ class LegProgress:
         self.at_m = self.driven_m = self.speed_mps = 0.0
         self.begun_m: float | None = None
         self._before: FloatArray | None = None
+        self._asked_ns = 0
 
     def begin(self, legs: list[Leg]) -> None:
         """Begin a route."""
@@ -75,6 +78,11 @@ class LegProgress:
         self.leg += 1
         self.target, self.driven_m, self.begun_m = 0, 0.0, None
         return self.leg == len(self.legs)
+
+    def paused(self, now_ns: int) -> bool:
+        """Take a turn; return whether nobody has asked for a while."""
+        before_ns, self._asked_ns = self._asked_ns, now_ns
+        return now_ns - before_ns > _PAUSE_NS
 
     def count(self, motion: Motion, *, backs: bool) -> None:
         """Count the way since the motion before; what is backed up is driven again."""
