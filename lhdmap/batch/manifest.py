@@ -109,9 +109,7 @@ def read_manifest(path: Path) -> list[Task]:
 def _check_columns(path: Path, columns: Sequence[str]) -> None:
     for column in columns:
         if column not in COLUMNS:
-            raise UsageError(
-                f"{path}: unknown column '{column}'{nearest(column, COLUMNS)}; known: {', '.join(COLUMNS)}"
-            )
+            raise UsageError(f"{path}: unknown column '{column}'{nearest(column, COLUMNS)}")
     if LOG not in columns:
         raise UsageError(f"{path}: no column log; known columns: {', '.join(COLUMNS)}")
 
@@ -128,7 +126,7 @@ def _task(path: Path, number: int, row: Mapping[str, str]) -> Task:
     if not row[LOG]:
         raise UsageError(f"{where}: log is empty")
     if command not in KINDS:
-        raise UsageError(f"{where}: unknown command '{command}'{nearest(command, KINDS)}; known: {', '.join(KINDS)}")
+        raise UsageError(f"{where}: unknown command '{command}'{nearest(command, KINDS)}")
     kind = KINDS[command]
     options = {name: _placed(path, row[name]) for name in OPTIONS if row.get(name)}
     for name in sorted(set(options) - kind.takes):

@@ -61,3 +61,9 @@ def test_what_is_wrong_is_refused(tmp_path: Path, text: str, kind: type[LhdmapEr
 def test_a_manifest_that_is_not_there(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="not readable"):
         read_manifest(tmp_path / "none.csv")
+
+
+def test_known_columns_are_told_once(tmp_path: Path) -> None:
+    with pytest.raises(UsageError) as told:
+        read_manifest(_write(tmp_path, "qqqq,log\n1,a\n"))
+    assert str(told.value).count("known:") == 1
