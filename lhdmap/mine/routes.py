@@ -71,6 +71,7 @@ class RouteFinder:
         """Return the runs of a drive through every edge that can be reached, each time the nearest; `left_out` are the others."""
         self._reverse = _TEACHING_REVERSE
         runs, states = self._begin(start)
+        state: RouteState | None = None
         left = {index for index, edge in enumerate(self.network.edges) if not self._blind(edge)}
         while left:
             found = self._search(states, functools.partial(self._covers_any, frozenset(left)))
@@ -81,7 +82,25 @@ class RouteFinder:
             left -= {k for k in left for run in driven if self._covered(k, run)}
             states = {state: ()}
         self.left_out = sorted({self.network.tubes[self.network.edges[k].tube].name for k in left})
+        runs = runs if state is None else self._past_node(state, runs)
         return trimmed(self.network, joined(runs))
+
+    def _past_node(self, state: RouteState, runs: list[Run]) -> list[Run]:
+        """Return runs that end at a node, and go on until all of the machine is past it: no bumper fits before the wall ahead.
+
+        Where no branch takes a machine they end before that wall.
+        """
+        edge = self.network.edges[state.edge]
+        if self._is_dead_end(edge, state.direction):
+            return runs
+        ways: list[list[Run]] = []
+        for step in self._on(state, edge):
+            ahead, direction = self.network.edges[step.state.edge], step.state.direction
+            begin = ahead.start_m if direction > 0 else ahead.end_m
+            there = begin + direction * self._depth(ahead, direction)
+            if (self._end(ahead, direction, state.gear) - there) * direction >= 0.0:
+                ways.append([*step.runs, Run(ahead.tube, begin, there, state.gear)])
+        return [*runs, *min(ways, key=len)] if ways else self._short_of_node(state, runs)
 
     def _blind(self, edge: Edge) -> bool:
         place = self.network.tubes[edge.tube].place
@@ -141,23 +160,21 @@ class RouteFinder:
 
     def _short_inversion(self, state: RouteState, edge: Edge) -> Iterator[RouteStep]:
         """Drive into an edge until the whole machine is past the node, and come back in the other gear."""
-        node, begin = (edge.start, edge.start_m) if state.direction > 0 else (edge.end, edge.end_m)
-        reach = max(
-            (
-                turn.end_at_m
-                for turns in self._turns.values()
-                for turn in turns
-                if turn.node == node and turn.end.tube == edge.tube
-            ),
-            default=0.0,
-        )
-        depth = reach + self._wheelbase_m + _BEHIND_M
+        begin = edge.start_m if state.direction > 0 else edge.end_m
+        depth = self._depth(edge, state.direction)
         if (self._end(edge, state.direction, state.gear) - begin) * state.direction < depth:
             return
         there = begin + state.direction * depth
         back = there - state.direction * self._wheelbase_m
         runs = (Run(edge.tube, begin, there, state.gear), Run(edge.tube, back, begin, -state.gear))
         yield RouteStep(2.0 * depth + _INVERSION_M, RouteState(state.edge, -state.direction, -state.gear, False), runs)
+
+    def _depth(self, edge: Edge, direction: int) -> float:
+        """Return how far into an edge a machine is past the node that it came in by, and past its turns, with all its length."""
+        node = edge.start if direction > 0 else edge.end
+        turns = (turn for turns in self._turns.values() for turn in turns)
+        reach = max((one.end_at_m for one in turns if one.node == node and one.end.tube == edge.tube), default=0.0)
+        return reach + self._wheelbase_m + _BEHIND_M
 
     def _on(self, state: RouteState, edge: Edge) -> Iterator[RouteStep]:
         """Go on from the end of an edge: into another one, or back in the other gear."""

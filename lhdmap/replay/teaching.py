@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import warnings
 from pathlib import Path
 
 import numpy as np
 
 from lhdmap.config import Settings
-from lhdmap.errors import UsageError
+from lhdmap.errors import LhdmapWarning, UsageError
 from lhdmap.localization.starting import poses_about, poses_anywhere, poses_in
 from lhdmap.machine import Machine
 from lhdmap.messages import FloatArray
@@ -54,7 +55,9 @@ def teach(scenario: Scenario, network: Network, machine: Machine, path: Path, se
     drive = MineDriveSettings(
         seed=scenario.seed + _SEED_APART, names=True, truth=False, operator=OperatorSettings(speed_kmh=_TEACH_KMH)
     )
-    simulate_mine(network, machine, drive, log, force=True)
+    driven = simulate_mine(network, machine, drive, log, force=True)
+    if driven.contacts:
+        warnings.warn(f"the teaching drive touched: {', '.join(driven.contacts)}", LhdmapWarning, stacklevel=2)
     build_map(BuildRequest([log], path, settings=settings, machine=machine))
 
 

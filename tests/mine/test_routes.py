@@ -14,9 +14,10 @@ from lhdmap.mine.plan import find_plan, load_plan
 from lhdmap.mine.route import Start, parse_route, start_of
 from lhdmap.mine.routes import RouteFinder
 from lhdmap.mine.runs import Run
+from lhdmap.mine.stands import overhang_m
 from lhdmap.mine.ways import STEP_M, Leg, legs_of
 
-from tests.mine.plans import TEE, network_of
+from tests.mine.plans import TEE, lines, network_of
 
 MACHINE = Machine()
 
@@ -96,6 +97,23 @@ def test_a_teaching_drive_goes_through_every_edge(name: str) -> None:
         middle = network.tubes[edge.tube].pose(0.5 * (edge.start_m + edge.end_m))[:2]
         dead_end = 1 in (network.nodes[edge.start].degree, network.nodes[edge.end].degree)
         assert np.hypot(*(places - middle).T).min() < (12.0 if dead_end else 1.0)
+
+
+def uncut() -> Network:
+    table = lines(("A", [[0, 0, 0], [80, 0, 0]]), ("B", [[40, -60, 0], [40, 0, 0]]))
+    return network_of(table, junction=[{"at": [40, 0, 0], "corner_m": 0.0}])
+
+
+@pytest.mark.parametrize(("name", "start"), [("haul_ring", None), ("", "B")])
+def test_a_teaching_drive_that_ends_at_a_node_has_no_bumper_in_the_wall_ahead(name: str, start: str | None) -> None:
+    network = make_network(load_plan(find_plan(name))) if name else uncut()
+    runs = RouteFinder(network, MACHINE).teaching(start_of(network, MACHINE, start))
+    leg, tube = legs_of(network, runs, MACHINE)[-1], network.tubes[runs[-1].tube]
+    ahead_m = 0.5 + overhang_m(MACHINE, leg.gear)
+    ahead = ahead_m * np.array([math.cos(leg.heading_rad[-1]), math.sin(leg.heading_rad[-1])])
+    nose_m = np.array([leg.x_m[-1], leg.y_m[-1]]) + ahead
+    places_m = tube.line.at(np.arange(0.0, tube.length_m, 0.1))[:, :2]
+    assert np.hypot(*(places_m - nose_m).T).min() < tube.half_width_m(tube.length_m)
 
 
 @pytest.mark.parametrize(("route", "start"), [("S1,DP1,-S1,OP1", None), ("-S1,OP1,-W,S2,TB1,-S2,DP9", "DP3")])
