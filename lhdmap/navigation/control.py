@@ -65,6 +65,11 @@ class NavigationControl:
         begins = [Begin(start, 0.0)] if start else begins_at(self._planner.topology, place, goal)
         self._plan(begins, located)
 
+    def wait_for_place(self, now_ns: int, goal: str, located: Located, *, loaded: bool = False) -> None:
+        """Take a goal while the place is not known: it is planned once it is, and help is asked for where that takes too long."""
+        self.goal, self._loaded, self._since_ns = goal, loaded, now_ns
+        self._goes(HALTED, f"place not known: {_how_known(located)}")
+
     def go_on(self, located: Located, *, reopened: bool = False) -> None:
         """Plan again from where the machine is, after others drove it or helped; `reopened`: what was closed is open again."""
         self.allowed.closed = () if reopened else self.allowed.closed
@@ -198,7 +203,7 @@ class NavigationControl:
 
     def _halt(self, now_ns: int, located: Located, *, standing: bool) -> None:
         """Stand where the place is not known; go on from there once it is, or ask after some time."""
-        settings, why = self._settings, f"{located.status}, deviation {located.deviation_m:.2f} m"
+        settings, why = self._settings, _how_known(located)
         if self.state != HALTED:
             self._since_ns = now_ns
             self._goes(HALTED, f"place not known: {why}")
@@ -263,3 +268,7 @@ class NavigationControl:
     def _goes(self, state: str, cause: str, **values: Any) -> None:
         self.state = state
         self._say(state, cause, **values)
+
+
+def _how_known(located: Located) -> str:
+    return f"{located.status}, deviation {located.deviation_m:.2f} m"

@@ -118,6 +118,18 @@ def test_it_asks_where_the_place_stays_unknown() -> None:
     assert "place not known" in rod.control.reason
 
 
+@pytest.mark.parametrize(("status", "ends"), [("tracking", ARRIVED), ("unknown", ASSISTANCE)])
+def test_a_goal_given_while_the_place_is_not_known_waits_for_it_and_asks_for_help_after_some_time(
+    status: str, ends: str
+) -> None:
+    rod = Rod(at(6.0, 0.0, 0.0), ladder(), status="unknown")
+    rod.control.wait_for_place(rod.now_ns, "t1.end", rod.located())
+    assert rod.run(5.0) == HALTED
+    rod.status = status
+    assert rod.run(120.0) == ends
+    assert ("place not known" in rod.control.reason) == (ends == ASSISTANCE)
+
+
 def test_a_missed_end_is_an_overrun() -> None:
     rod = Rod(at(6.0, 0.0, 0.0), ladder())
     rod.go("t1.end", "t1.start")

@@ -95,9 +95,13 @@ class Control:
 
     def __init__(self) -> None:
         self.steps, self.allowed = 0, Allowed()
+        self.waits_for = ""
 
-    def knows(self, _located: Located) -> bool:
-        return True
+    def knows(self, located: Located) -> bool:
+        return located.status == "tracking"
+
+    def wait_for_place(self, _now_ns: int, goal: str, _located: Located, *, loaded: bool) -> None:
+        self.waits_for = f"{goal}, {loaded}"
 
     def go(self, *_told: Any, **_more: Any) -> None:
         pass
@@ -179,6 +183,22 @@ def test_navigation_does_not_count_a_machine_that_digs_as_stuck(state: Loading, 
     ]
     list(made.step(START_NS, [Received(topic, START_NS, message) for topic, message in said]))
     assert control.steps == stepped
+
+
+def test_an_order_without_a_known_place_is_taken_up_and_not_forgotten() -> None:
+    """The mission stood in silence to its end: navigation did not know of the order, and so could not ask for help."""
+    control = Control()
+    made = OrderedNavigation(control, Journal().of("navigation"))  # type: ignore[arg-type]
+    said = [
+        (JOINTS, Joints(START_NS, {"articulation": 0.0}, {"articulation": 0.0})),
+        (POSE, SimpleNamespace(stamp_ns=START_NS, T_odom_base=np.eye(4))),
+        (LOCATED, located(status="unknown")),
+        (MACHINE_SAYS, HEALTH),
+        (ORDERS, Orders(START_NS, 1, "OP1", loaded=True)),
+    ]
+    out = list(made.step(START_NS, [Received(topic, START_NS, message) for topic, message in said]))
+    assert control.waits_for == "OP1, True"
+    assert [one.message.number for one in out if one.topic == NAVIGATING] == [1]
 
 
 def test_a_report_of_another_task_is_not_heard(underground: Bench) -> None:

@@ -95,3 +95,10 @@ def test_on_a_surface_site_it_says_go_on_and_does_not_drive() -> None:
     assert {word.mode for _, word in said} == {""}
     words(one, HEALTHY, 5.0, 5.2)
     assert next(word.gave_up for _, word in words(one, HEALTHY._replace(asks="again"), 5.2, 6.0) if word.gave_up)
+
+
+def test_who_still_asks_after_he_was_helped_asks_again_until_it_gives_up() -> None:
+    one = Station((ModeAt(),), 5.0, 1.0, Journal().of("station"), assists=2)
+    said = words(one, HEALTHY._replace(asks=UNKNOWN), 0.0, 150.0)
+    assert not any(word.gave_up for at, word in said if at < 120.0)
+    assert said[-1][1].gave_up == f"the station gave up: {UNKNOWN}"

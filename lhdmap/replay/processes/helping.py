@@ -10,6 +10,7 @@ from lhdmap.replay.scenario import ModeAt
 from lhdmap.simulation.history import SECOND_NS
 
 _BACK_NS, _BACK_KMH = 8 * SECOND_NS, 2.2
+_STILL_NS = 60 * SECOND_NS
 _WAITS = "place not known"
 
 
@@ -17,7 +18,8 @@ class Help:
     """Answers requests one after the other; `done`: what is left is to say that the machine is to go on.
 
     `backs_up`: where it drives the machine by hand first; on a surface site it only says that the way is clear.
-    Of more than `most` requests none is answered any more: `gave_up` says so.
+    Who still asks a minute after it was told to go on asks once more. Of more than `most` requests none is answered any more:
+    `gave_up` says so.
     """
 
     def __init__(self, assist_s: float, scribe: Scribe, most: int, *, backs_up: bool = True) -> None:
@@ -33,8 +35,9 @@ class Help:
         if not health.asks:
             self._asked_ns, self._backs_until_ns, self.done = None, None, False
             return script
-        if self._asked_ns is None:
+        if self._asked_ns is None or (self.done and now_ns - self._asked_ns > _STILL_NS + self._assist_ns):
             self._asked_ns, self._left = now_ns, self._left - 1
+            self._backs_until_ns, self.done = None, False
         if self._left < 0:
             return self._give_up(health.asks)
         if now_ns - self._asked_ns < self._assist_ns:

@@ -31,6 +31,7 @@ from lhdmap.replay.processes.told import Asked, Idle, Word
 
 NAVIGATION = "navigation"
 _SETTLED_NS = 1_000_000_000
+_FOUND_NS = 10_000_000_000  # a place that is found among all takes some scans
 _MOVES = ("autonomous", "assisted")
 _CREEPS_MPS = 0.1
 
@@ -75,6 +76,7 @@ class Navigator(Process):
         self._mission = self._mode = ""
         self._away = False
         self._since_ns: int | None = None
+        self._idle_ns: int | None = None  # since when it wants to begin
 
     def step(self, now_ns: int, inbox: Sequence[Received]) -> Iterator[Outgoing]:
         """Take what has come; give the directive of now and say how far the drive is."""
@@ -124,13 +126,16 @@ class Navigator(Process):
             self._feed.take(received)
 
     def _begin(self, now_ns: int, located: Located) -> None:
-        """Go, once the place has held for a second."""
+        """Go, once the place has held for a second; where it does not for long, let navigation ask for help."""
+        errand = self._errand
+        self._idle_ns = now_ns if self._idle_ns is None else self._idle_ns
         if located.status != "tracking":
             self._since_ns = None
+            if now_ns - self._idle_ns >= _FOUND_NS:
+                self.control.wait_for_place(now_ns, errand.goal, located, loaded=errand.loaded)
             return
         self._since_ns = now_ns if self._since_ns is None else self._since_ns
         if now_ns - self._since_ns >= _SETTLED_NS:
-            errand = self._errand
             self.control.go(errand.start, errand.goal, located, loaded=errand.loaded)
 
     def _told(self) -> str:

@@ -59,7 +59,7 @@ class OrderedNavigation(Process):
         motion, located, orders = self._feed.motion, self._located, self._orders
         if motion is None or located is None or orders is None:
             return
-        self._obey(orders, located)
+        self._obey(now_ns, orders, located)
         directive = None
         if self._mode != _AUTONOMOUS:
             self._away = self.control.state not in (IDLE, ARRIVED, ASSISTANCE)
@@ -79,11 +79,14 @@ class OrderedNavigation(Process):
         now = self._loading
         return now is not None and orders.loading == now.number > 0 and now.state in HAS_THE_MACHINE
 
-    def _obey(self, orders: Orders, located: Located) -> None:
-        """Begin another drive, once the place is known."""
-        if orders.number == self._number or not orders.goal or not self.control.knows(located):
+    def _obey(self, now_ns: int, orders: Orders, located: Located) -> None:
+        """Begin another drive; where the place is not known, wait for it, and ask for help after some time."""
+        if orders.number == self._number or not orders.goal:
             return
         self._number = orders.number
+        if not self.control.knows(located):
+            self.control.wait_for_place(now_ns, orders.goal, located, loaded=orders.loaded)
+            return
         try:
             self.control.go("", orders.goal, located, loaded=orders.loaded)
         except UsageError as error:
