@@ -52,13 +52,15 @@ class LocalizerOptions(NamedTuple):
 
     `live`: a running machine, where nothing waits for a search; of a log each is waited for, so that the rows are the same each
     time. With `smoother` a row's pose is that of the fixed-lag smoother once the machine is some metres farther. `listener` is
-    told of each front scan. `pile`: what looks for piles on the way, if anything does.
+    told of each front scan. `pile`: what looks for piles on the way, if anything does. `newest_only`: of the rows only the newest
+    is kept, so that memory does not grow with the run (without `smoother`).
     """
 
     live: bool = False
     smoother: bool = False
     listener: Listener | None = None
     pile: PileSink | None = None
+    newest_only: bool = False
 
 
 _AS_OF_A_LOG = LocalizerOptions()
@@ -93,13 +95,14 @@ class Localizer:
         self._place = HeldPlace(None if start is None else on_map.begun(start), own.support_scans)
         self._way = WayDriven()
         self.keeper = PlaceKeeper(self._place, on_map, self._finder, self.world, self._way, own.confirm_m)
-        self._told = LocalizerRows(on_map.placer, FixedLag() if options.smoother else None)
+        lag = FixedLag() if options.smoother else None
+        self._told = LocalizerRows(on_map.placer, lag, newest_only=options.newest_only)
         # Stamp and hits (N, 3) in `map` of the newest scan with a place.
         self.newest: tuple[int, FloatArray] | None = None
 
     @property
     def rows(self) -> list[LocalizationRow]:
-        """What was said of each front scan."""
+        """What was said of each front scan; with `newest_only` of the newest."""
         return self._told.rows
 
     @property

@@ -11,10 +11,14 @@ from lhdmap.pipeline.place_held import HeldPlace
 
 
 class LocalizerRows:
-    """`add` a scan, then `smooth`, which does nothing without a smoother (`lag`)."""
+    """`add` a scan, then `smooth`, which does nothing without a smoother (`lag`).
 
-    def __init__(self, placer: Placer, lag: FixedLag | None) -> None:
+    `newest_only`: the row before goes, as nobody asks for it; a shift has a million of them.
+    """
+
+    def __init__(self, placer: Placer, lag: FixedLag | None, *, newest_only: bool = False) -> None:
         self._placer, self._lag = placer, lag
+        self._newest_only = newest_only and lag is None
         self.rows: list[LocalizationRow] = []
 
     def add(self, stamp_ns: int, place: HeldPlace, step: OdometryStep, source: str, latency_ms: float) -> None:
@@ -26,6 +30,8 @@ class LocalizerRows:
         if tracker is not None:
             on_map = self._placer.at(tracker.pose, tracker.height_m, float(step.velocity[0]))
             row = row_of(row._replace(information_along=place.support.information), on_map, tracker)
+        if self._newest_only:
+            self.rows.clear()
         self.rows.append(row)
 
     def smooth(self, step: OdometryStep, turn_rad: float | None, predicted: Belief | None, place: HeldPlace) -> None:

@@ -51,7 +51,7 @@ class Locating(Process):
         self._scribe, self._pile, self._told_ns = scribe, pile, 0
         self._seen: list[Seen] = []
         self.localizer = Localizer(
-            known, live(settings), machine, start, LocalizerOptions(listener=self._listen, pile=pile)
+            known, live(settings), machine, start, LocalizerOptions(listener=self._listen, pile=pile, newest_only=True)
         )
         self._agreement = Agreement(self.localizer.pipeline.front_end.wheels.motion_between)
         scribe.goes("waiting", "no scan yet")
