@@ -105,10 +105,13 @@ def _cell_keys(points: FloatArray, height_m: float) -> npt.NDArray[np.int64]:
 
 
 class WorldChanges:
-    """Takes what a machine sees, with its place; tells what has changed at any time. Its memory grows with the map alone."""
+    """Takes what a machine sees, with its place; tells what has changed at any time. Its memory grows with the map alone.
 
-    def __init__(self, topology: TopologicalMap, sheets: list[Sheet], walls: MapWalls) -> None:
-        self._sheets, self._along = sheets, AlongNode(topology)
+    `told`: whether somebody asks for `changes`; else hits are not counted along the nodes.
+    """
+
+    def __init__(self, topology: TopologicalMap, sheets: list[Sheet], walls: MapWalls, *, told: bool = True) -> None:
+        self._sheets, self._along, self._told = sheets, AlongNode(topology), told
         self._tree = KDTree(walls.cells() * [1.0, 1.0, _HEIGHT])
         self._taken_m, self._new = -math.inf, _NewCells()
         self._apart: list[Seen] = []
@@ -135,7 +138,7 @@ class WorldChanges:
         seen = self._set_against(stamp_ns, *place, points)
         if known:
             self._settle()
-            self._along.add(seen)
+            self._count(seen)
             if holds:
                 self._new.add(travelled_m, seen.points[seen.kinds == 1], seen.height_m)
             return
@@ -156,15 +159,19 @@ class WorldChanges:
     def _settle(self) -> None:
         """Count what was seen while the machine was lost, if it was where the odometry said."""
         for seen in self._apart if self._was_right else []:
-            self._along.add(seen)
+            self._count(seen)
         self._lost_m, self._apart, self._was_right = None, [], False
+
+    def _count(self, seen: Seen) -> None:
+        if self._told:
+            self._along.add(seen)
 
     def walls(self) -> FloatArray:
         """Return the map's walls (M, 3): x, y, height of the floor."""
         return self._tree.data / [1.0, 1.0, _HEIGHT]
 
     def changes(self) -> list[Change]:
-        """Return the changed stretches, those that began first in front."""
+        """Return the changed stretches, those that began first in front; none where they are not `told`."""
         found = [_change(one) for one in stretches(self._along)]
         return sorted(found, key=lambda one: one.since_ns)
 

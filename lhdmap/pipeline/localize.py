@@ -52,8 +52,8 @@ class LocalizerOptions(NamedTuple):
 
     `live`: a running machine, where nothing waits for a search; of a log each is waited for, so that the rows are the same each
     time. With `smoother` a row's pose is that of the fixed-lag smoother once the machine is some metres farther. `listener` is
-    told of each front scan. `pile`: what looks for piles on the way, if anything does. `newest_only`: of the rows only the newest
-    is kept, so that memory does not grow with the run (without `smoother`).
+    told of each front scan. `pile`: what looks for piles on the way, if anything does. `newest_only`: nobody asks for more
+    than the newest row (without `smoother`): the others are not kept, and changes of the world are not counted.
     """
 
     live: bool = False
@@ -88,7 +88,7 @@ class Localizer:
         self.pipeline, self._listener = MappingPipeline(settings, machine, mapping), options.listener
         self._odometry = FromOdometry(self.pipeline, own, settings.odometry.min_height_m)
         self._on_map = on_map = TracksOnMap(known, settings)
-        self.world = WorldChanges(known.topology, known.sheets, on_map.walls)
+        self.world = WorldChanges(known.topology, known.sheets, on_map.walls, told=not options.newest_only)
         search = known.search(on_map.walls, settings)
         self._finder = Finder(search, own, settings.landmarks, waits=not options.live)
         self._start = StartChoice(on_map.walls, start)

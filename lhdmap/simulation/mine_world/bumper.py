@@ -9,12 +9,13 @@ import numpy as np
 from lhdmap.machine import Machine
 from lhdmap.messages import FloatArray
 from lhdmap.simulation.mine_world.world import MineWorld
-from lhdmap.simulation.vehicle.bodies import Bodies, Boxes
+from lhdmap.simulation.vehicle.bodies import Bodies, Boxes, moved_at_most_m
 from lhdmap.simulation.vehicle.contact import BodyContact, ContactPiece, Contacts
 from lhdmap.simulation.vehicle.state import VehicleState
 
 _KEPT = 128  # pieces of the surface that are ready to be touched
 _LIMIT_M = 2.0  # clearances are told up to this
+_SURELY_M = 1e-6  # what clearances are exact to
 _STAYS_M = 2.0  # pieces are looked for anew when a body has moved so far
 
 
@@ -25,16 +26,30 @@ class Bumper:
         self._bodies, self._world = Bodies(machine), world
         self._pieces: OrderedDict[int | str, ContactPiece] = OrderedDict()
         self._here: tuple[FloatArray, int, Contacts] | None = None
+        self._clear: tuple[Boxes, int, float] | None = (
+            None  # where the clearance was taken last, in which world, and what it was
+        )
 
     def touching(self, state: VehicleState) -> list[BodyContact]:
-        """Return the bodies that are in a wall or a thing, each with its deepest place."""
-        boxes = self._bodies.boxes(state)
+        """Return the bodies that are in a wall or a thing, each with its deepest place.
+
+        Bodies that have moved by less than the room that they had last touch nothing: nothing needs to be looked at.
+        """
+        boxes, clear = self._bodies.boxes(state), self._clear
+        if (
+            clear is not None
+            and clear[1] == self._world.version
+            and moved_at_most_m(clear[0], boxes) < clear[2] - _SURELY_M
+        ):
+            return []
         return self._near(boxes).touching(boxes)
 
     def clearance_m(self, state: VehicleState, limit_m: float = 1.0) -> float:
         """Return the least distance of any body from anything, at most `limit_m` (and 2 m), metres."""
         boxes = self._bodies.boxes(state)
-        return self._near(boxes).clearance_m(boxes, min(limit_m, _LIMIT_M))
+        clear_m = self._near(boxes).clearance_m(boxes, min(limit_m, _LIMIT_M))
+        self._clear = boxes, self._world.version, clear_m
+        return clear_m
 
     def _near(self, boxes: Boxes) -> Contacts:
         """Return what is around; a little more than that, so that it holds for the next metres."""

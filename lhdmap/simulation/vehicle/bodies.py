@@ -61,6 +61,11 @@ def body_boxes(machine: Machine, state: VehicleState) -> Boxes:
     return Bodies(machine).boxes(state)
 
 
+def moved_at_most_m(before: Boxes, now: Boxes) -> float:
+    """Return how far any point of the boxes is at most from the same box as it was `before`, metres."""
+    return float(_moved_at_most(before[1], before[2], before[3], now[1], now[2], now[3]))
+
+
 def bucket_outline(linkage: Linkage, boom_rad: float, bucket_rad: float) -> FloatArray:
     """Return pin, lip, heel and upper edge of the bucket as x, z in `base_link`, shape (4, 2), m."""
     lifted, tilted = boom_rad - linkage.boom_min_rad, bucket_rad - linkage.bucket_max_rad
@@ -106,3 +111,23 @@ def _placed(
             for j in range(3):
                 centre[b, k] += axes[b, k, j] * 0.5 * (corners[b, 0, j] + corners[b, 1, j])
     return centre, axes, half
+
+
+@nb.njit(cache=True, nogil=True)
+def _moved_at_most(
+    centre0: FloatArray, axes0: FloatArray, half0: FloatArray, centre: FloatArray, axes: FloatArray, half: FloatArray
+) -> float:
+    """Return the largest of the boxes' shifts: of the centre, of the ends of the axes, and of the sides that have grown."""
+    most = 0.0
+    for b in range(len(centre)):
+        square = 0.0
+        for k in range(3):
+            square += (centre[b, k] - centre0[b, k]) ** 2
+        shift = math.sqrt(square)
+        for j in range(3):
+            square = 0.0
+            for k in range(3):
+                square += (axes[b, k, j] - axes0[b, k, j]) ** 2
+            shift += math.sqrt(square) * half[b, j] + max(half[b, j] - half0[b, j], 0.0)
+        most = max(most, shift)
+    return most
