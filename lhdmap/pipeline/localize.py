@@ -53,7 +53,7 @@ class LocalizerOptions(NamedTuple):
     `live`: a running machine, where nothing waits for a search; of a log each is waited for, so that the rows are the same each
     time. With `smoother` a row's pose is that of the fixed-lag smoother once the machine is some metres farther. `listener` is
     told of each front scan. `pile`: what looks for piles on the way, if anything does. `newest_only`: nobody asks for more
-    than the newest row (without `smoother`): the others are not kept, and changes of the world are not counted.
+    than the newest row (without `smoother`): nothing of the drive is kept, and changes of the world are not counted.
     """
 
     live: bool = False
@@ -84,7 +84,7 @@ class Localizer:
         if options.pile is None:  # what lies beyond the map does not count: no loop is closed, no pile looked for
             settings = replace(settings, pile=replace(settings.pile, method="off"))
         own = settings.localization
-        mapping = MappingOptions(cloud=False, pile=options.pile, on_step=self.take)
+        mapping = MappingOptions(cloud=False, pile=options.pile, on_step=self.take, kept=not options.newest_only)
         self.pipeline, self._listener = MappingPipeline(settings, machine, mapping), options.listener
         self._odometry = FromOdometry(self.pipeline, own, settings.odometry.min_height_m)
         self._on_map = on_map = TracksOnMap(known, settings)

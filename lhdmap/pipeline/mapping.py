@@ -48,7 +48,8 @@ class MappingOptions(NamedTuple):
 
     `primary`: the sensor that the odometry runs on, the front scanner or a 3D scanner; `cloud`: whether sweeps are integrated,
     and `on_sweep` is told of each; `pile`: what looks for the pile, if not the stage of the settings here; `worker`: integrates
-    sweeps, a thread of its own by default; `on_step`: is told of each front scan.
+    sweeps, a thread of its own by default; `on_step`: is told of each front scan. `kept`: whether the drive is kept for what comes
+    after it (rows, path, key scans); a machine that runs for a shift has no use for it.
     """
 
     primary: Literal["front", "points"] = "front"
@@ -57,6 +58,7 @@ class MappingOptions(NamedTuple):
     pile: PileSink | None = None
     worker: Executor | None = None
     on_step: StepSink | None = None
+    kept: bool = True
 
 
 _WHOLE = MappingOptions()
@@ -74,12 +76,13 @@ class MappingPipeline:
         self._waiting = WaitingScans()
         self.odometry: PlanarOdometry | None = None  # begins once the first scans have told the speed
         self.clouds = CloudOdometry(settings.cloud_odometry) if options.primary == "points" else None
-        self.path = FinalPath(Track(settings.odometry.height_lever * front.machine.dimensions.wheelbase_m))
+        lever_m = settings.odometry.height_lever * front.machine.dimensions.wheelbase_m
+        self.path = FinalPath(Track(lever_m, kept=options.kept))
         self.sweeps = SweepIntegration(settings, machine, front.mounts, options.on_sweep, options.worker)
         self.evidence = DriveEvidence(settings.smoothing)
         looked_for = options.primary == "front" and settings.pile.method != "off"
         self.pile: PileSink | None = (options.pile or PileWatch(settings)) if looked_for else None
-        self._steps = StepRecorder(front.wheels, settings.slip)
+        self._steps = StepRecorder(front.wheels, settings.slip, kept=options.kept)
 
     def __enter__(self) -> Self:
         return self
@@ -199,18 +202,24 @@ class MappingPipeline:
 
     def _take(self, scan: LaserScan, time_ns: int, step: OdometryStep, odometry: PlanarOdometry) -> None:
         """Hand a processed scan on to all that live by its pose."""
-        front, evidence = self.front_end, self.evidence
+        front = self.front_end
         self.track.append(time_ns, step.pose_odom_base, *front.inclinometer.roll_pitch_at(time_ns))
-        if front.inclinometer.gyro.there:
-            evidence.turns.append(time_ns, front.inclinometer.gyro.turned_at(np.array([time_ns]))[0])
         self._steps.believe(step, odometry)
-        evidence.smoother.keys.update(time_ns, step.pose_odom_base, odometry.points, step.error, unseen=step.unseen)
-        self._view(scan, time_ns, step, odometry)
+        if self._options.kept:
+            self._keep(scan, time_ns, step, odometry)
         aligned = AlignedScan(time_ns, step.pose_odom_base, odometry.points, odometry.points_behind, weak=step.lost)
         self.path.update(aligned)
         self._steps.record(scan.stamp_ns, time_ns, step, odometry)
         self._look_for_pile(scan, time_ns, step)
         self.sweeps.advance(self.path.final, front.wheels)
+
+    def _keep(self, scan: LaserScan, time_ns: int, step: OdometryStep, odometry: PlanarOdometry) -> None:
+        """Keep what the steps after the drive live by: turns, key scans, views."""
+        gyro, evidence = self.front_end.inclinometer.gyro, self.evidence
+        if gyro.there:
+            evidence.turns.append(time_ns, gyro.turned_at(np.array([time_ns]))[0])
+        evidence.smoother.keys.update(time_ns, step.pose_odom_base, odometry.points, step.error, unseen=step.unseen)
+        self._view(scan, time_ns, step, odometry)
 
     def _view(self, scan: LaserScan, time_ns: int, step: OdometryStep, odometry: PlanarOdometry) -> None:
         """Keep what both scanners saw, where the views want it."""

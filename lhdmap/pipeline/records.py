@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 from array import array
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -22,9 +23,13 @@ _MATCH, _MOTION = (
 
 
 class ScanRecords:
-    """One row a scan of the front scanner (stamp, time) and one row a processed scan (diagnostics)."""
+    """One row a scan of the front scanner (stamp, time) and one row a processed scan (diagnostics).
 
-    def __init__(self) -> None:
+    Not `kept`: the newest of both alone.
+    """
+
+    def __init__(self, *, kept: bool = True) -> None:
+        self._kept = kept
         self._stamps_ns, self._times_ns, self._processed_ns, self._moved_ns = (array("q") for _ in range(4))
         self._matches, self._motions = array("d"), array("d")
         self._degenerate, self._lost = array("b"), array("b")
@@ -32,6 +37,8 @@ class ScanRecords:
 
     def add_scan(self, stamp_ns: int, time_ns: int) -> None:
         """Count a scan; `time_ns` is its stamp made rising."""
+        if not self._kept:
+            _empty(self._stamps_ns, self._times_ns)
         self._stamps_ns.append(stamp_ns)
         self._times_ns.append(time_ns)
 
@@ -48,6 +55,9 @@ class ScanRecords:
 
         `found`: information (3,), and standard deviations (3,) of what the step adds to the error of the path.
         """
+        if not self._kept:
+            _empty(self._processed_ns, self._moved_ns, self._matches, self._motions, self._degenerate, self._lost)
+            _empty(self._substitutes.rows, self._wheels.rows)
         self._processed_ns.append(stamp_ns)
         self._matches.extend((*match, *found[0].tolist(), wheels[1], *found[1].tolist()))
         self._substitutes.append(substitute)
@@ -154,14 +164,19 @@ class _Words:
 
     def __init__(self) -> None:
         self._numbers: dict[str, int] = {}
-        self._rows = array("B")
+        self.rows = array("B")
 
     def append(self, word: str) -> None:
-        self._rows.append(self._numbers.setdefault(str(word), len(self._numbers)))
+        self.rows.append(self._numbers.setdefault(str(word), len(self._numbers)))
 
     def all(self) -> list[str]:
         words = list(self._numbers)
-        return [words[number] for number in self._rows]
+        return [words[number] for number in self.rows]
+
+
+def _empty(*packed: array[Any]) -> None:
+    for one in packed:
+        del one[:]
 
 
 def _integers(packed: array[int]) -> npt.NDArray[np.int64]:

@@ -21,8 +21,8 @@ _NOT_KNOWN = np.full(3, math.nan)
 class StepRecorder:
     """`believe`, then `record` each processed step; `records` are the rows, `newest` what the odometry knows of its pose."""
 
-    def __init__(self, wheels: WheelOdometry, settings: SlipSettings) -> None:
-        self.records = ScanRecords()
+    def __init__(self, wheels: WheelOdometry, settings: SlipSettings, *, kept: bool = True) -> None:
+        self.records = ScanRecords(kept=kept)
         self.newest = Newest(np.zeros((3, 3)), np.zeros(3), None)
         self._wheels, self._slip = wheels, SkidFactor(settings)
 

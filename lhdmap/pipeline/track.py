@@ -18,6 +18,7 @@ from lhdmap.trajectory import Trajectory
 Stamps = npt.NDArray[np.int64]
 _CARRY_ON_NS = 2e8
 _POSE = 6  # numbers of a pose
+_NEWEST = 256  # poses of a track that is not kept: some ten seconds
 _MOST_CARRIED = 3.0  # a growing track's last step goes on for up to two of its lengths
 
 
@@ -33,10 +34,11 @@ class Track:
 
     A planar step is horizontal; with the machine on the floor it rises by -tan(pitch) forward and tan(roll) to the left
     (REP 103: positive pitch points down, positive roll lifts the left side). Poses are packed: a shift has a million of them.
+    Not `kept`: the newest ones alone.
     """
 
-    def __init__(self, height_lever_m: float = 0.0) -> None:
-        self._lever_m = height_lever_m
+    def __init__(self, height_lever_m: float = 0.0, *, kept: bool = True) -> None:
+        self._lever_m, self._kept = height_lever_m, kept
         self._times, self._poses = array("q"), array("d")
 
     def __len__(self) -> int:
@@ -60,6 +62,8 @@ class Track:
     def append(self, time_ns: int, pose_odom_base: FloatArray, roll_rad: float, pitch_rad: float) -> None:
         """Add a planar pose (3,) with its attitude; `time_ns` must rise."""
         pose = self.ahead(pose_odom_base, roll_rad, pitch_rad)
+        if not self._kept and len(self._times) >= _NEWEST:
+            del self._times[: _NEWEST // 2], self._poses[: _POSE * (_NEWEST // 2)]
         self._times.append(time_ns)
         self._poses.extend(pose)
 

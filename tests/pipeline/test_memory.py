@@ -62,6 +62,26 @@ def test_a_scan_leaves_some_numbers_behind() -> None:
     assert bytes_a_turn(scan, 5000) < 1.15 * (132 + 56 + 32)
 
 
+def test_a_scan_of_a_run_that_is_not_kept_leaves_nothing_behind() -> None:
+    records, track = ScanRecords(kept=False), Track(kept=False)
+
+    def scan(k: int) -> None:
+        stamp_ns, x = START_NS + k * STEP_NS, 0.1 * k
+        records.add_scan(stamp_ns, stamp_ns + 1)
+        records.add_processed(
+            stamp_ns, (x, x), (np.full(3, x), np.full(3, x)), "wheels", (k % 2 == 0, k % 2 == 1), ("used", x)
+        )
+        records.add_motion(stamp_ns, x, x, None)
+        track.append(stamp_ns, np.full(3, x), 0.0, 0.0)
+
+    assert bytes_a_turn(scan, 5000) < 1.0
+    assert (records.scans, records.processed, records.lost_now, records.weak_now) == (1, 1, True, False)
+    assert track.newest[:2] == pytest.approx([999.9, 999.9])
+    assert track.rows_after(0, track.last_ns or 0).times_ns[-2:] == pytest.approx(
+        [track.last_ns - STEP_NS, track.last_ns]
+    )
+
+
 def there_and_back(passes: int) -> Iterator[tuple[float, LaserScan]]:
     """Yield scans of a machine that drives back and forth in 24 m of a drift, with fresh noise each time."""
     world = drift_world(7, pieces=((40.0, 0.0),), cross_drift_at_m=None)

@@ -27,7 +27,7 @@ class Perception(Process):
 
     def __init__(self, settings: Settings, machine: Machine, scribe: Scribe) -> None:
         without_pile = replace(settings, pile=replace(settings.pile, method="off"))
-        self.pipeline = MappingPipeline(without_pile, machine, MappingOptions(cloud=False))
+        self.pipeline = MappingPipeline(without_pile, machine, MappingOptions(cloud=False, kept=False))
         self._scribe = scribe
         scribe.goes("waiting", "no scan yet")
 

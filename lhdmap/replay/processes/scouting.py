@@ -62,7 +62,7 @@ class Scouting(Process):
     def __init__(self, settings: Settings, machine: Machine, scribe: Scribe) -> None:
         self.pile = PileAhead(settings)
         self.pipeline = MappingPipeline(
-            live(settings), machine, MappingOptions(cloud=False, pile=self.pile, on_step=self._listen)
+            live(settings), machine, MappingOptions(cloud=False, pile=self.pile, on_step=self._listen, kept=False)
         )
         self._agreement = Agreement(self.pipeline.front_end.wheels.motion_between)
         self._scribe, self._seen = scribe, list[Seen]()
