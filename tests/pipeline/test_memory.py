@@ -74,9 +74,9 @@ def test_a_scan_of_a_run_that_is_not_kept_leaves_nothing_behind() -> None:
         records.add_motion(stamp_ns, x, x, None)
         track.append(stamp_ns, np.full(3, x), 0.0, 0.0)
 
-    assert bytes_a_turn(scan, 5000) < 1.0
+    assert bytes_a_turn(scan, 1000) < 10.0  # the path has 128 poses more or fewer
     assert (records.scans, records.processed, records.lost_now, records.weak_now) == (1, 1, True, False)
-    assert track.newest[:2] == pytest.approx([999.9, 999.9])
+    assert track.newest[:2] == pytest.approx([199.9, 199.9])
     assert track.rows_after(0, track.last_ns or 0).times_ns[-2:] == pytest.approx(
         [track.last_ns - STEP_NS, track.last_ns]
     )
