@@ -5,8 +5,8 @@ a tile holds). Only tiles with hits have a block of memory; blocks are used in t
 are forgotten. Coarse levels serve sparse, distant walls and starts. A tilted scanner sees a wall at another height from each
 distance, and rock is rough in height, too: the line at a point is the wall's at the height of that point.
 
-A bit for each cell with hits, and the four numbers of a cell in one, would save 16 to 19 % of the time of a fit, 2 % of a run:
-docs/notes/weighed.md.
+A bit for each cell with hits, and the four numbers of a cell in one, would save a seventh of the time of a fit, at most 2 %
+of a run: docs/notes/weighed.md.
 """
 
 from __future__ import annotations
