@@ -22,9 +22,9 @@ def test_a_map_is_read_back_as_it_was_written() -> None:
 
 def test_the_contract_s_properties_are_there() -> None:
     wanted = {
-        "tunnel": "id name length_m width_min_m width_mean_m grade_max_pct speed_limit_kmh wall_preference pose_map_node "
+        "tunnel": "id name length_m width_min_m width_mean_m grade_max_pct speed_limit_kmh wall_preference T_map_node "
         "not_distinctive_m ends",
-        "intersection": "id name degree pose_map_node level",
+        "intersection": "id name degree T_map_node level",
         "access_point": "id node heading_deg joins",
         "waypoint": "id node heading_deg purpose speed_limit_kmh",
         "connection": "from to type length_m min_radius_m feasible closed cost_s",
