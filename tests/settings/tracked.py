@@ -14,10 +14,10 @@ from lhdmap.driving.motion import Motion, Setpoint
 from lhdmap.messages import FloatArray
 from lhdmap.tracking.settings import TrackingSettings
 from lhdmap.tracking.tracker import Tracker
-from tools.evaluate.tracking_paths import turn
-from tools.evaluate.tracking_plant import Errors, Plant, placed
 
 from tests.guidance.tunnels import BODIES, MODEL
+from tests.tracking.paths import turn
+from tests.tracking.plant import Errors, Plant, placed
 
 
 def tracks(settings: TrackingSettings) -> Iterator[Any]:

@@ -11,7 +11,7 @@ import pytest
 from lhdmap.config import Settings, settings_table
 from tools.docs_hooks import linked, notebook_text
 
-ROOT = Path(__file__).resolve().parents[1]
+ROOT = Path(__file__).resolve().parents[2]
 
 
 @pytest.mark.parametrize(
