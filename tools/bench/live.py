@@ -157,7 +157,7 @@ class _Session:
             self._publishers[topic] = (
                 ext.declare_advanced_publisher(self._session, _key(message), cache=cache, publisher_detection=True)
                 if fixed
-                else self._session.declare_publisher(_key(message))
+                else self._session.declare_publisher(_key(message), congestion_control=zenoh.CongestionControl.BLOCK)
             )
         if fixed and message not in self._mounts:
             self._mounts.append(message)
