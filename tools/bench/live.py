@@ -149,6 +149,8 @@ class _Session:
         self._session, self._publishers = None, {}
 
     def put(self, message: Sent, number: int) -> None:
+        """Publish a message; where the network is behind, wait: by default zenoh drops what a burst has too much, unheard."""
+        import zenoh
         from zenoh import ext
 
         fixed, topic = message.type_name == _FIXED, message.topic
