@@ -21,11 +21,14 @@ class _Late(NamedTuple):
 
 
 class Crossing:
-    """Both ways of the link. A sign of life that is lost is gone; what must arrive is sent again each turn until it does."""
+    """Both ways of the link. A sign of life that is lost is gone; what must arrive is sent again each turn until it does.
+
+    `machine_ns`: the machine's time, set in each of its turns.
+    """
 
     def __init__(self, radio: Radio, speed: float) -> None:
         """`speed`: how much faster than the clock the machine's time goes."""
-        self._radio, self._speed = radio, speed or 1.0
+        self._radio, self._speed, self.machine_ns = radio, speed or 1.0, 0
         self._heard: deque[tuple[Message, int]] = deque(maxlen=_MOST)
         self._late: deque[_Late] = deque()
         self._says: deque[tuple[Message, str]] = deque(maxlen=_MOST)
@@ -38,10 +41,10 @@ class Crossing:
         """Take a message of the machine."""
         self._says.append((message, key))
 
-    def arrived(self, machine_ns: int, clock_ns: int) -> Iterator[tuple[Message, int]]:
+    def arrived(self, clock_ns: int) -> Iterator[tuple[Message, int]]:
         """Yield what is through, with the clock's time at which it was."""
         for message, heard_ns in [self._heard.popleft() for _ in range(len(self._heard))]:
-            delay_ns = self._delay_ns(message, machine_ns)
+            delay_ns = self._delay_ns(message)
             if delay_ns is not None:
                 self._late.append(_Late(heard_ns + round(delay_ns / self._speed), message))
             elif isinstance(message, Command):
@@ -50,19 +53,19 @@ class Crossing:
             self._late.remove(one)
             yield one.message, one.due_ns
 
-    def sent(self, machine_ns: int) -> Iterator[tuple[Message, str]]:
+    def sent(self) -> Iterator[tuple[Message, str]]:
         """Yield what goes to the console now, in order; a state that is lost is gone, the next one is newer."""
         while self._says:
             message, key = self._says[0]
-            lost = self._radio(SAYS, machine_ns) is None
+            lost = self._radio(SAYS, self.machine_ns) is None
             if lost and not isinstance(message, Status):
                 return
             self._says.popleft()
             if not lost:
                 yield message, key
 
-    def _delay_ns(self, message: Message, machine_ns: int) -> int | None:
+    def _delay_ns(self, message: Message) -> int | None:
         """Return the delay of a message; of a sign of life that of its tick as well."""
         ways = (TICK, BEAT) if isinstance(message, Beat) else (COMMAND,)
-        delays = [self._radio(topic, machine_ns) for topic in ways]
+        delays = [self._radio(topic, self.machine_ns) for topic in ways]
         return None if None in delays else sum(delay or 0 for delay in delays)

@@ -33,14 +33,13 @@ class MachineLink:
     def __init__(self, machine: str, url: str, key: str, settings: ConsoleSettings, speed: float = 1.0,
                  clock: Clock = time.monotonic_ns, sleep: Callable[[float], None] = time.sleep) -> None:  # fmt: skip
         self._speed, self._clock, self._sleep = speed, clock, sleep
-        self._watch, self._settings = Watch(settings), settings
+        self._watch = Watch(settings)
         self._lock = threading.Lock()
         self._commands: deque[tuple[Command, int]] = deque(maxlen=_KEPT)
         self._begun: tuple[int, int] | None = None
         self._stopped, self._shown_ns = False, 0
         self._asked: Ask | None = None
         self._crossing: Crossing | None = None
-        self._machine_ns = 0
         self._client = Client(Address(url, machine, key), self._heard, self._tick, settings.tick_s)
 
     def connect(self, patience_s: float = 10.0) -> None:
@@ -62,7 +61,7 @@ class MachineLink:
         with self._lock:
             now_ns = self._clock()
             if self._crossing is not None:
-                for message, at_ns in self._crossing.arrived(self._machine_ns, now_ns):
+                for message, at_ns in self._crossing.arrived(now_ns):
                     self._take(message, at_ns)
             return self._watch.fault(now_ns)
 
@@ -86,7 +85,8 @@ class MachineLink:
     def attend(self, now_ns: int, status: Status, request: Ask | None) -> Sequence[Command]:
         """Return what has been commanded, and a stop where the operator of an armed machine is silent."""
         self._pace(now_ns)
-        self._machine_ns = now_ns
+        if self._crossing is not None:
+            self._crossing.machine_ns = now_ns
         self._show(status, request)
         fault = self.fault()
         commands = [command for command, told_ns in self._taken() if self._counts(command, told_ns, fault)]
@@ -124,7 +124,7 @@ class MachineLink:
             self._shown_ns = now_ns
             self._say(status, "status")
         if self._crossing is not None:
-            for message, key in self._crossing.sent(self._machine_ns):
+            for message, key in self._crossing.sent():
                 self._client.send(message, key)
 
     def _say(self, message: Message, key: str = "") -> None:
@@ -149,7 +149,7 @@ class MachineLink:
     def _tick(self) -> Tick:
         with self._lock:
             number = self._watch.tick(self._clock())
-            return Tick(number, self._watch.round_trip_s, self._settings.latency_limit_s)
+            return Tick(number, self._watch.round_trip_s, self._watch.latency_limit_s)
 
     def _heard(self, message: Message) -> None:
         """Take a message of the console; called in the link's thread."""

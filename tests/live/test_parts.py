@@ -5,6 +5,7 @@ from __future__ import annotations
 import threading
 import time
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -163,8 +164,17 @@ def test_what_ends_a_source_is_raised_where_its_messages_are_read(tmp_path: Path
 
 def test_the_warm_up_runs_the_kernels_that_a_link_that_breaks_needs(monkeypatch: pytest.MonkeyPatch) -> None:
     ran = list[str]()
-    for module, name in ((submap, "search"), (rear_view, "_joint_equation")):
+
+    def counted(module: Any, name: str) -> None:
         kernel = getattr(module, name)
-        monkeypatch.setattr(module, name, lambda *a, k=kernel, n=name, **more: (ran.append(n), k(*a, **more))[1])
+
+        def run(*arguments: Any, **more: Any) -> Any:
+            ran.append(name)
+            return kernel(*arguments, **more)
+
+        monkeypatch.setattr(module, name, run)
+
+    counted(submap, "search")
+    counted(rear_view, "_joint_equation")
     warm_up(Settings(), None)
     assert set(ran) == {"search", "_joint_equation"}
