@@ -20,7 +20,7 @@ from lhdmap.replay.parts import Autonomous, Parts
 from lhdmap.replay.process import Process
 from lhdmap.replay.processes.dumps import DUMPS, Dumps
 from lhdmap.replay.processes.execute import EXECUTOR, PERIODS_S, Execute
-from lhdmap.replay.processes.executive import EXECUTIVE, Executive
+from lhdmap.replay.processes.executive import EXECUTIVE, Executive, Shares
 from lhdmap.replay.processes.guide import GUIDANCE, Guide
 from lhdmap.replay.processes.load import LOADS, Loads
 from lhdmap.replay.processes.locating import Locating
@@ -46,6 +46,7 @@ def mission_processes(
     navigation = NavigationControl(
         RoutePlanner(topology, settings.movement), models[0], bodies, settings.navigation, journal.of(NAVIGATION).goes
     )
+    navigation.allowed.avoid = () if job is None else job.avoid
     control = Control(models[0], bodies, settings.executor, PERIODS_S)
     guidance = guidance_of(machine, models[0], bodies, settings)
     return [
@@ -65,7 +66,7 @@ def _executive(
 ) -> Executive:
     if job is not None:
         task = job.task
-        return Executive(task, job.orders, topology, full_t, scribe, free=lambda: task.free)
+        return Executive(task, job.orders, topology, full_t, scribe, shares=Shares(lambda: task.free, job.presence))
     layout = checked(layout_of_map(topology, scenario.mine))
     alone = MissionTask(layout, park=scenario.start if scenario.start in layout.of("park") else "")
     orders = [Buckets(one.source, one.to, one.buckets) for one in scenario.mission]

@@ -22,6 +22,7 @@ from lhdmap.navigation.begin import Errand as Way
 from lhdmap.navigation.begin import Reach, route_from
 from lhdmap.navigation.hold import ROOM_M
 from lhdmap.navigation.leg import Leg, legs_of
+from lhdmap.navigation.presence import Presence
 from lhdmap.replay.crew_parts import errands_of
 from lhdmap.replay.journal import Scribe
 from lhdmap.replay.parts import Parts
@@ -29,14 +30,15 @@ from lhdmap.replay.processes.section_watch import SectionWatch
 from lhdmap.replay.scenario import Scenario
 from lhdmap.topology.model import TopologicalMap, Waypoint
 
-_OUT_M = 1.0  # a section is given back so far after the rear has left it
+_OUT_M = 1.0  # a section is given back so far after the machine has left it
 
 
 class Job(NamedTuple):
-    """What a machine of a fleet is to do, the fleet's word on it, and the nodes (ids) in which others work or park."""
+    """What a machine of a fleet is to do, the fleet's word on it, what it is in, the nodes (ids) in which others work or park."""
 
     task: Member
     orders: Sequence[Buckets]
+    presence: Presence
     avoid: tuple[str, ...]
 
 
@@ -84,7 +86,8 @@ def crew_mission(scenario: Scenario, crew: Mapping[str, Parts]) -> CrewMission:
     check_pull_back(layout, errands, parts.settings.loading.pull_back_m + tail_m)
     fleet = Fleet(layout, errands, parts.settings.haulage, tail_m + _OUT_M)
     orders = {name: [Buckets(one.source, one.to, one.buckets) for one in ones] for name, ones in wanted.items()}
-    return CrewMission({name: Job(fleet.member(name), orders[name], avoid) for name in crew}, layout)
+    presence = Presence(topology, bodies, machine, _OUT_M)
+    return CrewMission({name: Job(fleet.member(name), orders[name], presence, avoid) for name in crew}, layout)
 
 
 def section_watch(given: CrewMission, crew: Mapping[str, Parts], scribe: Scribe) -> SectionWatch:
