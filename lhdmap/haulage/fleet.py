@@ -11,7 +11,7 @@ from collections.abc import Collection, Mapping
 from itertools import groupby, pairwise
 
 from lhdmap.errors import UsageError
-from lhdmap.haulage.layout import Layout
+from lhdmap.haulage.layout import Layout, nodes_of_section
 from lhdmap.haulage.machine import NOWHERE, Errand, Status
 from lhdmap.haulage.mission import MissionTask
 from lhdmap.haulage.mission_io import MissionInput, MissionOutput
@@ -64,7 +64,8 @@ class Fleet:
 
     def _nodes_in(self, sections: Collection[str]) -> set[str]:
         """Return the names of the nodes of sections."""
-        return {edge.node for edge in self._layout.edges if edge.held in sections}
+        joined = {node for section in sections for node in nodes_of_section(section)}
+        return joined | {edge.node for edge in self._layout.edges if edge.held in sections}
 
     def bound(self, name: str) -> str:
         """Return where a machine is bound for, whatever it waits for; empty: it is to stand."""

@@ -13,7 +13,7 @@ from lhdmap.driving.model import drive_model
 from lhdmap.errors import UsageError
 from lhdmap.haulage.fleet import Fleet, Member
 from lhdmap.haulage.joining import check_pull_back, ways_of, with_sections
-from lhdmap.haulage.layout import Layout, checked
+from lhdmap.haulage.layout import Layout, checked, nodes_of_section
 from lhdmap.haulage.machine import Errand
 from lhdmap.haulage.mission_io import Buckets
 from lhdmap.haulage.of_map import layout_of_map
@@ -94,7 +94,9 @@ def section_watch(given: CrewMission, crew: Mapping[str, Parts], scribe: Scribe)
     """Return who looks at the sections of a crew's mission."""
     parts = next(iter(crew.values()))
     assert parts.autonomous is not None  # noqa: S101  # a mission drives itself
-    named = {edge.node: edge.held for edge in given.layout.edges}
+    held = {edge.held for edge in given.layout.edges}
+    named = {node: one for one in held for node in nodes_of_section(one)}
+    named |= {edge.node: edge.held for edge in given.layout.edges}
     section_of = {one: named.get(name, name) for one, name in given.layout.ids.items()}
     spaces = {name: "" if number == 0 else name for number, name in enumerate(crew)}
     origin = np.zeros(4) if parts.T_mine_map is None else parts.T_mine_map
