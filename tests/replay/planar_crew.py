@@ -7,20 +7,18 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from itertools import combinations
 
 import numpy as np
 from lhdmap.config import Settings
 from lhdmap.driving.bodies import bodies_of
-from lhdmap.driving.model import drive_model
-from lhdmap.guidance.directive import SPEED, WAY, Directive
+from lhdmap.driving.model import DriveModel, drive_model
+from lhdmap.guidance.directive import HEADING, SPEED, WAY, Directive, X, Y
 from lhdmap.loading.states import State
 from lhdmap.machine import Machine
 from lhdmap.messages import FloatArray, Joints, Tachometer
-from lhdmap.movement.routes import RoutePlanner
 from lhdmap.navigation.along import Located, along_m
-from lhdmap.navigation.control import NavigationControl
 from lhdmap.pipeline.pose_now import PoseNow
+from lhdmap.replay.assemble_mission import executive_of, navigation_of
 from lhdmap.replay.crew_mission import CrewMission, Job
 from lhdmap.replay.journal import Journal
 from lhdmap.replay.namespace import InNamespace, JournalOf, Scribes
@@ -39,11 +37,11 @@ from lhdmap.replay.process import (
     Process,
     Received,
 )
-from lhdmap.replay.processes.executive import EXECUTIVE, Executive, Shares
+from lhdmap.replay.processes.executive import EXECUTIVE
 from lhdmap.replay.processes.feed import JOINTS, TACHOMETER
 from lhdmap.replay.processes.navigator import NAVIGATION
-from lhdmap.replay.processes.ordered import OrderedNavigation
 from lhdmap.replay.processes.told import DumpingNow, Health, LoadingNow, Navigating, Orders
+from lhdmap.replay.scenario import Scenario
 from lhdmap.topology.model import TopologicalMap
 
 from tests.replay.doubles import Unicycle
@@ -63,11 +61,14 @@ class Planar(Process):
     name, period_ns, priority = "plant", round(PERIOD_S * 1e9), 0
     reads = (DIRECTIVE, APPROACH, ORDERS, NAVIGATING)
 
-    def __init__(self, pose_map: FloatArray, wheelbase_m: float) -> None:
+    def __init__(self, pose_map: FloatArray, model: DriveModel) -> None:
         """`pose_map` (3,): of `base_link` at first."""
-        self._wheelbase_m, self._speed_mps = wheelbase_m, 0.0
-        way = np.array([math.cos(pose_map[2]), math.sin(pose_map[2])])
-        self.front_m, self.rear_m = pose_map[:2].copy(), pose_map[:2] - wheelbase_m * way
+        self._model, self._speed_mps = model, 0.0
+        self.front_m, self.heading_rad, self.rear_heading_rad = (
+            pose_map[:2].copy(),
+            float(pose_map[2]),
+            float(pose_map[2]),
+        )
         self._directive: Directive | None = None
         self._orders, self._left_m = Orders(0, 0, "", loaded=False), math.inf
         self._loading, self._digging_s, self._number = State.IDLE, 0.0, 0
@@ -75,9 +76,14 @@ class Planar(Process):
         self._to_go_m = 0.0
 
     @property
-    def heading_rad(self) -> float:
-        """From the rear axle to the front one: the joint is straight."""
-        return math.atan2(*(self.front_m - self.rear_m)[::-1])
+    def joint_m(self) -> FloatArray:
+        """Where the joint is (2,)."""
+        return self.front_m - self._model.front_m * _unit(self.heading_rad)
+
+    @property
+    def rear_m(self) -> FloatArray:
+        """Where the rear axle is (2,)."""
+        return self.joint_m - self._model.rear_m * _unit(self.rear_heading_rad)
 
     def step(self, now_ns: int, inbox: Sequence[Received]) -> Iterator[Outgoing]:
         """Move, work, and say it."""
@@ -91,7 +97,8 @@ class Planar(Process):
         pose = np.array([*self.front_m, self.heading_rad])
         yield Outgoing(POSE, PoseNow(now_ns, T, np.eye(3) * 1e-4, 0.0, "scan"))
         yield Outgoing(LOCATED, Located(now_ns, "tracking", pose, pose, np.eye(3) * 1e-4, 0.0))
-        yield Outgoing(JOINTS, Joints(now_ns, {"articulation": 0.0}, {"articulation": 0.0}))
+        bend_rad = math.remainder(self.heading_rad - self.rear_heading_rad, math.tau)
+        yield Outgoing(JOINTS, Joints(now_ns, {"articulation": bend_rad}, {"articulation": 0.0}))
         yield Outgoing(TACHOMETER, Tachometer(now_ns, self._speed_mps))
         stands = self._speed_mps == 0.0
         yield Outgoing(MACHINE_SAYS, Health(now_ns, True, "autonomous", stands, ()))
@@ -101,7 +108,10 @@ class Planar(Process):
             done = self._dumped_s > _DUMPS_S
             yield Outgoing(DUMPING, DumpingNow(now_ns, self._dump, "done" if done else "busy"))
         x, y = self.front_m.tolist()
-        yield Outgoing(STATE, Unicycle(now_ns, x, y, yaw_rad=self.heading_rad, speed_mps=self._speed_mps))
+        yield Outgoing(
+            STATE,
+            Unicycle(now_ns, x, y, yaw_rad=self.heading_rad, articulation_rad=bend_rad, speed_mps=self._speed_mps),
+        )
 
     def _take(self, received: Received) -> None:
         message = received.message
@@ -138,8 +148,7 @@ class Planar(Process):
         """Move for a period: straight where the loading task drives, else along the path."""
         if self._loading in (State.POSITIONING, State.PULL_BACK):
             sign = 1.0 if self._loading == State.POSITIONING else -1.0
-            step = sign * _APPROACH_MPS * PERIOD_S * np.array([math.cos(self.heading_rad), math.sin(self.heading_rad)])
-            self.front_m, self.rear_m = self.front_m + step, self.rear_m + step
+            self.front_m = self.front_m + sign * _APPROACH_MPS * PERIOD_S * _unit(self.heading_rad)
             self._to_go_m -= _APPROACH_MPS * PERIOD_S
             self._speed_mps = sign * _APPROACH_MPS
             return
@@ -154,33 +163,52 @@ class Planar(Process):
             return
         speed = min(float(np.interp(at_m, told.path[:, WAY], told.path[:, SPEED])), math.sqrt(2 * _SLOWS_MPS2 * left_m))
         step_m = min(max(speed, 0.1) * PERIOD_S, left_m)
-        lead = np.array([np.interp(at_m + step_m, told.path[:, WAY], told.path[:, k]) for k in (0, 1)])
-        trail = self.rear_m if told.gear > 0 else self.front_m
-        drawn = lead + (trail - lead) * self._wheelbase_m / np.linalg.norm(trail - lead)
-        self.front_m, self.rear_m = (lead, drawn) if told.gear > 0 else (drawn, lead)
+        way = told.path[:, WAY]
+        lead = np.array([np.interp(at_m + step_m, way, told.path[:, k]) for k in (X, Y)])
+        self._lead_to(told.gear, lead, float(np.interp(at_m + step_m, way, told.path[:, HEADING])))
         self._speed_mps = told.gear * step_m / PERIOD_S
 
+    def _lead_to(self, gear: int, lead_m: FloatArray, heading_rad: float) -> None:
+        """Put the leading axle somewhere; the joint is where its body has it, and draws the other axle."""
+        if gear > 0:
+            rear_m = self.rear_m
+            self.front_m, self.heading_rad = lead_m, heading_rad
+            self.rear_heading_rad = math.atan2(*(self.joint_m - rear_m)[::-1])
+            return
+        front_m, self.rear_heading_rad = self.front_m, heading_rad + math.pi
+        joint_m = lead_m + self._model.rear_m * _unit(self.rear_heading_rad)
+        self.heading_rad = math.atan2(*(front_m - joint_m)[::-1])
+        self.front_m = joint_m + self._model.front_m * _unit(self.heading_rad)
 
-def crew_processes(given: CrewMission, topology: TopologicalMap, starts: Mapping[str, FloatArray], journal: Journal) -> list[Process]:
+
+def _unit(heading_rad: float) -> FloatArray:
+    return np.array([math.cos(heading_rad), math.sin(heading_rad)])
+
+
+def crew_processes(
+    scenario: Scenario,
+    given: CrewMission,
+    topology: TopologicalMap,
+    starts: Mapping[str, FloatArray],
+    journal: Journal,
+) -> list[Process]:
     """Return the processes of all machines; `starts`: poses (3,) in `map` by name, the first machine's first."""
     made: list[Process] = []
     for number, (name, pose) in enumerate(starts.items()):
         scribes = JournalOf(journal, name) if number else journal
-        own = machine_processes(given.jobs[name], topology, pose, scribes)
+        own = machine_processes(scenario, given.jobs[name], topology, pose, scribes)
         made += [InNamespace(one, name) for one in own] if number else own
     return made
 
 
-def machine_processes(job: Job, topology: TopologicalMap, pose: FloatArray, journal: Scribes) -> list[Process]:
-    machine, settings = Machine(), Settings()
+def machine_processes(
+    scenario: Scenario, job: Job, topology: TopologicalMap, pose: FloatArray, journal: Scribes
+) -> list[Process]:
+    """Return the processes of one machine: as in a replay, but for what is made up."""
+    machine = Machine()
     model = drive_model(machine, 0.0)
-    planner = RoutePlanner(topology, settings.movement)
-    navigation = NavigationControl(planner, model, bodies_of(machine), settings.navigation, journal.of(NAVIGATION).goes)
-    navigation.allowed.avoid = job.avoid
-    task = job.task
-    shares = Shares(lambda: task.free, job.presence)
     return [
-        Planar(pose, model.wheelbase_m),
-        Executive(task, job.orders, topology, 10.0, journal.of(EXECUTIVE), shares=shares),
-        OrderedNavigation(navigation, journal.of(NAVIGATION)),
+        Planar(pose, model),
+        executive_of(scenario, topology, 1e-3 * machine.drive.payload_kg, journal.of(EXECUTIVE), job),
+        navigation_of(topology, Settings(), (model, bodies_of(machine)), journal.of(NAVIGATION), job),
     ]

@@ -239,6 +239,17 @@ def test_loading_is_not_begun_before_the_draw_point_is_its_own(its_own: set[str]
     assert bench.orders(TO_LOAD, navigating(number, 20.0)).loading == begun
 
 
+@pytest.mark.parametrize(("x_m", "said"), [(20.0, "driving"), (45.0, "arrived")])
+def test_a_machine_among_others_is_at_its_draw_point_by_its_place_not_by_who_drives_it(x_m: float, said: str) -> None:
+    """The loading task takes the machine over some way before; sections are given back by where it truly is."""
+    bench = among_others(Scripted(TO_LOAD), {"T1.1", "I1", "T1.2"})
+    number = bench.orders(TO_LOAD, (LOCATED, located(5.0)), (MACHINE_SAYS, HEALTH)).number
+    task = bench.orders(TO_LOAD, navigating(number, 20.0)).loading
+    bench.turn(TO_LOAD, loading(task, Loading.POSITIONING), (LOCATED, located(x_m)))
+    assert (bench.heard.navigation.state, bench.heard.navigation.goal) == (said, "DP1")
+    assert ("T1.2" in bench.heard.inside) is (said == "arrived")
+
+
 @pytest.mark.parametrize("bench", ["underground", "surface"])
 def test_both_write_the_same_lines_and_say_how_far_it_is(bench: str, request: pytest.FixtureRequest) -> None:
     made: Bench = request.getfixturevalue(bench)
