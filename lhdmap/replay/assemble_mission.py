@@ -21,7 +21,7 @@ from lhdmap.replay.parts import Autonomous, Parts
 from lhdmap.replay.process import Process
 from lhdmap.replay.processes.dumps import DUMPS, Dumps
 from lhdmap.replay.processes.execute import EXECUTOR, PERIODS_S, Execute
-from lhdmap.replay.processes.executive import EXECUTIVE, Executive, Shares
+from lhdmap.replay.processes.executive import EXECUTIVE, Executive, SharedMap
 from lhdmap.replay.processes.guide import GUIDANCE, Guide
 from lhdmap.replay.processes.load import LOADS, Loads
 from lhdmap.replay.processes.locating import Locating
@@ -78,7 +78,7 @@ def executive_of(
     """Return who gives the orders of a mission; `full_t`: a full bucket, `job`: of a machine among others."""
     if job is not None:
         task = job.task
-        return Executive(task, job.orders, topology, full_t, scribe, shares=Shares(lambda: task.free, job.presence))
+        return Executive(task, job.orders, topology, full_t, scribe, shares=SharedMap(lambda: task.free, job.presence))
     layout = checked(layout_of_map(topology, scenario.mine))
     alone = MissionTask(layout, park=scenario.start if scenario.start in layout.of("park") else "")
     orders = [Buckets(one.source, one.to, one.buckets) for one in scenario.mission]

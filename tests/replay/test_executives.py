@@ -36,7 +36,7 @@ from lhdmap.replay.process import (
     Process,
     Received,
 )
-from lhdmap.replay.processes.executive import Executive, Shares
+from lhdmap.replay.processes.executive import Executive, SharedMap
 from lhdmap.replay.processes.feed import JOINTS
 from lhdmap.replay.processes.ordered import OrderedNavigation, straight_left_m
 from lhdmap.replay.processes.site_executive import SiteExecutive
@@ -222,7 +222,7 @@ def test_the_station_stops_answers_and_ends(underground: Bench) -> None:
 def among_others(task: Scripted, free: set[str]) -> Bench:
     """Return the executive of a machine that shares the map with others, and may be in some nodes."""
     machine, topology = Machine(), map_of_plan("cycle")
-    shares = Shares(lambda: frozenset(free), Presence(topology, bodies_of(machine), machine))
+    shares = SharedMap(lambda: frozenset(free), Presence(topology, bodies_of(machine), machine))
     return Bench(Executive(task, [], topology, 10.0, Journal().of("mission"), shares=shares), task, [])
 
 

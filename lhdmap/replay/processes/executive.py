@@ -39,7 +39,7 @@ HAS_THE_MACHINE = frozenset(State) - {State.IDLE, State.IDENTIFICATION, State.DO
 """States of the loading task in which it drives the machine, and navigation does not."""
 
 
-class Shares(NamedTuple):
+class SharedMap(NamedTuple):
     """What a machine among others knows of the map: the nodes (ids) that it may be in, and what it is in itself."""
 
     free: Callable[[], frozenset[str]]
@@ -64,7 +64,7 @@ class Executive(Process):
         full_t: float,
         scribe: Scribe,
         *,
-        shares: Shares | None = None,
+        shares: SharedMap | None = None,
     ) -> None:
         """`shares`: of a machine among others."""
         self.task, self._buckets, self._book, self._shares = task, tuple(orders), OrderBook(scribe), shares
