@@ -14,6 +14,7 @@ from lhdmap.mine.plan import find_plan, load_plan
 from lhdmap.mine.route import Start, parse_route, start_of
 from lhdmap.mine.routes import RouteFinder
 from lhdmap.mine.runs import Run
+from lhdmap.mine.stands import stand_at
 from lhdmap.mine.ways import STEP_M, Leg, legs_of
 
 from tests.mine.plans import TEE, network_of
@@ -96,6 +97,17 @@ def test_a_teaching_drive_goes_through_every_edge(name: str) -> None:
         middle = network.tubes[edge.tube].pose(0.5 * (edge.start_m + edge.end_m))[:2]
         dead_end = 1 in (network.nodes[edge.start].degree, network.nodes[edge.end].degree)
         assert np.hypot(*(places - middle).T).min() < (12.0 if dead_end else 1.0)
+
+
+def test_a_teaching_drive_comes_to_each_draw_point_and_dump_bucket_first() -> None:
+    """Into the short drift of DP2 of `branches` it could back to turn: it would never stand where machines load."""
+    network = make_network(load_plan(find_plan("branches")))
+    runs = RouteFinder(network, MACHINE).teaching(start_of(network, MACHINE, None))
+    for place in network.plan.places:
+        if place.kind in ("draw_point", "dump"):
+            tube, at_m, facing = stand_at(network, place, MACHINE)
+            ends = [run for run in runs if run.tube == tube and abs(run.to_m - at_m) < 0.1]
+            assert any(run.gear > 0 and (run.to_m - run.from_m) * facing > 0.0 for run in ends), place.name
 
 
 @pytest.mark.parametrize(("route", "start"), [("S1,DP1,-S1,OP1", None), ("-S1,OP1,-W,S2,TB1,-S2,DP9", "DP3")])
