@@ -11,7 +11,7 @@ JOBS ?= 2
 STAMP := $(VENV)/.made-from-$(shell cat pyproject.toml <(pwd) | sha256sum | cut -c1-16)
 
 # The docs site needs nothing of lhdmap: its pages are read from the sources.
-DOCS = $(shell $(BIN)/python -c "import tomllib; print(*tomllib.load(open('pyproject.toml', 'rb'))['project']['optional-dependencies']['docs'])")
+DOCS = $(shell $(PYTHON) -c "import tomllib; print(*tomllib.load(open('pyproject.toml', 'rb'))['project']['optional-dependencies']['docs'])")
 
 # The linear algebra of several libraries meets in one process: one thread each, or they fight for the cores.
 export OMP_NUM_THREADS ?= 1
@@ -37,6 +37,7 @@ demo: $(STAMP) ## Simulate the sample drive, build its map, evaluate it: demo/ (
 	$(BIN)/lhdmap demo --output demo --force
 
 test: $(STAMP) ## Run all tests
+	$(BIN)/python -m tools.kernels > /dev/null
 	$(BIN)/python -m pytest -n $(JOBS) --dist worksteal
 
 lint: $(STAMP) ## Check style, formatting and types
@@ -61,7 +62,7 @@ bench: $(STAMP) ## Measure speed and memory
 wheel: $(STAMP) ## Build the wheel: dist/
 	$(BIN)/python -m pip wheel --quiet --disable-pip-version-check --no-deps --wheel-dir dist .
 
-docs: $(STAMP) ## Build the docs site: site/ (into an environment of its own)
+docs: ## Build the docs site: site/ (into an environment of its own)
 	test -x $(VENV)-docs/bin/mkdocs || { $(PYTHON) -m venv $(VENV)-docs && $(VENV)-docs/bin/python -m pip install --quiet --disable-pip-version-check $(DOCS); }
 	NO_MKDOCS_2_WARNING=1 $(VENV)-docs/bin/mkdocs build --strict --quiet --clean
 

@@ -32,6 +32,7 @@ BAD = ("Traceback", "fault in lhdmap", "Error:", "Exception ignored")
 PATIENCE_S = 120.0
 LONGEST_S = 30.0
 EARLIEST_S = 0.06
+_BEFORE = (-signal.SIGINT, 1)  # of Python itself; 1 while it imports `site`
 
 
 def commands(work: Path) -> dict[str, list[str]]:
@@ -125,7 +126,7 @@ def problem(words: list[str], out: Path, delay_s: float) -> str:
     took_s = time.monotonic() - asked
     if process.returncode == EXIT_DONE:
         return ""
-    if process.returncode == -signal.SIGINT and "in entry_point" not in errors:
+    if process.returncode in _BEFORE and "KeyboardInterrupt" in errors and "in entry_point" not in errors:
         return ""  # Python itself was starting: no line of lhdmap had run
     if process.returncode != EXIT_INTERRUPTED:
         return f"exit code {process.returncode}: {errors.strip()[-300:]}"

@@ -16,6 +16,7 @@ ROOT = Path(__file__).resolve().parents[1]
 FOLDERS = ("evaluation", "pipelines", "datasets")
 PAGES = ("README.md", "CHANGELOG.md", "CONTRIBUTING.md")
 _LINK = re.compile(r"(!?\[[^\]]*\]\()([^)\s]+)(\))")
+_SHIM = "https://unpkg.com/iframe-worker/shim"
 _SECRET = re.compile(r"(^|/)(__|_)")
 
 
@@ -46,6 +47,16 @@ def on_files(files: Any, config: Any) -> Any:
 def on_page_markdown(markdown: str, page: Any, config: Any, files: Any) -> str:  # noqa: ARG001  # mkdocs passes all
     """Turn the links of a page into those of the site."""
     return linked(markdown, page.file.src_uri)
+
+
+def on_post_page(output: str, page: Any, config: Any) -> str:  # noqa: ARG001  # mkdocs passes all
+    """Take what the search of a site on disk needs from the site, not from the network."""
+    return without_network(output, page.url)
+
+
+def without_network(html: str, url: str) -> str:
+    """Return a page with the theme's one script from elsewhere replaced by our copy of it."""
+    return html.replace(_SHIM, "../" * url.count("/") + "js/iframe-worker.js")
 
 
 def linked(markdown: str, page: str) -> str:

@@ -8,6 +8,7 @@ from collections import deque
 from collections.abc import Callable, Sequence
 
 from lhdmap.console.client import Address, Client
+from lhdmap.console.crossing import Crossing, Radio
 from lhdmap.console.messages import REARM, STOP, Ask, Asked, Beat, Command, Event, Message, Outcome, Plan, Status, Tick
 from lhdmap.console.settings import ConsoleSettings
 from lhdmap.console.watch import Watch
@@ -32,12 +33,13 @@ class MachineLink:
     def __init__(self, machine: str, url: str, key: str, settings: ConsoleSettings, speed: float = 1.0,
                  clock: Clock = time.monotonic_ns, sleep: Callable[[float], None] = time.sleep) -> None:  # fmt: skip
         self._speed, self._clock, self._sleep = speed, clock, sleep
-        self._watch, self._settings = Watch(settings), settings
+        self._watch = Watch(settings)
         self._lock = threading.Lock()
         self._commands: deque[tuple[Command, int]] = deque(maxlen=_KEPT)
         self._begun: tuple[int, int] | None = None
         self._stopped, self._shown_ns = False, 0
         self._asked: Ask | None = None
+        self._crossing: Crossing | None = None
         self._client = Client(Address(url, machine, key), self._heard, self._tick, settings.tick_s)
 
     def connect(self, patience_s: float = 10.0) -> None:
@@ -57,23 +59,34 @@ class MachineLink:
     def fault(self) -> str:
         """Return why the machine must not be driven under this operator now; empty: it may."""
         with self._lock:
-            return self._watch.fault(self._clock())
+            now_ns = self._clock()
+            if self._crossing is not None:
+                for message, at_ns in self._crossing.arrived(now_ns):
+                    self._take(message, at_ns)
+            return self._watch.fault(now_ns)
+
+    def crosses(self, radio: Radio) -> None:
+        """Have all that is said and heard cross a link that is simulated besides the real one."""
+        with self._lock:
+            self._crossing = Crossing(radio, self._speed)
 
     def shows(self, plan: Plan) -> None:
         """Take what the machine is drawn on."""
-        self._client.send(plan, "plan")
+        self._say(plan, "plan")
 
     def notes(self, event: Event) -> None:
         """Take something that happened."""
-        self._client.send(event)
+        self._say(event)
 
     def told(self, outcome: Outcome) -> None:
         """Take what became of a command."""
-        self._client.send(outcome)
+        self._say(outcome)
 
     def attend(self, now_ns: int, status: Status, request: Ask | None) -> Sequence[Command]:
         """Return what has been commanded, and a stop where the operator of an armed machine is silent."""
         self._pace(now_ns)
+        if self._crossing is not None:
+            self._crossing.machine_ns = now_ns
         self._show(status, request)
         fault = self.fault()
         commands = [command for command, told_ns in self._taken() if self._counts(command, told_ns, fault)]
@@ -105,11 +118,20 @@ class MachineLink:
     def _show(self, status: Status, request: Ask | None) -> None:
         if request is not self._asked:
             self._asked = request
-            self._client.send(Asked(request), "asked")
+            self._say(Asked(request), "asked")
         now_ns = self._clock()
         if now_ns - self._shown_ns >= _STATUS_NS:
             self._shown_ns = now_ns
-            self._client.send(status, "status")
+            self._say(status, "status")
+        if self._crossing is not None:
+            for message, key in self._crossing.sent():
+                self._client.send(message, key)
+
+    def _say(self, message: Message, key: str = "") -> None:
+        if self._crossing is None:
+            self._client.send(message, key)
+        else:
+            self._crossing.says(message, key)
 
     def _pace(self, now_ns: int) -> None:
         """Wait until the machine's time is the clock's."""
@@ -127,12 +149,18 @@ class MachineLink:
     def _tick(self) -> Tick:
         with self._lock:
             number = self._watch.tick(self._clock())
-            return Tick(number, self._watch.round_trip_s, self._settings.latency_limit_s)
+            return Tick(number, self._watch.round_trip_s, self._watch.latency_limit_s)
 
     def _heard(self, message: Message) -> None:
         """Take a message of the console; called in the link's thread."""
         with self._lock:
-            if isinstance(message, Beat):
-                self._watch.answered(message.number, message.by, self._clock())
-            elif isinstance(message, Command):
-                self._commands.append((message, self._clock()))
+            if self._crossing is None:
+                self._take(message, self._clock())
+            else:
+                self._crossing.heard(message, self._clock())
+
+    def _take(self, message: Message, at_ns: int) -> None:
+        if isinstance(message, Beat):
+            self._watch.answered(message.number, message.by, at_ns)
+        elif isinstance(message, Command):
+            self._commands.append((message, at_ns))

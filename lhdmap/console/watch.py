@@ -33,6 +33,11 @@ class Watch:
         """Time from the last tick that was answered to its answer, s."""
         return self._trips[-1] * 1e-9 if self._trips else 0.0
 
+    @property
+    def latency_limit_s(self) -> float:
+        """What round trips must not exceed, s."""
+        return self._latency_ns / 1e9
+
     def tick(self, now_ns: int) -> int:
         """Return the number of a tick that is sent now."""
         self._count += 1

@@ -66,7 +66,7 @@ def _nodes(space: Modelspace, content: Content) -> None:
         space.add_polyline3d(tunnel.line_m.tolist(), dxfattribs={"layer": "CENTRELINE"})
         _text(space, "CENTRELINE", tunnel.name, tunnel.line_m[len(tunnel.line_m) // 2].tolist())
     for node in content.topology.intersections:
-        x, y, z = node.T_map_node[:3].tolist()
+        x, y, z = node.pose_map_node[:3].tolist()
         ring = [(*point, z) for point in node.outline_m.tolist()]
         if ring:
             space.add_polyline3d(ring, close=True, dxfattribs={"layer": "NODES"})

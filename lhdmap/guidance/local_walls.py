@@ -49,29 +49,29 @@ class LocalWalls:
         self._ghosts: Ghosts | None = None
         self._scans = 0
 
-    def add(self, T_odom_base: FloatArray, points: FloatArray, eyes: Sequence[Eye] = ()) -> None:
+    def add(self, pose_odom_base: FloatArray, points: FloatArray, eyes: Sequence[Eye] = ()) -> None:
         """Take hits (N, 2) in `base_link`, seen from a pose (3,); `eyes`: the same by scanner."""
         near = points[np.hypot(points[:, 0], points[:, 1]) < _RANGE_M]
-        self._newest = se2.transform(T_odom_base, near)
+        self._newest = se2.transform(pose_odom_base, near)
         if self._last is not None:
-            self._travelled_m += math.dist(self._last[:2], T_odom_base[:2])
-        self._last = T_odom_base.copy()
-        self._drop_ghosts(T_odom_base, eyes)
-        if self._key is not None and not self._is_new(T_odom_base):
+            self._travelled_m += math.dist(self._last[:2], pose_odom_base[:2])
+        self._last = pose_odom_base.copy()
+        self._drop_ghosts(pose_odom_base, eyes)
+        if self._key is not None and not self._is_new(pose_odom_base):
             return
-        self._key = T_odom_base.copy()
+        self._key = pose_odom_base.copy()
         kept = _thinned(self._newest)
-        places = [se2.transform(T_odom_base, eye.place[None])[0] for eye in eyes]
+        places = [se2.transform(pose_odom_base, eye.place[None])[0] for eye in eyes]
         seen_m = [np.hypot(*(kept - place).T) for place in places] or [np.full(len(kept), np.inf)]
         self._kept.append(_Kept(self._travelled_m, kept, np.min(seen_m, axis=0)))
         self._ghosts = None
         while self._travelled_m - self._kept[0].travelled_m > self._memory_m:
             self._kept.popleft()
 
-    def _drop_ghosts(self, T_odom_base: FloatArray, eyes: Sequence[Eye]) -> None:
+    def _drop_ghosts(self, pose_odom_base: FloatArray, eyes: Sequence[Eye]) -> None:
         """Forget hits that a machine that stands has seen through several times."""
-        if self._stood is None or math.dist(self._stood[:2], T_odom_base[:2]) > _STANDS_M:
-            self._stood, self._ghosts, self._scans = T_odom_base.copy(), None, 0
+        if self._stood is None or math.dist(self._stood[:2], pose_odom_base[:2]) > _STANDS_M:
+            self._stood, self._ghosts, self._scans = pose_odom_base.copy(), None, 0
         self._scans += 1
         if not eyes or not self._kept or self._scans % _GHOSTS_EVERY:
             return
@@ -79,7 +79,9 @@ class LocalWalls:
             parts = list(self._kept)
             hits = np.concatenate([one.points for one in parts])
             self._ghosts = Ghosts(hits, np.concatenate([one.seen_m for one in parts]))
-        in_odom = [Eye(*(se2.transform(T_odom_base, each) for each in (eye.place[None], eye.points))) for eye in eyes]
+        in_odom = [
+            Eye(*(se2.transform(pose_odom_base, each) for each in (eye.place[None], eye.points))) for eye in eyes
+        ]
         gone = self._ghosts.gone([Eye(eye.place[0], eye.points) for eye in in_odom])
         if gone.any():
             self._forget(gone)

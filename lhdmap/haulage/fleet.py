@@ -7,11 +7,11 @@ to make way.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from itertools import groupby, pairwise
 
 from lhdmap.errors import UsageError
-from lhdmap.haulage.layout import Layout
+from lhdmap.haulage.layout import Layout, nodes_of_section
 from lhdmap.haulage.machine import NOWHERE, Errand, Status
 from lhdmap.haulage.mission import MissionTask
 from lhdmap.haulage.mission_io import MissionInput, MissionOutput
@@ -24,7 +24,8 @@ from lhdmap.traffic.sections import Haul, Leg, Section, SectionMap
 class Fleet:
     """Machines by name, each with its errand (its orders are to be from and to the same points) and a park of its own.
 
-    `machine_m`: length of a machine; its rear has left a section once it is so far beyond.
+    `machine_m`: length of a machine; where it is not told what it is in (`inside`), its rear has left a section once it is so
+    far beyond.
     """
 
     def __init__(
@@ -58,9 +59,13 @@ class Fleet:
 
     def nodes_of(self, name: str) -> frozenset[str]:
         """Return the nodes (ids of the map, or names) of the sections that a machine holds."""
-        held = {section for section, by in self.control.held().items() if by == name}
-        nodes = {edge.node for edge in self._layout.edges if edge.held in held}
+        nodes = self._nodes_in({section for section, by in self.control.held().items() if by == name})
         return frozenset(nodes | {one for one, named in self._layout.ids.items() if named in nodes})
+
+    def _nodes_in(self, sections: Collection[str]) -> set[str]:
+        """Return the names of the nodes of sections."""
+        joined = {node for section in sections for node in nodes_of_section(section)}
+        return joined | {edge.node for edge in self._layout.edges if edge.held in sections}
 
     def bound(self, name: str) -> str:
         """Return where a machine is bound for, whatever it waits for; empty: it is to stand."""
@@ -80,16 +85,23 @@ class Fleet:
         here, granted = self._layout.edges[task.status.edge].held, self.control.place(name).section
         if here != granted:
             return  # it has what comes next, and is not there yet
-        at, entered_m = self._entered.get(name, ("", 0.0))
-        if at != here:
-            self._entered[name] = (here, told.odometer_m)
-        elif told.odometer_m - entered_m >= self._machine_m:
+        if self._out(name, here, told):
             self.control.left(name)
         following = self._next_section(name, told)
         if following:
             status = task.status
             home = not status.left and not status.loaded and not told.orders[task.orders_taken :]
             self.control.wants(name, told.now_ns, following, home=home or told.service_due)
+
+    def _out(self, name: str, here: str, told: MissionInput) -> bool:
+        """Return whether a machine has left the section behind: by where it is, else by the way since it entered its own."""
+        if told.inside:
+            behind = self._nodes_in({self.control.behind(name)})
+            return behind.isdisjoint(self._layout.ids.get(one, one) for one in told.inside)
+        at, entered_m = self._entered.get(name, ("", 0.0))
+        if at != here:
+            self._entered[name] = (here, told.odometer_m)
+        return at == here and told.odometer_m - entered_m >= self._machine_m
 
     def _bound(self, name: str, told: MissionInput) -> Status:
         """Return the status with which a machine goes on: of a parked one that of its next order."""

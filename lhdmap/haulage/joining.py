@@ -12,7 +12,7 @@ from dataclasses import replace
 from itertools import groupby
 
 from lhdmap.errors import UsageError
-from lhdmap.haulage.layout import Edge, Layout
+from lhdmap.haulage.layout import Edge, Layout, nodes_of_section
 from lhdmap.haulage.machine import Errand
 from lhdmap.navigation.hold import beyond_of
 from lhdmap.navigation.leg import Leg
@@ -86,7 +86,7 @@ def _join_short(joined: _Joined, edges: Sequence[Edge], least_m: float, turns: C
     """
 
     def turned(section: str) -> bool:
-        return not set(turns).isdisjoint(section.split("+"))
+        return not set(turns).isdisjoint(nodes_of_section(section))
 
     while True:
         parts = [
@@ -119,7 +119,7 @@ class _Joined:
 
     def works_in(self, section: str) -> bool:
         """Return whether a machine loads, dumps or parks in a section."""
-        return not self._works.isdisjoint(section.split("+"))
+        return not self._works.isdisjoint(nodes_of_section(section))
 
     def join(self, node: str, other: str, why: str) -> None:
         """Make two nodes (ids) one section."""

@@ -53,6 +53,11 @@ class Edge(NamedTuple):
         return self.section or self.node
 
 
+def nodes_of_section(section: str) -> list[str]:
+    """Return the names of the nodes that a section was joined of; of some no edge is known: stubs in which machines turn."""
+    return section.split("+")
+
+
 @dataclass(frozen=True)
 class Layout:
     """Points and edges; `roles`: what is done in each area (`load`, `dump`, …); `ids`: names of nodes by the map's ids.

@@ -55,6 +55,7 @@ class MissionInput(NamedTuple):
         now_ns: time of now.
         pose_map: x, y (m) and yaw (rad) in `map`; None where it is not known.
         node: name or id of the node of the map that the machine is in, by localization; on a site nothing.
+        inside: names or ids of the nodes that any part of the machine is in, by localization; empty: not known.
         odometer_m: how far was driven since some beginning.
         navigation: what navigation says.
         loading, dumping: what the tasks say.
@@ -87,6 +88,7 @@ class MissionInput(NamedTuple):
     answer: Answer = ""
     service_due: bool = False
     make_way: bool = False
+    inside: frozenset[str] = frozenset()
 
 
 class MissionOutput(NamedTuple):

@@ -34,7 +34,7 @@ def landmarks_of(
 
     Args:
         scans: of all nodes, one each half to whole metre of the drive, at their final poses; several visits are fine.
-        frames: of each node T_map_node (4,): x, y, z, yaw.
+        frames: of each node pose_map_node (4,): x, y, z, yaw.
         tunnels: which of them are tunnels; the others are intersections.
         settings: `LandmarkSettings`.
         progress: is told how far it is.
@@ -49,14 +49,14 @@ def landmarks_of(
     for number, (node, own) in enumerate(by_node.items()):
         told = _share(progress, node, number, len(by_node))
         told(0.0)
-        T_map_node = np.asarray(frames[node], dtype=np.float64)
-        surfaces[node] = node_surface(own, T_map_node, settings, tunnel=node in tunnels)
+        pose_map_node = np.asarray(frames[node], dtype=np.float64)
+        surfaces[node] = node_surface(own, pose_map_node, settings, tunnel=node in tunnels)
         if node in tunnels:
-            clouds = along_tunnel(own, T_map_node, settings)
+            clouds = along_tunnel(own, pose_map_node, settings)
             matrices[node] = similarity(clouds, settings, done=told)
             parts.append((node, clouds, choose_keys(matrices[node], settings)))
         else:
-            clouds = [cloud for cloud in (of_intersection(own, T_map_node, settings),) if len(cloud.points_m)]
+            clouds = [cloud for cloud in (of_intersection(own, pose_map_node, settings),) if len(cloud.points_m)]
             parts.append((node, clouds, _whole(len(clouds))))
     return _joined(parts, matrices, surfaces)
 
@@ -72,27 +72,27 @@ def _share(progress: Progress | None, node: str, number: int, count: int) -> Cal
 
 
 def node_surface(
-    scans: Sequence[NodeScan], T_map_node: FloatArray, settings: LandmarkSettings, *, tunnel: bool
+    scans: Sequence[NodeScan], pose_map_node: FloatArray, settings: LandmarkSettings, *, tunnel: bool
 ) -> NodeSurface:
     """Return the fused walls of a node from its scans, in order along it; a tunnel's with the profile."""
     cells = fused(
-        [placed(scan, T_map_node, settings) for scan in scans], settings.cell_m, [scan.height_m for scan in scans]
+        [placed(scan, pose_map_node, settings) for scan in scans], settings.cell_m, [scan.height_m for scan in scans]
     )
-    quality = quality_of(cells, scans, T_map_node, settings)
+    quality = quality_of(cells, scans, pose_map_node, settings)
     if not tunnel:
         return NodeSurface(cells, quality, None)
-    profile = _profile(cells, scans, T_map_node, settings)
+    profile = _profile(cells, scans, pose_map_node, settings)
     parts = [scans[k::2] for k in (0, 1)]
-    halves = [fused([placed(scan, T_map_node, settings) for scan in part], settings.cell_m) for part in parts]
-    one, other = (_profile(half, part, T_map_node, settings) for half, part in zip(halves, parts, strict=True))
+    halves = [fused([placed(scan, pose_map_node, settings) for scan in part], settings.cell_m) for part in parts]
+    one, other = (_profile(half, part, pose_map_node, settings) for half, part in zip(halves, parts, strict=True))
     quality = quality._replace(chi2=reduced_chi2(one, other, settings))
     return NodeSurface(cells, quality, profile._replace(gap=gaps(profile, settings)))
 
 
 def _profile(
-    cells: Cells, scans: Sequence[NodeScan], T_map_node: FloatArray, settings: LandmarkSettings
+    cells: Cells, scans: Sequence[NodeScan], pose_map_node: FloatArray, settings: LandmarkSettings
 ) -> WallProfile:
-    at_m, way = _way(scans, T_map_node)
+    at_m, way = _way(scans, pose_map_node)
     points, counts = cells.points_m.astype(np.float64), cells.counts.astype(np.float64)
     return profile_of(points, counts, way, at_m, settings)
 
@@ -111,10 +111,10 @@ def _by_node(scans: Sequence[NodeScan], frames: Mapping[str, FloatArray]) -> dic
     return {node: ordered(found[node]) for node in frames if node in found}
 
 
-def _way(scans: Sequence[NodeScan], T_map_node: FloatArray) -> tuple[FloatArray, FloatArray]:
+def _way(scans: Sequence[NodeScan], pose_map_node: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return places (K,) and positions (K, 2) along a tunnel, each metre the mean of all visits."""
     at_m = np.array([scan.at_m for scan in scans])
-    positions = np.array([in_node(scan, T_map_node)[:2] for scan in scans])
+    positions = np.array([in_node(scan, pose_map_node)[:2] for scan in scans])
     metres, which = np.unique(np.round(at_m).astype(np.int64), return_inverse=True)
     counts = np.bincount(which)
     means = [np.bincount(which, values) / counts for values in (at_m, *positions.T)]
@@ -137,7 +137,7 @@ def _joined(
     return Landmarks(
         np.concatenate([np.zeros((0, 2)), *points]).astype(np.float32),
         np.concatenate([[0], np.cumsum([len(one) for one in points])]).astype(np.int64),
-        np.array([cloud.T_node_base for cloud in clouds]).reshape(-1, 3),
+        np.array([cloud.pose_node_base for cloud in clouds]).reshape(-1, 3),
         np.array([node for node, own, _ in parts for _ in own], dtype=np.str_),
         np.array([cloud.at_m for cloud in clouds], dtype=np.float64),
         np.concatenate([np.zeros(0), *(one.threshold for one in keys)]),

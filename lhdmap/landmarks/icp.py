@@ -133,7 +133,7 @@ def judge(target, points, pose, model):  # type: ignore[no-untyped-def]
 
 @nb.njit(cache=True, nogil=True)
 def align(target: Target, points_m: FloatArray, start: FloatArray, model: IcpModel) -> IcpFit:
-    """Return the `IcpFit` of points (N, 2), N > 0, on a target from the pose `start` (3,): T_target_source, m and rad.
+    """Return the `IcpFit` of points (N, 2), N > 0, on a target from the pose `start` (3,): pose_target_source, m and rad.
 
     It finds what is up to a metre and some degrees away in rough walls.
     """

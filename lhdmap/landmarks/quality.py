@@ -54,20 +54,22 @@ UNMEASURED = Quality(math.nan, math.nan, math.nan, math.nan, 10.0, math.nan, mat
 """Of a node with too few scans; kappa is that of a map whose local scale is off by half a per cent."""
 
 
-def quality_of(cells: Cells, scans: Sequence[NodeScan], T_map_node: FloatArray, settings: LandmarkSettings) -> Quality:
+def quality_of(
+    cells: Cells, scans: Sequence[NodeScan], pose_map_node: FloatArray, settings: LandmarkSettings
+) -> Quality:
     """Return how well scans, in order along the node, fit its walls; of 60 of them at most."""
     if len(scans) < _LEAST_SCANS:
         return UNMEASURED
     chosen = sorted({int(k) for k in np.linspace(0, len(scans) - 1, _SCANS)})
     walls = _Walls(cells, settings)
-    whole = [_matched(walls, scans[k], T_map_node, settings) for k in chosen]
+    whole = [_matched(walls, scans[k], pose_map_node, settings) for k in chosen]
     halves = [
-        _Walls(fused([placed(scan, T_map_node, settings) for scan in scans[k::2]], settings.cell_m), settings)
+        _Walls(fused([placed(scan, pose_map_node, settings) for scan in scans[k::2]], settings.cell_m), settings)
         for k in (0, 1)
     ]
-    apart = [_deviation(halves[1 - k % 2], scans[k], T_map_node, settings) for k in chosen]
+    apart = [_deviation(halves[1 - k % 2], scans[k], pose_map_node, settings) for k in chosen]
     support = np.array([one.support for one in whole])
-    scale, scale_std = _scale(walls, _inner([scans[k] for k in chosen], settings), T_map_node, settings)
+    scale, scale_std = _scale(walls, _inner([scans[k] for k in chosen], settings), pose_map_node, settings)
     return Quality(
         float(support.mean()),
         float(np.percentile(support, 5.0)),
@@ -102,9 +104,11 @@ def _kappa_of(scale: float) -> float:
     return float(np.interp(0.005 if math.isnan(scale) else abs(scale), KAPPA_SCALES, KAPPAS))
 
 
-def _matched(walls: _Walls, scan: NodeScan, T_map_node: FloatArray, settings: LandmarkSettings, side: int = 0) -> Match:
+def _matched(
+    walls: _Walls, scan: NodeScan, pose_map_node: FloatArray, settings: LandmarkSettings, side: int = 0
+) -> Match:
     """Return the match of a scan with the walls from its own pose; `side`: 1 its hits ahead alone, -1 those behind."""
-    pose, points = in_node(scan, T_map_node), near(scan.points_m, settings.surface_range_m, settings.centre_m)
+    pose, points = in_node(scan, pose_map_node), near(scan.points_m, settings.surface_range_m, settings.centre_m)
     if side:
         points = points[side * (points[:, 0] - settings.centre_m) > 0.0]
     points = points[:: max(len(points) // _HITS, 1)]
@@ -112,9 +116,9 @@ def _matched(walls: _Walls, scan: NodeScan, T_map_node: FloatArray, settings: La
     return match(walls.about(pose), hits, Prior(pose, _PRIOR), pose, OTHER_VISIT)
 
 
-def _deviation(walls: _Walls, scan: NodeScan, T_map_node: FloatArray, settings: LandmarkSettings) -> float:
+def _deviation(walls: _Walls, scan: NodeScan, pose_map_node: FloatArray, settings: LandmarkSettings) -> float:
     """Return the squared deviation of a match along and across from the scan's pose, over its stated variance; mean of both."""
-    found, pose = _matched(walls, scan, T_map_node, settings), in_node(scan, T_map_node)
+    found, pose = _matched(walls, scan, pose_map_node, settings), in_node(scan, pose_map_node)
     off = se2.between(pose, found.pose)
     information = marginal_information(body_information(found.information, pose[2]) + _PRIOR)
     return float(np.mean(off[:2] ** 2 * information[:2]))
@@ -133,13 +137,13 @@ def _along_m(found: Match) -> float:
 
 
 def _scale(
-    walls: _Walls, scans: Sequence[NodeScan], T_map_node: FloatArray, settings: LandmarkSettings
+    walls: _Walls, scans: Sequence[NodeScan], pose_map_node: FloatArray, settings: LandmarkSettings
 ) -> tuple[float, float]:
     """Return by how much the map is stretched near each scan (0: not), and the deviation of that."""
     values, weights = [], []
     for scan in scans:
-        pose = in_node(scan, T_map_node)
-        found = [_matched(walls, scan, T_map_node, settings, side) for side in (1, -1)]
+        pose = in_node(scan, pose_map_node)
+        found = [_matched(walls, scan, pose_map_node, settings, side) for side in (1, -1)]
         distances = [_reach(one, pose) for one in found]
         shifts = [se2.between(pose, one.pose)[0] for one in found]
         information = [body_information(one.information, pose[2])[0, 0] for one in found]

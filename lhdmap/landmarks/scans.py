@@ -18,22 +18,22 @@ class NodeScan(NamedTuple):
     """One stored cloud: the hits of both scanners, joined in the machine's level base frame.
 
     `node`: id of the tunnel or intersection. `at_m`: distance along the node's line (tunnels), or along the drive within it
-    (intersections). `T_map_base` (3,): x, y, yaw. `points_m` (N, 2): hits, without those of the machine itself. `height_m`: of the
-    floor in `map`; a tunnel may wind above itself.
+    (intersections). `pose_map_base` (3,): x, y, yaw. `points_m` (N, 2): hits, without the machine's own. `height_m`: of the floor
+    in `map`; a tunnel may wind above itself.
     """
 
     node: str
     at_m: float
-    T_map_base: FloatArray
+    pose_map_base: FloatArray
     points_m: FloatArray
     height_m: float = 0.0
 
 
 class NodeCloud(NamedTuple):
-    """A landmark's cloud `points_m` (N, 2): in the machine's frame at `T_node_base` (3,), `at_m` along its node."""
+    """A landmark's cloud `points_m` (N, 2): in the machine's frame at `pose_node_base` (3,), `at_m` along its node."""
 
     at_m: float
-    T_node_base: FloatArray
+    pose_node_base: FloatArray
     points_m: FloatArray
 
 
@@ -43,7 +43,7 @@ def checked(scan: NodeScan) -> NodeScan:
     Raises:
         InputError: place, pose or shape of the points are not usable.
     """
-    pose = np.asarray(scan.T_map_base, dtype=np.float64)
+    pose = np.asarray(scan.pose_map_base, dtype=np.float64)
     points = np.asarray(scan.points_m, dtype=np.float64)
     if pose.shape != (3,) or points.ndim != 2 or points.shape[1] != 2:
         raise InputError(f"scan in {scan.node}: pose {pose.shape}, points {points.shape}; (3,) and (N, 2) were wanted")
@@ -54,12 +54,12 @@ def checked(scan: NodeScan) -> NodeScan:
 
 def ordered(scans: Sequence[NodeScan]) -> list[NodeScan]:
     """Return scans in the order along their node, the same whatever order they come in."""
-    return sorted(scans, key=lambda scan: (scan.at_m, *scan.T_map_base.tolist(), len(scan.points_m)))
+    return sorted(scans, key=lambda scan: (scan.at_m, *scan.pose_map_base.tolist(), len(scan.points_m)))
 
 
-def in_node(scan: NodeScan, T_map_node: FloatArray) -> FloatArray:
-    """Return the pose (3,) of a scan in the frame of its node, T_map_node (4,): x, y, z, yaw."""
-    T: FloatArray = se2.between(T_map_node[[0, 1, 3]], scan.T_map_base)
+def in_node(scan: NodeScan, pose_map_node: FloatArray) -> FloatArray:
+    """Return the pose (3,) of a scan in the frame of its node, pose_map_node (4,): x, y, z, yaw."""
+    T: FloatArray = se2.between(pose_map_node[[0, 1, 3]], scan.pose_map_base)
     return T
 
 
@@ -82,7 +82,7 @@ def thinned(points_m: FloatArray, voxel_m: float) -> FloatArray:
     return means
 
 
-def along_tunnel(scans: Sequence[NodeScan], T_map_node: FloatArray, settings: LandmarkSettings) -> list[NodeCloud]:
+def along_tunnel(scans: Sequence[NodeScan], pose_map_node: FloatArray, settings: LandmarkSettings) -> list[NodeCloud]:
     """Return the clouds of a tunnel: of the scan nearest to each multiple of the spacing, if one is within half of it."""
     scans = ordered(scans)
     places = np.array([scan.at_m for scan in scans])
@@ -91,19 +91,19 @@ def along_tunnel(scans: Sequence[NodeScan], T_map_node: FloatArray, settings: La
         best = int(np.argmin(np.abs(places - k * settings.spacing_m)))
         if abs(places[best] - k * settings.spacing_m) <= 0.5 * settings.spacing_m and best not in chosen[-1:]:
             chosen.append(best)
-    clouds = [_cloud(scans[k], T_map_node, settings) for k in chosen]
+    clouds = [_cloud(scans[k], pose_map_node, settings) for k in chosen]
     return [cloud for cloud in clouds if len(cloud.points_m)]
 
 
-def _cloud(scan: NodeScan, T_map_node: FloatArray, settings: LandmarkSettings) -> NodeCloud:
+def _cloud(scan: NodeScan, pose_map_node: FloatArray, settings: LandmarkSettings) -> NodeCloud:
     points = thinned(near(scan.points_m, settings.range_m, settings.centre_m), settings.voxel_m)
-    return NodeCloud(scan.at_m, in_node(scan, T_map_node), points)
+    return NodeCloud(scan.at_m, in_node(scan, pose_map_node), points)
 
 
-def of_intersection(scans: Sequence[NodeScan], T_map_node: FloatArray, settings: LandmarkSettings) -> NodeCloud:
+def of_intersection(scans: Sequence[NodeScan], pose_map_node: FloatArray, settings: LandmarkSettings) -> NodeCloud:
     """Return the one cloud of an intersection, in the node's frame: all its scans, integrated."""
     parts = [
-        se2.transform(in_node(scan, T_map_node), near(scan.points_m, settings.range_m, settings.centre_m))
+        se2.transform(in_node(scan, pose_map_node), near(scan.points_m, settings.range_m, settings.centre_m))
         for scan in ordered(scans)
     ]
     return NodeCloud(0.0, np.zeros(3), thinned(np.concatenate(parts), settings.voxel_m))

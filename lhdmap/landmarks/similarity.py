@@ -57,7 +57,7 @@ def similarity(
     F = np.full((n, n), np.nan, dtype=np.float32)
     if not n:
         return F
-    poses, at_m = np.array([cloud.T_node_base for cloud in clouds]), np.array([cloud.at_m for cloud in clouds])
+    poses, at_m = np.array([cloud.pose_node_base for cloud in clouds]), np.array([cloud.at_m for cloud in clouds])
     offsets = np.concatenate([[0], np.cumsum([len(cloud.points_m) for cloud in clouds])])
     points = np.concatenate([cloud.points_m for cloud in clouds])
     forward, model = _forward(poses), icp_model(settings)

@@ -61,10 +61,10 @@ def fused(placed: list[FloatArray], cell_m: float, heights_m: Sequence[float] | 
     return Cells(means.astype(np.float32), np.minimum(counts, _MOST_COUNT).astype(np.uint16), cell_m, mean_heights)
 
 
-def placed(scan: NodeScan, T_map_node: FloatArray, settings: LandmarkSettings) -> FloatArray:
+def placed(scan: NodeScan, pose_map_node: FloatArray, settings: LandmarkSettings) -> FloatArray:
     """Return the hits (N, 2) of a scan that enter the fused walls, in the node's frame."""
     points: FloatArray = se2.transform(
-        in_node(scan, T_map_node), near(scan.points_m, settings.surface_range_m, settings.centre_m)
+        in_node(scan, pose_map_node), near(scan.points_m, settings.surface_range_m, settings.centre_m)
     )
     return points
 

@@ -38,6 +38,8 @@ def source_of(address: str, quiet_s: float | None = None) -> LiveSource:
         raise UsageError(f"{address}: a source was wanted: {FORMS}")
     if path.is_dir():
         raise UsageError(f"{path}: is a folder; the MCAP file in it that grows was wanted")
+    if not path.parent.is_dir():  # a file may come yet, its folder is a typing error
+        raise UsageError(f"{path}: there is no folder {path.parent}")
     from lhdmap.live.mcap_follow import QUIET_S, McapFollow
 
     return McapFollow(path, QUIET_S if quiet_s is None else quiet_s)

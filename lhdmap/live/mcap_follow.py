@@ -61,7 +61,7 @@ class McapFollow:
         Raises:
             InputError: the file did not appear, or is no MCAP file.
         """
-        if not self._appeared(stop):
+        if not self._appeared(sink, stop):
             return
         with self._path.open("rb", buffering=0) as file:
             stream: Any = GrowingFile(file, stop, self._quiet_s)
@@ -85,9 +85,11 @@ class McapFollow:
             except (McapError, KeyError) as error:
                 raise InputError(f"{self._path}: not an MCAP file that can be followed: {error}") from error
 
-    def _appeared(self, stop: threading.Event) -> bool:
-        """Wait for the file; return whether it is there."""
+    def _appeared(self, sink: Sink, stop: threading.Event) -> bool:
+        """Wait for the file, and say so; return whether it is there."""
         began_s = time.monotonic()
+        if not self._path.exists():
+            sink.say(f"{self._path}: not there yet; waiting for it, {self._quiet_s:.0f} s at most (--quiet-end)")
         while not self._path.exists():
             if stop.wait(0.05):
                 return False

@@ -81,6 +81,7 @@ def live(request: LiveRequest) -> LiveResult:
     free_folder(request.target, force=request.force, inputs=inputs)
     with RunFolderWriter(KIND, request.target, force=request.force, inputs=inputs) as folder:
         if request.warm:
+            request.say("kernels are made ready; the first time after installation it takes a minute or two")
             warm_up(request.settings, request.machine)
         request.say(f"{request.source.address}: followed from now on")
         log = folder.path / LOG

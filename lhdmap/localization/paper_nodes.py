@@ -39,7 +39,7 @@ class PaperNodes:
         self._landmarks, self._settings, self._model = landmarks, settings, icp_model(settings)
         wide = 3.0 * settings.range_m
         self._whole = IcpModel(settings.limit_m, wide, 0.0, _ACROSS, settings.fitness == "line")
-        self._frames = {node.id: node.T_map_node[[0, 1, 3]] for node in topology.nodes.values()}
+        self._frames = {node.id: node.pose_map_node[[0, 1, 3]] for node in topology.nodes.values()}
         self._rows = {node: landmarks.of(node) for node in topology.nodes}
         self._arcs = {tunnel.id: arc_m(tunnel.line_m) for tunnel in topology.tunnels}
         self._target = functools.lru_cache(_KEPT_TARGETS)(self._prepared)

@@ -48,7 +48,7 @@ class Placer:
             for point in self._points[tunnel.id]
         }
         lines = [tunnel.line_m for tunnel in topology.tunnels]
-        lines += [node.T_map_node[None, :3] for node in topology.intersections]
+        lines += [node.pose_map_node[None, :3] for node in topology.intersections]
         self._heights = np.vstack(lines) if lines else np.zeros((1, 3))
         self._tree = KDTree(self._heights * [1.0, 1.0, _HEIGHT])
 
@@ -73,7 +73,7 @@ class Placer:
             rho, lateral, heading = self._in_tunnel(found, pose, height_m)
             name, far = self._next_along(node, rho, math.copysign(1.0, math.cos(heading)) * (-1.0 if backward else 1.0))
         else:
-            rho, lateral, heading = se2.between(found.T_map_node[[0, 1, 3]], pose).tolist()
+            rho, lateral, heading = se2.between(found.pose_map_node[[0, 1, 3]], pose).tolist()
             name, far = self._next_across(node, pose, pose[2] + (math.pi if backward else 0.0))
         return PlaceOnMap(node, rho, lateral, math.remainder(heading, 2.0 * math.pi), height_m, name, far)
 

@@ -44,7 +44,7 @@ def poses_in(topology: TopologicalMap, node: str) -> FloatArray:
         yaw = np.arctan2(way[:, 1], way[:, 0])
         one_way = np.column_stack([line[:, :2], yaw, line[:, 2]])
         return np.concatenate([one_way, one_way + np.array([0.0, 0.0, math.pi, 0.0])])
-    middle = found.T_map_node
+    middle = found.pose_map_node
     places = np.vstack([middle[None, :3], *(point.pose[None, :3] for point in topology.points_of(node))])
     yaws = middle[3] + 2.0 * math.pi * np.arange(_HEADINGS) / _HEADINGS
     return np.array([[x, y, yaw, z] for x, y, z in places.tolist() for yaw in yaws.tolist()])

@@ -105,7 +105,7 @@ class AlongNode:
                 for row, side, number in zip(rows.tolist(), right.tolist(), at.tolist(), strict=True):
                     out[row] = (node, side, number)
             elif node:
-                off = points[rows, :2] - self._topology.nodes[node].T_map_node[:2]
+                off = points[rows, :2] - self._topology.nodes[node].pose_map_node[:2]
                 sectors = np.floor(_SECTORS * (np.arctan2(off[:, 1], off[:, 0]) / (2.0 * math.pi) % 1.0)).astype(int)
                 for row, number in zip(rows.tolist(), sectors.tolist(), strict=True):
                     out[row] = (node, 2, number)

@@ -102,7 +102,7 @@ class _Walls:
     def __init__(self, topology: TopologicalMap, landmarks: Landmarks) -> None:
         self._cells = {
             node: (
-                se2.transform(topology.nodes[node].T_map_node[[0, 1, 3]], surface.cells.points_m.astype(float)),
+                se2.transform(topology.nodes[node].pose_map_node[[0, 1, 3]], surface.cells.points_m.astype(float)),
                 surface.cells.counts.astype(float),
             )
             for node, surface in landmarks.surfaces.items()
@@ -160,7 +160,7 @@ def _crossings(topology: TopologicalMap, walls: _Walls, settings: LandmarkSettin
             profile = profile_of(*walls.near(nodes, way), way, arc_m(way), settings)
             rows = _between(profile, cut_a, cut_b)
             strip = _strip(node.id, profile, rows, settings, walls.noise)
-            heights = np.full(len(strip.poses), node.T_map_node[2])
+            heights = np.full(len(strip.poses), node.pose_map_node[2])
             yield strip._replace(heights_m=heights, enters=(a.id, end_a, True), leaves=(b.id, end_b, False))
 
 

@@ -38,7 +38,7 @@ class MapWalls:
             surface = landmarks.surfaces.get(node.id)
             if surface is None:
                 continue
-            places = se2.transform(node.T_map_node[[0, 1, 3]], surface.cells.points_m.astype(float))
+            places = se2.transform(node.pose_map_node[[0, 1, 3]], surface.cells.points_m.astype(float))
             heights = surface.cells.heights_m
             by_plan = _heights_by_plan(places, node) if heights is None else heights.astype(float)
             self._cells[node.id] = np.column_stack([places, by_plan])
@@ -96,6 +96,6 @@ def _is_far(at: FloatArray, place: FloatArray, far_m: float) -> bool:
 def _heights_by_plan(places: FloatArray, node: Tunnel | Intersection) -> FloatArray:
     """Return heights (M,) of places (M, 2) by the node's line, of maps that do not tell them."""
     if isinstance(node, Intersection):
-        return np.full(len(places), node.T_map_node[2])
+        return np.full(len(places), node.pose_map_node[2])
     heights: FloatArray = node.line_m[KDTree(node.line_m[:, :2]).query(places)[1], 2]
     return heights

@@ -23,6 +23,7 @@ _REVERSE = 2.5  # a way in reverse against one forwards
 _BEHIND_M = 1.0
 _AT_NODE_M = 13.0  # so near a node a turn may leave an edge, or come into it
 _TEACHING_REVERSE = 8.0  # a teaching drive goes forwards where it can
+_WORKED = ("draw_point", "dump")
 LEAST_RADIUS_M = 5.0
 """Turns of a smaller radius are not driven (guidance prototype, tightest bends)."""
 
@@ -34,6 +35,7 @@ class RouteFinder:
         self.network, self.machine = network, machine
         self._wheelbase_m, self._reverse = machine.dimensions.wheelbase_m, _REVERSE
         self.left_out: list[str] = []
+        self._worked = {place_end(network, one)[:2] for one in network.plan.places if one.kind in _WORKED}
         self._turns: dict[tuple[int, Branch], list[BranchTurn]] = {}
         for turn in network.turns:
             if turn.tube < 0 or turn.radius_m >= LEAST_RADIUS_M:
@@ -68,19 +70,23 @@ class RouteFinder:
         return trimmed(self.network, joined(runs))
 
     def teaching(self, start: Start) -> list[Run]:
-        """Return the runs of a drive through every edge that can be reached, each time the nearest; `left_out` are the others."""
+        """Return the runs of a drive through every edge that can be reached, each time the nearest; `left_out` are the others.
+
+        A draw point or dump is reached bucket first where a way leads there so: else the machine never stands where it works.
+        """
         self._reverse = _TEACHING_REVERSE
         runs, states = self._begin(start)
         state: RouteState | None = None
         left = {index for index, edge in enumerate(self.network.edges) if not self._blind(edge)}
-        while left:
-            found = self._search(states, functools.partial(self._covers_any, frozenset(left)))
-            if found is None:
-                break
-            state, driven = found
-            runs += driven
-            left -= {k for k in left for run in driven if self._covered(k, run)}
-            states = {state: ()}
+        for covers in (self._covered_as_worked, self._covered):
+            while left:
+                found = self._search(states, functools.partial(_covers_any, covers, frozenset(left)))
+                if found is None:
+                    break
+                state, driven = found
+                runs += driven
+                left -= {k for k in left for run in driven if covers(k, run)}
+                states = {state: ()}
         self.left_out = sorted({self.network.tubes[self.network.edges[k].tube].name for k in left})
         runs = runs if state is None else self._past_node(state, runs)
         return trimmed(self.network, joined(runs))
@@ -106,8 +112,12 @@ class RouteFinder:
         place = self.network.tubes[edge.tube].place
         return place is not None and place.kind in BLIND
 
-    def _covers_any(self, edges: frozenset[int], step: RouteStep) -> bool:
-        return any(self._covered(k, run) for k in edges for run in step.runs)
+    def _covered_as_worked(self, index: int, run: Run) -> bool:
+        """Return whether a run goes through an edge; where one works at its end, facing it."""
+        facing = run.gear if run.to_m > run.from_m else -run.gear
+        edge = self.network.edges[index]
+        worked = {1: (edge.tube, edge.end_m), -1: (edge.tube, edge.start_m)}
+        return self._covered(index, run) and worked[-facing] not in self._worked
 
     def _covered(self, index: int, run: Run) -> bool:
         """Return whether a run goes through an edge, but for what is about its nodes, and what a machine keeps from the rock."""
@@ -279,3 +289,7 @@ class RouteFinder:
     def _search(self, states: Starts, reached: Callable[[RouteStep], bool]) -> tuple[RouteState, list[Run]] | None:
         """Return the cheapest way from one of `states` to what is `reached`: where it ends, and the runs."""
         return cheapest(states, self._steps, reached, self._reverse)
+
+
+def _covers_any(covers: Callable[[int, Run], bool], edges: frozenset[int], step: RouteStep) -> bool:
+    return any(covers(k, run) for k in edges for run in step.runs)

@@ -27,7 +27,7 @@ class Located(NamedTuple):
     height_m: float
 
     @property
-    def T_odom_map(self) -> FloatArray:  # noqa: N802  # frames in the name
+    def pose_odom_map(self) -> FloatArray:
         """The frame `map` in `odom` (3,)."""
         return se2.compose(self.pose_odom, se2.inverse(self.pose_map))
 
@@ -39,8 +39,8 @@ class Located(NamedTuple):
 
 def on_map(motion: Motion, located: Located) -> Motion:
     """Return a motion with its place in `map`."""
-    T_map_odom = se2.compose(located.pose_map, se2.inverse(located.pose_odom))
-    x, y, heading = se2.compose(T_map_odom, np.array([motion.x_m, motion.y_m, motion.heading_rad])).tolist()
+    pose_map_odom = se2.compose(located.pose_map, se2.inverse(located.pose_odom))
+    x, y, heading = se2.compose(pose_map_odom, np.array([motion.x_m, motion.y_m, motion.heading_rad])).tolist()
     return motion._replace(x_m=x, y_m=y, heading_rad=heading)
 
 

@@ -146,7 +146,7 @@ class NavigationControl:
     def _drive(self, now_ns: int, motion: Motion, located: Located, standing: bool) -> Directive | None:
         way = self._way
         leg = way.now
-        path = moved(leg.path, located.T_odom_map)
+        path = moved(leg.path, located.pose_odom_map)
         lead = self._body.leads[leg.gear].state(motion)
         way.at_m = along_m(path, lead[0], lead[1])
         way.begun_m = way.at_m if way.begun_m is None else way.begun_m
@@ -249,7 +249,7 @@ class NavigationControl:
     def _back(self, now_ns: int, motion: Motion, located: Located, standing: bool) -> Directive | None:
         leg = self._backs.leg
         assert leg is not None  # noqa: S101  # in this state
-        path = moved(leg.path, located.T_odom_map)
+        path = moved(leg.path, located.pose_odom_map)
         lead = self._body.leads[leg.gear].state(motion)
         at_m = along_m(path, lead[0], lead[1])
         if not standing or self._since_ns == 0 or not self.allowed.may_move:

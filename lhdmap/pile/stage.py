@@ -30,12 +30,12 @@ _BLURRED_DEG = 25.0  # an inclination that is less sure is none
 class ScanHits(NamedTuple):
     """One scan of the front scanner in the map: hits (N, 3) in the order of the beams, and the machine then.
 
-    `T_map_base`: x, y, z (m), heading (rad), shape (4,).
+    `pose_map_base`: x, y, z (m), heading (rad), shape (4,).
     """
 
     stamp_ns: int
     points_map: FloatArray
-    T_map_base: FloatArray
+    pose_map_base: FloatArray
 
 
 class PileStage:
@@ -56,9 +56,9 @@ class PileStage:
 
     def update(self, scan: ScanHits) -> Snapshot | None:
         """Take one scan; return the new estimate where the machine has moved far enough for one."""
-        position = scan.T_map_base[:3]
+        position = scan.pose_map_base[:3]
         if self._position is not None:
-            self._travelled_m += _forward(position - self._position, float(scan.T_map_base[3]))
+            self._travelled_m += _forward(position - self._position, float(scan.pose_map_base[3]))
         self._position = position
         self._path.append((self._travelled_m, float(position[2])))
         while abs(self._path[0][0] - self._travelled_m) > _GRADE_M:
@@ -98,8 +98,8 @@ class PileStage:
         return UprightFrame(start, heading).map(hits[:: max(1, len(hits) // _MOST_AROUND)])
 
     def _estimate(self, scan: ScanHits) -> Snapshot:
-        base = UprightFrame(scan.T_map_base[:3], float(scan.T_map_base[3]))
-        hits = self._window.hits(scan.T_map_base, self._travelled_m)
+        base = UprightFrame(scan.pose_map_base[:3], float(scan.pose_map_base[3]))
+        hits = self._window.hits(scan.pose_map_base, self._travelled_m)
         rng = np.random.default_rng(len(hits))
         self._tilt.update(hits, self._travelled_m)
         tilt = self._tilt.tilt()
@@ -117,7 +117,7 @@ class PileStage:
                 "the floor before the pile was not seen: the toe is where the machine's path would reach the face"
             )
         estimate = replace(measure(scene), warnings=tuple(warnings))
-        distance = float(np.linalg.norm(estimate.toe_m - scan.T_map_base[:3], axis=1).min())
+        distance = float(np.linalg.norm(estimate.toe_m - scan.pose_map_base[:3], axis=1).min())
         self._idle = estimate.probabilities["none"] > _NOTHING
         return Snapshot(scan.stamp_ns, distance, estimate)
 

@@ -23,7 +23,7 @@ _LEVEL_M = 2.5  # of height over the floor up to which hits are walls and not th
 
 def landmarks_for(topology: TopologicalMap, seen: Seen, settings: LandmarkSettings) -> Landmarks:
     """Return the landmarks of all nodes, from the views of the drive(s)."""
-    frames = {node.id: node.T_map_node for node in topology.nodes.values()}
+    frames = {node.id: node.pose_map_node for node in topology.nodes.values()}
     return landmarks_of(node_scans(topology, seen), frames, {tunnel.id for tunnel in topology.tunnels}, settings)
 
 

@@ -39,12 +39,12 @@ class Overlap(NamedTuple):
 
 
 class _Place(NamedTuple):
-    """A place that a window proposes: `T_map_drive` (3,), the machine's pose (3,) in the drive's frame there.
+    """A place that a window proposes: `pose_map_drive` (3,), the machine's pose (3,) in the drive's frame there.
 
     `weight`: its probability, over the reduced χ² of its walls.
     """
 
-    T_map_drive: FloatArray
+    pose_map_drive: FloatArray
     pose: FloatArray
     weight: float
 
@@ -53,7 +53,7 @@ def overlap_of(known: KnownMap, seen: fit.Seen, drive: fit.Seen, settings: Setti
     """Return where a drive lies in a map whose own drive has `seen` it."""
     search = known.search(MapWalls(known.topology, known.landmarks), settings)
     groups = _groups(_proposed(search, drive, settings))
-    fits = [fit.fitted(seen, drive, group[0].T_map_drive, settings.smoothing) for group in groups[:_TRIED]]
+    fits = [fit.fitted(seen, drive, group[0].pose_map_drive, settings.smoothing) for group in groups[:_TRIED]]
     held = sorted((one for one in fits if one is not None and _holds(one)), key=lambda one: -one.tied)
     apart = [one for one in held[1:] if _differ(one, held[0], drive)]
     if not held:
@@ -100,7 +100,7 @@ def _groups(places: list[_Place]) -> list[list[_Place]]:
 
 def _agree(a: _Place, b: _Place) -> bool:
     """Return whether two places are one, but for what the odometry may have drifted between them."""
-    apart = se2.between(se2.compose(a.T_map_drive, b.pose), se2.compose(b.T_map_drive, b.pose))
+    apart = se2.between(se2.compose(a.pose_map_drive, b.pose), se2.compose(b.pose_map_drive, b.pose))
     drift = _DRIFT * math.dist(a.pose[:2], b.pose[:2])
     return math.hypot(apart[0], apart[1]) < _SAME_M + drift and abs(se2.wrap(apart[2])) < _SAME_RAD
 
@@ -112,5 +112,7 @@ def _holds(one: fit.Fit) -> bool:
 def _differ(a: fit.Fit, b: fit.Fit, drive: fit.Seen) -> bool:
     """Return whether two fits put the middle of the drive at places of their own."""
     middle = drive.poses[len(drive.poses) // 2, [0, 1, 3]]
-    there = [se2.compose(one.correction.T_map_odom[len(one.correction.T_map_odom) // 2], middle) for one in (a, b)]
+    there = [
+        se2.compose(one.correction.pose_map_odom[len(one.correction.pose_map_odom) // 2], middle) for one in (a, b)
+    ]
     return math.hypot(*(there[0] - there[1])[:2]) > 2.0 * _SAME_M

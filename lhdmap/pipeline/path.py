@@ -64,5 +64,5 @@ class FinalPath:
 def motion_at(correction: Correction, time_ns: int) -> FloatArray:
     """Return the planar motion (3,) of what was measured at a time."""
     at = int(np.searchsorted(correction.times_ns, time_ns))
-    motion: FloatArray = correction.T_map_odom[min(at, len(correction.T_map_odom) - 1)]
+    motion: FloatArray = correction.pose_map_odom[min(at, len(correction.pose_map_odom) - 1)]
     return motion

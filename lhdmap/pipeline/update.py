@@ -108,7 +108,7 @@ def _in_the_map(known: TaughtMap, drive: TaughtMap, request: UpdateRequest) -> C
         raise InputError(
             f"{log}: its walls are nowhere in {request.map}; say where it begins with --start, or build it apart"
         )
-    shares = [fit.share_that_fits(known.seen, drive.seen, one.T_map_drive, smoothing) for one in places]
+    shares = [fit.share_that_fits(known.seen, drive.seen, one.pose_map_drive, smoothing) for one in places]
     best, *others = sorted(shares, reverse=True)
     if others and best > 0.0 and others[0] >= _ALIKE * best:
         raise InputError(
@@ -116,7 +116,7 @@ def _in_the_map(known: TaughtMap, drive: TaughtMap, request: UpdateRequest) -> C
             "scans fit); say where it begins with --start X,Y,HEADING_DEG"
         )
     place = places[shares.index(best)]
-    found = fit.fitted(known.seen, drive.seen, place.T_map_drive, smoothing)
+    found = fit.fitted(known.seen, drive.seen, place.pose_map_drive, smoothing)
     if found is None:
         raise InputError(f"{log}: its scans do not fit the walls of {request.map}; build it apart")
     if found.tied < 0.2 * found.keys:

@@ -83,6 +83,58 @@ class Attitudes(NamedTuple):
     valid: npt.NDArray[np.bool_]
 
 
+class _SampleWatch:
+    """Judges each sample by those before it: a jump, a value that stays to the last bit."""
+
+    def __init__(self, settings: AttitudeSettings, samples: SampleBuffer, warnings: Warnings) -> None:
+        self._settings, self._samples, self._warnings = settings, samples, warnings
+        self._jump_rad = math.radians(settings.jump_deg)
+        self._outliers = 0
+        self._same_since_ns: int | None = None
+
+    def is_outlier(self, stamp_ns: int, roll: float, pitch: float) -> bool:
+        """Return whether a sample is far from the last one, and has not lasted yet."""
+        newest_ns, last = self._samples.latest_ns, self._samples.latest_row
+        if newest_ns is None or stamp_ns - newest_ns > self._settings.max_gap_s * 1e9:
+            return False
+        if not max(abs(roll - last[0]), abs(pitch - last[1])) > self._jump_rad:
+            self._outliers = 0
+            return False
+        self._outliers += 1
+        if self._outliers < JUMP_RUN:
+            self._warnings.add(f"inclinometer: a jump of more than {self._settings.jump_deg:g} degrees; left out")
+            return True
+        self._warnings.add("inclinometer: its level changed at once and stayed; taken as true")
+        self._outliers = 0
+        return False
+
+    def frozen(self, stamp_ns: int, roll: float, pitch: float) -> None:
+        """Warn of a sensor that repeats one value."""
+        if (roll, pitch) != self._samples.latest_row:
+            self._same_since_ns = None
+        elif self._same_since_ns is None:
+            self._same_since_ns = self._samples.latest_ns
+        elif stamp_ns - self._same_since_ns > self._settings.frozen_s * 1e9:
+            self._warnings.add(f"inclinometer: the same values for more than {self._settings.frozen_s:g} s; frozen?")
+            self._same_since_ns = stamp_ns
+
+
+class _Held:
+    """The last roll and pitch (rad) that were known, and for how long (s) they had to do at most."""
+
+    def __init__(self) -> None:
+        self._roll_pitch, self.silent_s = (0.0, 0.0), 0.0
+        self._known_ns: int | None = None
+
+    def after(self, stamp_ns: int, found: Attitude | None) -> tuple[float, float]:
+        """Return what holds at a time, where this was found."""
+        if found is not None:
+            self._roll_pitch, self._known_ns = (found.roll_rad, found.pitch_rad), stamp_ns
+        elif self._known_ns is not None:
+            self.silent_s = max(self.silent_s, (stamp_ns - self._known_ns) * 1e-9)
+        return self._roll_pitch
+
+
 class AttitudeFilter:
     """Takes inclinometer messages in the order of the log and gives the attitude at any moment that is kept."""
 
@@ -93,16 +145,13 @@ class AttitudeFilter:
         self._samples = SampleBuffer("inclinometer", 2, settings.keep_s, self.warnings)
         turned = R_base_sensor is not None and not np.array_equal(R_base_sensor, np.eye(3))
         self._R_sensor_base = np.asarray(R_base_sensor, dtype=float).T if turned else None
-        self._jump_rad = math.radians(settings.jump_deg)
-        self._outliers = 0
-        self._same_since_ns: int | None = None
+        self._watch = _SampleWatch(settings, self._samples, self.warnings)
         self._noise_rad = _BEST_STD_RAD
         self._taken = 0
         self._finished = False
         self._asked: tuple[int, int] = (0, -1)
         self._answer: Attitude | None = None
-        self._held, self._silent_s = (0.0, 0.0), 0.0
-        self._held_ns: int | None = None
+        self._held = _Held()
 
     def update(self, message: Inclination) -> None:
         """Take one message; values that cannot be are left out, with a warning."""
@@ -112,8 +161,8 @@ class AttitudeFilter:
         if abs(roll) > LARGEST_TILT_RAD or abs(pitch) > LARGEST_TILT_RAD:
             self.warnings.add("inclinometer: a tilt of more than 60 degrees; left out")
             return
-        self._watch_frozen(message.stamp_ns, roll, pitch)
-        if self._is_outlier(message.stamp_ns, roll, pitch):
+        self._watch.frozen(message.stamp_ns, roll, pitch)
+        if self._watch.is_outlier(message.stamp_ns, roll, pitch):
             return
         if self._samples.append(message.stamp_ns, (roll, pitch)):
             self._taken += 1
@@ -146,12 +195,7 @@ class AttitudeFilter:
     def roll_pitch_at(self, stamp_ns: int) -> tuple[float, float]:
         """Return roll and pitch at a time, radians; where nothing is known the last ones, with a warning. Times rise."""
         found = self.attitude_at(stamp_ns)
-        if found is not None:
-            self._held = found.roll_rad, found.pitch_rad
-            self._held_ns = stamp_ns
-        elif self._held_ns is not None:
-            self._silent_s = max(self._silent_s, (stamp_ns - self._held_ns) * 1e-9)
-        return self._held
+        return self._held.after(stamp_ns, found)
 
     def causal_at(self, now_ns: int) -> Attitude | None:
         """Return the latest attitude that the samples so far tell of, at `now_ns` or before it; None where there is none.
@@ -171,8 +215,9 @@ class AttitudeFilter:
 
     def texts(self) -> list[str]:
         """Return what was odd, in words."""
-        silent = f"inclinometer: silent for {self._silent_s:.1f} s and more; the attitude before was kept there"
-        return [*self.warnings.texts(), *([silent] if self._silent_s > _SILENT_S else [])]
+        silent_s = self._held.silent_s
+        silent = f"inclinometer: silent for {silent_s:.1f} s and more; the attitude before was kept there"
+        return [*self.warnings.texts(), *([silent] if silent_s > _SILENT_S else [])]
 
     def _attitude(self, stamp_ns: int) -> Attitude | None:
         values, factor = self._fit(np.array([stamp_ns], dtype=np.int64))
@@ -194,30 +239,6 @@ class AttitudeFilter:
         delay_s, rate_s = (s.lag_s, 0.0) if s.lag_kind == "delay" else (0.0, s.lag_s)
         shown_ns = stamps_ns + round(delay_s * 1e9)
         return fit_at(samples.stamps_ns, samples.rows, shown_ns, s.half_window_s, s.max_gap_s, rate_s)
-
-    def _is_outlier(self, stamp_ns: int, roll: float, pitch: float) -> bool:
-        newest_ns, last = self._samples.latest_ns, self._samples.latest_row
-        if newest_ns is None or stamp_ns - newest_ns > self.settings.max_gap_s * 1e9:
-            return False
-        if not max(abs(roll - last[0]), abs(pitch - last[1])) > self._jump_rad:
-            self._outliers = 0
-            return False
-        self._outliers += 1
-        if self._outliers < JUMP_RUN:
-            self.warnings.add(f"inclinometer: a jump of more than {self.settings.jump_deg:g} degrees; left out")
-            return True
-        self.warnings.add("inclinometer: its level changed at once and stayed; taken as true")
-        self._outliers = 0
-        return False
-
-    def _watch_frozen(self, stamp_ns: int, roll: float, pitch: float) -> None:
-        if (roll, pitch) != self._samples.latest_row:
-            self._same_since_ns = None
-        elif self._same_since_ns is None:
-            self._same_since_ns = self._samples.latest_ns
-        elif stamp_ns - self._same_since_ns > self.settings.frozen_s * 1e9:
-            self.warnings.add(f"inclinometer: the same values for more than {self.settings.frozen_s:g} s; frozen?")
-            self._same_since_ns = stamp_ns
 
 
 def _noise(rows: FloatArray) -> float:

@@ -8,6 +8,7 @@ from types import MappingProxyType
 from typing import NamedTuple
 
 from lhdmap.config import Settings
+from lhdmap.console.link import MachineLink
 from lhdmap.driving.bodies import bodies_of
 from lhdmap.driving.model import drive_model
 from lhdmap.errors import ConfigError, UsageError
@@ -24,7 +25,7 @@ from lhdmap.replay.engine import Engine, overrun_targets
 from lhdmap.replay.faults import Faults
 from lhdmap.replay.journal import Journal
 from lhdmap.replay.judges import Judges
-from lhdmap.replay.link import Link
+from lhdmap.replay.link import ConsoleRadio, Link
 from lhdmap.replay.load_tally import LoadTally
 from lhdmap.replay.namespace import InNamespace, JournalOf, Scribes
 from lhdmap.replay.parts import Autonomous, Parts
@@ -103,6 +104,8 @@ def assemble(
     """
     faults = Faults(scenario.faults, journal, parts.places)
     link = Link(scenario.link, faults, scenario.seed)
+    if isinstance(parts.attendant, MachineLink):
+        parts.attendant.crosses(ConsoleRadio(scenario.link, faults, scenario.seed, link))
     monitor = _monitor(scenario, parts, journal)
     monitors, sections = {FIRST: monitor}, None
     processes: list[Process] = [Plant(parts, faults, link, journal.of(Plant.name), scenario.seed)]

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from lhdmap.driving.bodies import bodies_of
-from lhdmap.driving.model import drive_model
+from lhdmap.config import Settings
+from lhdmap.driving.bodies import Bodies, bodies_of
+from lhdmap.driving.model import DriveModel, drive_model
 from lhdmap.executor.control import Control
 from lhdmap.haulage.layout import checked
 from lhdmap.haulage.mission import MissionTask
@@ -20,7 +21,7 @@ from lhdmap.replay.parts import Autonomous, Parts
 from lhdmap.replay.process import Process
 from lhdmap.replay.processes.dumps import DUMPS, Dumps
 from lhdmap.replay.processes.execute import EXECUTOR, PERIODS_S, Execute
-from lhdmap.replay.processes.executive import EXECUTIVE, Executive
+from lhdmap.replay.processes.executive import EXECUTIVE, Executive, SharedMap
 from lhdmap.replay.processes.guide import GUIDANCE, Guide
 from lhdmap.replay.processes.load import LOADS, Loads
 from lhdmap.replay.processes.locating import Locating
@@ -43,15 +44,12 @@ def mission_processes(
     full_kg = machine.drive.payload_kg
     models = drive_model(machine, 0.0), drive_model(machine, full_kg)
     bodies, topology = bodies_of(machine), given.known.topology
-    navigation = NavigationControl(
-        RoutePlanner(topology, settings.movement), models[0], bodies, settings.navigation, journal.of(NAVIGATION).goes
-    )
     control = Control(models[0], bodies, settings.executor, PERIODS_S)
     guidance = guidance_of(machine, models[0], bodies, settings)
     return [
         Locating(given.known, settings, machine, given.start, journal.of(PERCEPTION), pile=PileAhead(settings)),
-        _executive(scenario, topology, 1e-3 * full_kg, journal.of(EXECUTIVE), job),
-        OrderedNavigation(navigation, journal.of(NAVIGATION)),
+        executive_of(scenario, topology, 1e-3 * full_kg, journal.of(EXECUTIVE), job),
+        navigation_of(topology, settings, (models[0], bodies), journal.of(NAVIGATION), job),
         Loads(task_of(scenario.loading, settings, machine), None, journal.of(LOADS)),
         Dumps(journal.of(DUMPS), machine.linkage),
         Guide(guidance, settings.executor.jumps, journal.of(GUIDANCE), models=models),
@@ -60,12 +58,27 @@ def mission_processes(
     ]
 
 
-def _executive(
-    scenario: Scenario, topology: TopologicalMap, full_t: float, scribe: Scribe, job: Job | None
+def navigation_of(
+    topology: TopologicalMap,
+    settings: Settings,
+    body: tuple[DriveModel, Bodies],
+    scribe: Scribe,
+    job: Job | None = None,
+) -> OrderedNavigation:
+    """Return what drives to the goals of a mission; of a machine among others, on routes that keep out of others' places."""
+    planner = RoutePlanner(topology, settings.movement)
+    control = NavigationControl(planner, *body, settings.navigation, scribe.goes)
+    control.allowed.avoid = () if job is None else job.avoid
+    return OrderedNavigation(control, scribe)
+
+
+def executive_of(
+    scenario: Scenario, topology: TopologicalMap, full_t: float, scribe: Scribe, job: Job | None = None
 ) -> Executive:
+    """Return who gives the orders of a mission; `full_t`: a full bucket, `job`: of a machine among others."""
     if job is not None:
         task = job.task
-        return Executive(task, job.orders, topology, full_t, scribe, free=lambda: task.free)
+        return Executive(task, job.orders, topology, full_t, scribe, shares=SharedMap(lambda: task.free, job.presence))
     layout = checked(layout_of_map(topology, scenario.mine))
     alone = MissionTask(layout, park=scenario.start if scenario.start in layout.of("park") else "")
     orders = [Buckets(one.source, one.to, one.buckets) for one in scenario.mission]

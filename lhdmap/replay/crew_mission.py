@@ -13,7 +13,7 @@ from lhdmap.driving.model import drive_model
 from lhdmap.errors import UsageError
 from lhdmap.haulage.fleet import Fleet, Member
 from lhdmap.haulage.joining import check_pull_back, ways_of, with_sections
-from lhdmap.haulage.layout import Layout, checked
+from lhdmap.haulage.layout import Layout, checked, nodes_of_section
 from lhdmap.haulage.machine import Errand
 from lhdmap.haulage.mission_io import Buckets
 from lhdmap.haulage.of_map import layout_of_map
@@ -22,6 +22,7 @@ from lhdmap.navigation.begin import Errand as Way
 from lhdmap.navigation.begin import Reach, route_from
 from lhdmap.navigation.hold import ROOM_M
 from lhdmap.navigation.leg import Leg, legs_of
+from lhdmap.navigation.presence import Presence
 from lhdmap.replay.crew_parts import errands_of
 from lhdmap.replay.journal import Scribe
 from lhdmap.replay.parts import Parts
@@ -29,14 +30,15 @@ from lhdmap.replay.processes.section_watch import SectionWatch
 from lhdmap.replay.scenario import Scenario
 from lhdmap.topology.model import TopologicalMap, Waypoint
 
-_OUT_M = 1.0  # a section is given back so far after the rear has left it
+_OUT_M = 1.0  # a section is given back so far after the machine has left it
 
 
 class Job(NamedTuple):
-    """What a machine of a fleet is to do, the fleet's word on it, and the nodes (ids) in which others work or park."""
+    """What a machine of a fleet is to do, the fleet's word on it, what it is in, the nodes (ids) in which others work or park."""
 
     task: Member
     orders: Sequence[Buckets]
+    presence: Presence
     avoid: tuple[str, ...]
 
 
@@ -84,14 +86,17 @@ def crew_mission(scenario: Scenario, crew: Mapping[str, Parts]) -> CrewMission:
     check_pull_back(layout, errands, parts.settings.loading.pull_back_m + tail_m)
     fleet = Fleet(layout, errands, parts.settings.haulage, tail_m + _OUT_M)
     orders = {name: [Buckets(one.source, one.to, one.buckets) for one in ones] for name, ones in wanted.items()}
-    return CrewMission({name: Job(fleet.member(name), orders[name], avoid) for name in crew}, layout)
+    presence = Presence(topology, bodies, machine, _OUT_M)
+    return CrewMission({name: Job(fleet.member(name), orders[name], presence, avoid) for name in crew}, layout)
 
 
 def section_watch(given: CrewMission, crew: Mapping[str, Parts], scribe: Scribe) -> SectionWatch:
     """Return who looks at the sections of a crew's mission."""
     parts = next(iter(crew.values()))
     assert parts.autonomous is not None  # noqa: S101  # a mission drives itself
-    named = {edge.node: edge.held for edge in given.layout.edges}
+    held = {edge.held for edge in given.layout.edges}
+    named = {node: one for one in held for node in nodes_of_section(one)}
+    named |= {edge.node: edge.held for edge in given.layout.edges}
     section_of = {one: named.get(name, name) for one, name in given.layout.ids.items()}
     spaces = {name: "" if number == 0 else name for number, name in enumerate(crew)}
     origin = np.zeros(4) if parts.T_mine_map is None else parts.T_mine_map

@@ -74,7 +74,10 @@ class Judges:
             for name, one in self._monitors.items()
         }
         first = next(iter(each.values()))
-        return first if len(each) == 1 else self._together(first, each, (now_ns - START_NS) / SECOND_NS)
+        if len(each) == 1:
+            return first
+        waits = {"longest_wait_s": max((one.longest_wait_s for one in missions.values()), default=0.0)}
+        return self._together(first, each, (now_ns - START_NS) / SECOND_NS) | waits
 
     def _together(
         self, first: Mapping[str, Any], each: Mapping[str, Mapping[str, Any]], duration_s: float

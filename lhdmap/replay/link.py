@@ -106,3 +106,19 @@ class Link:
                 apart = math.dist(point, self.position_m) / self._settings.fade_radius_m
                 kept *= 1.0 - self._settings.fade_loss_share * math.exp(-(apart**2))
         return 1.0 - kept
+
+
+class ConsoleRadio:
+    """The link as an operator's console meets it (`lhdmap.console.crossing.Radio`).
+
+    What it loses is counted apart: a run that is done again from its journal has no console, and comes out the same.
+    """
+
+    def __init__(self, settings: LinkSettings, faults: Faults, seed: int, beside: Link) -> None:
+        self._link, self._beside = Link(settings, faults, seed), beside
+
+    def __call__(self, topic: str, now_ns: int) -> int | None:
+        """Return the delay of a message that is sent now (ns), None where it is lost."""
+        self._link.position_m = self._beside.position_m
+        at_ns = self._link.arrival_ns(topic, "console", now_ns, crosses=True)
+        return None if at_ns is None else at_ns - now_ns

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from typing import Any
 
+from lhdmap.haulage.records import Phase
 from lhdmap.replay.journal import Event
 from lhdmap.replay.processes.executive import EXECUTIVE
 from lhdmap.simulation.history import SECOND_NS, START_NS
 
 _BEFORE = "idle"
+_WAITS = (Phase.TRAFFIC, Phase.QUEUE_LOAD, Phase.QUEUE_DUMP)
 
 
 class MissionTally:
@@ -18,6 +20,8 @@ class MissionTally:
         self.cycles, self.tonnes = 0, 0.0
         self._phase, self._since_ns = _BEFORE, START_NS
         self._ns_of: dict[str, int] = {}
+        self._waits_ns, self.longest_wait_s = 0, 0.0
+        """The longest time in one go that it stood for others."""
 
     def __call__(self, event: Event) -> None:
         """Take an event."""
@@ -37,5 +41,7 @@ class MissionTally:
         return {"cycles": self.cycles, "tonnes": self.tonnes, "time_by_phase_s": by_phase}
 
     def _until(self, now_ns: int) -> None:
+        self._waits_ns = self._waits_ns + now_ns - self._since_ns if self._phase in _WAITS else 0
+        self.longest_wait_s = max(self.longest_wait_s, self._waits_ns / SECOND_NS)
         self._ns_of[self._phase] = self._ns_of.get(self._phase, 0) + max(now_ns - self._since_ns, 0)
         self._since_ns = max(now_ns, self._since_ns)

@@ -55,7 +55,7 @@ def _figure(topology: TopologicalMap, sheet: Sheet, walls: Walls | None, level: 
 def _names(axes: Axes, topology: TopologicalMap, level: int, *, several: bool) -> None:
     for node in topology.intersections:
         if not several or str(node.level) == str(level):
-            x, y = node.T_map_node[:2]
+            x, y = node.pose_map_node[:2]
             axes.text(x, y, node.name, fontsize=7, ha="center", va="center", clip_on=True)
     for tunnel in topology.tunnels:
         if not several:

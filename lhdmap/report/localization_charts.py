@@ -41,7 +41,7 @@ def drawn_map(data: LocalizationData, rows: Sequence[LocalizationRow]) -> str:
         at = np.array([one.at_m for one in data.changes])
         axes.plot(at[:, 0], at[:, 1], "X", color=charts.WHEELS, markersize=8, label="not as in the map")
     for node in data.topology.intersections:
-        axes.text(node.T_map_node[0], node.T_map_node[1], node.name, fontsize=7, ha="center")
+        axes.text(node.pose_map_node[0], node.pose_map_node[1], node.name, fontsize=7, ha="center")
     for tunnel in data.topology.tunnels:
         x, y = tunnel.line_m[len(tunnel.line_m) // 2, :2]
         axes.text(x, y, tunnel.name, fontsize=7, ha="center")

@@ -51,7 +51,7 @@ def name_places(axes: Axes, drive: DriveData, way_m: FloatArray) -> None:
         return
     said = {(one.node, one.name) for one in topology.waypoints}
     names = [(one.name, one.pose, 4.0) for one in topology.waypoints]
-    names += [(one.name, one.T_map_node, 1.0) for one in topology.intersections]
+    names += [(one.name, one.pose_map_node, 1.0) for one in topology.intersections]
     names += [(one.name, middle(one.line_m), 1.5) for one in topology.tunnels if (one.id, one.name) not in said]
     low, high = np.array([axes.get_xlim(), axes.get_ylim()]).T
     near = [one for one in names if (one[1][:2] > low).all() and (one[1][:2] < high).all()]

@@ -75,7 +75,7 @@ def part_of(topology: TopologicalMap, levels: Levels, number: int) -> Topologica
     tunnels = tuple(one for one in topology.tunnels if (levels.of(one.line_m) == number).any())
     return TopologicalMap(
         tunnels,
-        kept(topology.intersections, [one.T_map_node for one in topology.intersections]),
+        kept(topology.intersections, [one.pose_map_node for one in topology.intersections]),
         kept(topology.access_points, [one.pose for one in topology.access_points]),
         kept(topology.waypoints, [one.pose for one in topology.waypoints]),
         kept(topology.connections, [one.line_m[len(one.line_m) // 2] for one in topology.connections]),
@@ -86,7 +86,7 @@ def names_of(part: TopologicalMap, levels: Levels, number: int) -> Names:
     """Return the names on a level with their places, and the size of the mark there: waypoints, intersections, tunnels."""
     names: Names = [(one.name, one.pose, 4.5) for one in part.waypoints]
     said = {(one.node, one.name) for one in part.waypoints}
-    names += [(one.name, one.T_map_node, 1.0) for one in part.intersections]
+    names += [(one.name, one.pose_map_node, 1.0) for one in part.intersections]
     for tunnel in part.tunnels:
         own = max(levels.on(number, [tunnel.line_m]), key=len, default=tunnel.line_m)
         if (tunnel.id, tunnel.name) not in said and len(own):
@@ -132,7 +132,7 @@ def _names_on(topology: TopologicalMap, steps: Sequence[Step]) -> Names:
     return [
         *((one.name, one.pose, 6.0) for one in waypoints),
         *(
-            (one.name, middle(one.line_m) if isinstance(one, Tunnel) else one.T_map_node, 2.0)
+            (one.name, middle(one.line_m) if isinstance(one, Tunnel) else one.pose_map_node, 2.0)
             for one in nodes
             if (one.id, one.name) not in said
         ),

@@ -52,7 +52,7 @@ class Levels:
     def _names(self, topology: TopologicalMap, sheets: Sequence[Sheet]) -> list[str]:
         """Return the name that the intersections on each sheet have for their level; else its number."""
         nodes = topology.intersections
-        on = self.of(np.array([one.T_map_node[:3] for one in nodes]).reshape(-1, 3))
+        on = self.of(np.array([one.pose_map_node[:3] for one in nodes]).reshape(-1, 3))
         told = [
             {str(one.level) for one, k in zip(nodes, on.tolist(), strict=True) if k == n} for n in range(len(sheets))
         ]

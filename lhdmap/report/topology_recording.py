@@ -113,7 +113,7 @@ def _add_tunnels(writer: RecordingWriter, topology: TopologicalMap) -> None:
 
 def _add_intersections(writer: RecordingWriter, topology: TopologicalMap) -> None:
     own = [one for one in topology.intersections if len(one.outline_m)]
-    rings = [_at_height(np.vstack([one.outline_m, one.outline_m[:1]]), one.T_map_node[2]) for one in own]
+    rings = [_at_height(np.vstack([one.outline_m, one.outline_m[:1]]), one.pose_map_node[2]) for one in own]
     _add_lines(writer, "map/topology/intersections", rings, _YELLOW, 1.8, [one.name for one in own], shown=True)
     if own:
         writer.explain("yellow outline", "intersection")

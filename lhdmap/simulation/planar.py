@@ -45,9 +45,9 @@ class PlanarWorld:
     members: npt.NDArray[np.int64]
     centre_line_m: FloatArray
 
-    def ranges(self, T_world_scanner: FloatArray, angles_rad: FloatArray, max_range_m: float) -> FloatArray:
+    def ranges(self, pose_world_scanner: FloatArray, angles_rad: FloatArray, max_range_m: float) -> FloatArray:
         """Return exact ranges, shape (N,), metres (inf = none): pose (3,) for all beams or (N, 3), one for each."""
-        poses = np.broadcast_to(np.asarray(T_world_scanner, dtype=float), (angles_rad.size, 3))
+        poses = np.broadcast_to(np.asarray(pose_world_scanner, dtype=float), (angles_rad.size, 3))
         return _cast(
             np.ascontiguousarray(poses),
             angles_rad,

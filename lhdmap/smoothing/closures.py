@@ -53,7 +53,7 @@ class Closure(NamedTuple):
 
     earlier: int
     current: int
-    T_earlier_current: FloatArray
+    pose_earlier_current: FloatArray
     covariance: FloatArray
     support: float = 1.0
 
@@ -201,8 +201,8 @@ def _agree(a: Closure, b: Closure, keys: list[KeyScan], settings: SmoothingSetti
     """Compare by the loop through both closures and the odometry between their keys: it must end where it began."""
     if abs(keys[a.current].travelled_m - keys[b.current].travelled_m) > 5.0:
         return False
-    there = se2.compose(a.T_earlier_current, se2.between(keys[a.current].pose, keys[b.current].pose))
-    back = se2.compose(se2.between(keys[a.earlier].pose, keys[b.earlier].pose), b.T_earlier_current)
+    there = se2.compose(a.pose_earlier_current, se2.between(keys[a.current].pose, keys[b.current].pose))
+    back = se2.compose(se2.between(keys[a.earlier].pose, keys[b.earlier].pose), b.pose_earlier_current)
     gap = se2.between(there, back)
     turn = abs(float(se2.wrap(gap[2])))
     return float(np.hypot(gap[0], gap[1])) < settings.agree_m and turn < math.radians(settings.agree_deg)

@@ -50,7 +50,7 @@ def evidence_of(
             "" if kept else DOUBTFUL if doubtful else CONTRADICTED,
             one.support,
             one.sigma_m,
-            one.T_earlier_current,
+            one.pose_earlier_current,
             float(chi2),
         )
         for one, kept, doubtful, chi2 in zip(found, judgement.kept, judgement.doubtful, judgement.chi2, strict=True)

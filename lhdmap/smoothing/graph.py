@@ -47,7 +47,7 @@ def smoothed(keys: list[KeyScan], closures: list[Closure], settings: SmoothingSe
     for closure in closures:
         gaussian = gtsam.noiseModel.Gaussian.Covariance(closure.covariance)
         robust = gtsam.noiseModel.Robust.Create(gtsam.noiseModel.mEstimator.Cauchy.Create(_CAUCHY), gaussian)
-        pose = gtsam.Pose2(*closure.T_earlier_current)
+        pose = gtsam.Pose2(*closure.pose_earlier_current)
         graph.add(gtsam.BetweenFactorPose2(closure.earlier, closure.current, pose, robust))
     solved = gtsam.LevenbergMarquardtOptimizer(graph, values).optimize()
     found = [solved.atPose2(index) for index in range(len(keys))]

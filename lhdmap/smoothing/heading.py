@@ -177,7 +177,7 @@ def _constants(
 
 
 def moves_of(path: Path, turned_rad: FloatArray) -> FloatArray:
-    """Return what moves each pose (N, 3), `T_map_odom`, where the heading turns by `turned_rad` (N,) more: the way follows it."""
+    """Return what moves each pose (N, 3), `pose_map_odom`, where the heading turns by `turned_rad` (N,) more: the path follows."""
     middle = 0.5 * (turned_rad[1:] + turned_rad[:-1])
     dx, dy = np.diff(path.poses[:, 0]), np.diff(path.poses[:, 1])
     c, s = np.cos(middle), np.sin(middle)

@@ -14,7 +14,7 @@ _PLANAR = 3
 
 
 class Moves:
-    """A list of (time, `T_map_odom` (3,)) in the order of time."""
+    """A list of (time, `pose_map_odom` (3,)) in the order of time."""
 
     def __init__(self) -> None:
         self._times, self._moves = array("q"), array("d")
@@ -23,18 +23,18 @@ class Moves:
         return len(self._times)
 
     def __iter__(self) -> Iterator[tuple[int, FloatArray]]:
-        times_ns, T_map_odom = self.since(0)
-        return zip(times_ns.tolist(), T_map_odom, strict=True)
+        times_ns, pose_map_odom = self.since(0)
+        return zip(times_ns.tolist(), pose_map_odom, strict=True)
 
     @property
     def last_ns(self) -> int:
         """Time of the last node."""
         return self._times[-1]
 
-    def append(self, time_ns: int, T_map_odom: FloatArray) -> None:
+    def append(self, time_ns: int, pose_map_odom: FloatArray) -> None:
         """Add a node."""
         self._times.append(time_ns)
-        self._moves.extend(T_map_odom.tolist())
+        self._moves.extend(pose_map_odom.tolist())
 
     def since(self, first: int) -> tuple[npt.NDArray[np.int64], FloatArray]:
         """Return times (N,) and moves (N, 3) from number `first` on, copied."""

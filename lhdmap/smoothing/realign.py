@@ -60,7 +60,7 @@ class _Way:
 
 
 class Realigner:
-    """`update` with each processed scan; `moves` holds time and `T_map_odom` (3,) of the nodes that are final.
+    """`update` with each processed scan; `moves` holds time and `pose_map_odom` (3,) of the nodes that are final.
 
     `joint_x_m`: of the joint that rear hits swing about, in `base_link`; what its encoder is off is one of the unknowns.
     """
@@ -136,8 +136,8 @@ class Realigner:
 
     def _make_final(self) -> None:
         node = self._nodes[self._final]
-        T_map_odom = se2.compose(self._poses[self._final], se2.inverse(node.pose))
-        self.moves.append(node.time_ns, T_map_odom)
+        pose_map_odom = se2.compose(self._poses[self._final], se2.inverse(node.pose))
+        self.moves.append(node.time_ns, pose_map_odom)
         self._final += 1
         while self._final > 1 and (
             node.travelled_m - self._nodes[0].travelled_m > _ANCHOR_M or self._final > _MOST_FINAL

@@ -35,7 +35,7 @@ class Tie(NamedTuple):
 
     first: int
     second: int
-    T_first_second: FloatArray
+    pose_first_second: FloatArray
     covariance: FloatArray
 
 
@@ -139,7 +139,7 @@ class _Problem:
         """Return the squared Mahalanobis distance (K,) of each closure at these poses."""
         out = np.empty(len(self._ties))
         for index, tie in enumerate(self._ties):
-            gap = se2.between(tie.T_first_second, se2.between(poses[tie.first], poses[tie.second]))
+            gap = se2.between(tie.pose_first_second, se2.between(poses[tie.first], poses[tie.second]))
             gap[2] = math.remainder(gap[2], 2.0 * math.pi)
             out[index] = float(gap @ np.linalg.solve(tie.covariance, gap))
         return out
@@ -154,7 +154,7 @@ class _Problem:
             noise: Any = gtsam.noiseModel.Gaussian.Covariance(tie.covariance)
             if kernel is not None:
                 noise = gtsam.noiseModel.Robust.Create(kernel, noise)
-            graph.add(gtsam.BetweenFactorPose2(tie.first, tie.second, gtsam.Pose2(*tie.T_first_second), noise))
+            graph.add(gtsam.BetweenFactorPose2(tie.first, tie.second, gtsam.Pose2(*tie.pose_first_second), noise))
         return graph
 
     def _optimized(self, graph: Any, poses: FloatArray) -> FloatArray:

@@ -25,7 +25,7 @@ _BLOCK = 50_000  # poses moved at a time: what is needed on the way is ten times
 
 
 class Correction(NamedTuple):
-    """Planar corrections of the odometry: `T_map_odom` (N, 3) at `times_ns` (N,), and the number of closures behind them.
+    """Planar corrections of the odometry: `pose_map_odom` (N, 3) at `times_ns` (N,), and the number of closures behind them.
 
     `end_covariance` (3, 3): of the last key, in its axes, where closures were used; `raised_m` (N,): what the heights change by;
     `left` (N, 2): what a gyroscope leaves of the error of a step's heading: share of its variance, and what adds up with time
@@ -33,7 +33,7 @@ class Correction(NamedTuple):
     """
 
     times_ns: npt.NDArray[np.int64]
-    T_map_odom: FloatArray
+    pose_map_odom: FloatArray
     closures: int
     end_covariance: FloatArray | None = None
     raised_m: FloatArray | None = None
@@ -88,7 +88,7 @@ class Smoother:
     def _believed(self, keys: list[KeyScan], found: list[Closure], refused: list[Refusal]) -> list[Closure]:
         """Return the closures that agree with odometry and each other, and note what speaks for and against each."""
         poses = np.array([key.pose for key in keys]).reshape(-1, 3)
-        ties = [Tie(one.earlier, one.current, one.T_earlier_current, one.covariance) for one in found]
+        ties = [Tie(one.earlier, one.current, one.pose_earlier_current, one.covariance) for one in found]
         judgement = judged(poses, step_covariances(keys, self._settings), ties)
         self.evidence = evidence_of(keys, found, judgement, refused)
         return [closure for closure, kept in zip(found, judgement.kept, strict=True) if kept]
@@ -116,8 +116,8 @@ def _planar(poses: FloatArray, times_ns: npt.NDArray[np.int64], correction: Corr
     span = np.maximum((correction.times_ns[after] - correction.times_ns[at]).astype(float), 1.0)
     share = np.clip((times_ns - correction.times_ns[at]).astype(float) / span, 0.0, 1.0)[:, None]
     planar = poses[:, _PLANAR]
-    return (1.0 - share) * _moved(correction.T_map_odom[at], planar) + share * _moved(
-        correction.T_map_odom[after], planar
+    return (1.0 - share) * _moved(correction.pose_map_odom[at], planar) + share * _moved(
+        correction.pose_map_odom[after], planar
     )
 
 

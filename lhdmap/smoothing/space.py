@@ -94,7 +94,7 @@ def _add(graph: Any, closure: Closure, keys: list[KeyScan], floor: FloatArray) -
     """Add a closure: what the match said in the plane, and how much the floor rises between both places."""
     import gtsam
 
-    x, y, turn = closure.T_earlier_current.tolist()
+    x, y, turn = closure.pose_earlier_current.tolist()
     here, there = floor[closure.earlier], floor[closure.current]
     level = se3.from_rpy(0.0, 0.0, turn, (x, y, _rise_m(keys, floor[:, 0], closure)))
     T = se3.inverse(se3.from_rpy(here[1], here[2], 0.0)) @ level @ se3.from_rpy(there[1], there[2], 0.0)
@@ -142,4 +142,4 @@ def _rise_m(keys: list[KeyScan], heights_m: FloatArray, closure: Closure) -> flo
     if abs(run) < 1.0:
         return 0.0
     slope = float(heights_m[high] - heights_m[low]) / run
-    return slope * float(closure.T_earlier_current[0])
+    return slope * float(closure.pose_earlier_current[0])

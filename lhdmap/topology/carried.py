@@ -11,22 +11,22 @@ from lhdmap.messages import FloatArray
 from lhdmap.topology.model import TopologicalMap
 
 
-def carried(topology: TopologicalMap, T_frame_map: FloatArray) -> TopologicalMap:
-    """Return the map with its places in the frame that `T_frame_map` (4,: x, y, z, yaw) leads to."""
+def carried(topology: TopologicalMap, pose_frame_map: FloatArray) -> TopologicalMap:
+    """Return the map with its places in the frame that `pose_frame_map` (4,: x, y, z, yaw) leads to."""
 
     def points(line: FloatArray) -> FloatArray:
-        return carried_points(line, T_frame_map)
+        return carried_points(line, pose_frame_map)
 
     def pose(one: FloatArray) -> FloatArray:
-        return np.append(points(one[None, :3])[0], math.remainder(one[3] + T_frame_map[3], 2.0 * math.pi))
+        return np.append(points(one[None, :3])[0], math.remainder(one[3] + pose_frame_map[3], 2.0 * math.pi))
 
     return replace(
         topology,
         tunnels=tuple(
-            replace(one, line_m=points(one.line_m), T_map_node=pose(one.T_map_node)) for one in topology.tunnels
+            replace(one, line_m=points(one.line_m), pose_map_node=pose(one.pose_map_node)) for one in topology.tunnels
         ),
         intersections=tuple(
-            replace(one, outline_m=points(one.outline_m), T_map_node=pose(one.T_map_node))
+            replace(one, outline_m=points(one.outline_m), pose_map_node=pose(one.pose_map_node))
             for one in topology.intersections
         ),
         access_points=tuple(replace(one, pose=pose(one.pose)) for one in topology.access_points),
@@ -35,9 +35,9 @@ def carried(topology: TopologicalMap, T_frame_map: FloatArray) -> TopologicalMap
     )
 
 
-def carried_points(points_m: FloatArray, T_frame_map: FloatArray) -> FloatArray:
-    """Return points (N, 2) or (N, 3) in the frame that `T_frame_map` (4,: x, y, z, yaw) leads to."""
-    x, y, z, yaw = T_frame_map.tolist()
+def carried_points(points_m: FloatArray, pose_frame_map: FloatArray) -> FloatArray:
+    """Return points (N, 2) or (N, 3) in the frame that `pose_frame_map` (4,: x, y, z, yaw) leads to."""
+    x, y, z, yaw = pose_frame_map.tolist()
     c, s = math.cos(yaw), math.sin(yaw)
     out = np.array(points_m, dtype=float)
     out[:, 0] = x + c * points_m[:, 0] - s * points_m[:, 1]

@@ -170,7 +170,7 @@ def _renamed(topology: TopologicalMap, rename: Rename) -> TopologicalMap:
 
 def _node_at(topology: TopologicalMap, at_m: tuple[float, float], what: str) -> Tunnel | Intersection:
     places: list[tuple[float, Tunnel | Intersection]] = [
-        (float(np.linalg.norm(node.T_map_node[:2] - at_m)) - 4.0, node) for node in topology.intersections
+        (float(np.linalg.norm(node.pose_map_node[:2] - at_m)) - 4.0, node) for node in topology.intersections
     ]
     places += [(_apart_m(tunnel, at_m), tunnel) for tunnel in topology.tunnels]
     apart, node = min(places, key=lambda place: place[0], default=(math.inf, None))

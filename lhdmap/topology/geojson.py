@@ -120,7 +120,7 @@ def _tunnel(one: Tunnel) -> dict[str, Any]:
             "grade_max_pct": round(one.grade_max_pct, 2),
             "speed_limit_kmh": one.speed_limit_kmh,
             "wall_preference": one.wall_preference,
-            "T_map_node": _pose(one.T_map_node),
+            "T_map_node": _pose(one.pose_map_node),
             "not_distinctive_m": [list(stretch) for stretch in one.not_distinctive_m],
             "ends": list(one.ends),
             "half_widths_m": np.round(one.half_widths_m, 3).tolist(),
@@ -140,7 +140,7 @@ def _intersection(one: Intersection) -> dict[str, Any]:
             "id": one.id,
             "name": one.name,
             "degree": one.degree,
-            "T_map_node": _pose(one.T_map_node),
+            "T_map_node": _pose(one.pose_map_node),
             "level": one.level,
         },
     )

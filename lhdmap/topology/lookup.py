@@ -24,7 +24,7 @@ class Lookup:
             points.append(each_metre(tunnel.line_m))
             owner += [tunnel.id] * len(points[-1])
         for node in topology.intersections:
-            middle = node.T_map_node[:3]
+            middle = node.pose_map_node[:3]
             inner = [middle[None]]
             for point in topology.points_of(node.id):
                 share = np.linspace(0.0, 1.0, _ARMS)[:-1, None]

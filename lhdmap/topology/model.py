@@ -32,8 +32,8 @@ class Tunnel:
     """A way between two ends, each an intersection's id, `dead_end` or `unexplored`.
 
     `line_m` (N, 3): the centre line from the first end to the second, between the access points. `half_widths_m` (N, 2): free
-    room to its left and right. `T_map_node` (4,): the node's frame, at the line's start, x along it. `driven`: whether the machine
-    was in it, or has only seen it. `not_distinctive_m`: stretches [from, to] whose walls do not tell where along it one is.
+    room to its left and right. `pose_map_node` (4,): the node's frame, at the line's start, x along it. `driven`: whether the
+    machine was in it, or has only seen it. `not_distinctive_m`: stretches [from, to] whose walls do not tell where one is.
     """
 
     id: str
@@ -41,7 +41,7 @@ class Tunnel:
     ends: tuple[str, str]
     line_m: FloatArray
     half_widths_m: FloatArray
-    T_map_node: FloatArray
+    pose_map_node: FloatArray
     driven: bool = True
     closed: bool = False
     speed_limit_kmh: float = 12.0
@@ -63,7 +63,7 @@ class Tunnel:
 
 @dataclass(frozen=True, slots=True)
 class Intersection:
-    """A place with three or more arms: `degree` of them. `outline_m` (N, 2): its free space; `T_map_node` (4,) its frame.
+    """A place with three or more arms: `degree` of them. `outline_m` (N, 2): its free space; `pose_map_node` (4,) its frame.
 
     `level`: number or name of the mine's level that it is on.
     """
@@ -71,7 +71,7 @@ class Intersection:
     id: str
     name: str
     degree: int
-    T_map_node: FloatArray
+    pose_map_node: FloatArray
     outline_m: FloatArray
     level: str | int = 0
 

@@ -66,6 +66,10 @@ class TrafficControl:
         front = {self.place(name).section: name for name in self.names}
         return {section: name for name, section in self._behind.items()} | front
 
+    def behind(self, machine: str) -> str:
+        """Return the section that a machine holds behind the one that was granted last; empty: none."""
+        return self._behind.get(machine, "")
+
     def wants(self, machine: str, now_ns: int, section: str = "", *, home: bool = False) -> None:
         """A machine asks to go on: wherever its way leads, or into one section alone; `home`: it has nothing more to load."""
         since = self._waits[machine].since_ns if machine in self._waits else now_ns

@@ -129,8 +129,8 @@ def _changed(old: Tunnel, new: Tunnel) -> dict[str, Any]:
 
 
 def _nearest(node: Intersection, others: tuple[Intersection, ...]) -> Intersection | None:
-    near = [one for one in others if math.dist(one.T_map_node[:3], node.T_map_node[:3]) < _SAME_NODE_M]
-    return min(near, key=lambda one: math.dist(one.T_map_node[:3], node.T_map_node[:3]), default=None)
+    near = [one for one in others if math.dist(one.pose_map_node[:3], node.pose_map_node[:3]) < _SAME_NODE_M]
+    return min(near, key=lambda one: math.dist(one.pose_map_node[:3], node.pose_map_node[:3]), default=None)
 
 
 def _moved(before: tuple[Intersection, ...], after: tuple[Intersection, ...]) -> list[dict[str, Any]]:
@@ -139,7 +139,7 @@ def _moved(before: tuple[Intersection, ...], after: tuple[Intersection, ...]) ->
         old = _nearest(node, before)
         if old is None:
             continue
-        by_m = math.dist(old.T_map_node[:3], node.T_map_node[:3])
+        by_m = math.dist(old.pose_map_node[:3], node.pose_map_node[:3])
         if by_m > _MOVED_M or old.degree != node.degree:
             found.append({"name": node.name, "by_m": round(by_m, 3), "degree": [old.degree, node.degree]})
     return found

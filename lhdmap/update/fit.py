@@ -54,12 +54,12 @@ class Fit(NamedTuple):
     within: int = 0
 
 
-def fitted(known: Seen, drive: Seen, T_map_drive: FloatArray, settings: SmoothingSettings) -> Fit | None:
-    """Return how a drive, about at `T_map_drive` (3,), fits into a map; None where too little of it does."""
+def fitted(known: Seen, drive: Seen, pose_map_drive: FloatArray, settings: SmoothingSettings) -> Fit | None:
+    """Return how a drive, about at `pose_map_drive` (3,), fits into a map; None where too little of it does."""
     keys = _keys(drive.poses)
     planar = drive.poses[:, [0, 1, 3]]
     tree = KDTree(known.poses[:, :2])
-    moved = T_map_drive
+    moved = pose_map_drive
     ties: list[Tie] = []
     raised: list[tuple[int, float]] = []
     within = 0
@@ -75,23 +75,23 @@ def fitted(known: Seen, drive: Seen, T_map_drive: FloatArray, settings: Smoothin
         if tie is None:
             continue
         ties.append(tie._replace(second=number))
-        moved = se2.compose(tie.T_first_second, se2.inverse(planar[row]))
-        nearest = near[np.linalg.norm(known.poses[near, :2] - tie.T_first_second[:2], axis=1).argmin()]
+        moved = se2.compose(tie.pose_first_second, se2.inverse(planar[row]))
+        nearest = near[np.linalg.norm(known.poses[near, :2] - tie.pose_first_second[:2], axis=1).argmin()]
         raised.append((row, float(known.poses[nearest, 2] - drive.poses[row, 2])))
     if len(ties) < 2:
         return None
-    solved = _solved(drive, keys, planar, T_map_drive, ties, raised, settings)
+    solved = _solved(drive, keys, planar, pose_map_drive, ties, raised, settings)
     return None if solved is None else solved._replace(within=within)
 
 
-def share_that_fits(known: Seen, drive: Seen, T_map_drive: FloatArray, settings: SmoothingSettings) -> float:
-    """Return which share of a drive's keys, some of them tried, the map's walls hold where the drive is at `T_map_drive` (3,)."""
+def share_that_fits(known: Seen, drive: Seen, pose_map_drive: FloatArray, settings: SmoothingSettings) -> float:
+    """Return which share of a drive's keys, some tried, the map's walls hold where the drive is at `pose_map_drive` (3,)."""
     keys = _keys(drive.poses)
     tried = keys[:: max(len(keys) // _MOST_TRIED, 1)]
     tree = KDTree(known.poses[:, :2])
     held = 0
     for row in tried:
-        predicted = se2.compose(T_map_drive, drive.poses[row, [0, 1, 3]])
+        predicted = se2.compose(pose_map_drive, drive.poses[row, [0, 1, 3]])
         near = np.array(tree.query_ball_point(predicted[:2], _AROUND_M), dtype=np.int64)
         if len(near) >= _FEWEST_VIEWS:
             held += _tie(known, near, drive.views[row], predicted, _FIRST_REACH, settings) is not None
@@ -137,20 +137,20 @@ def _solved(
     drive: Seen,
     keys: npt.NDArray[np.int64],
     planar: FloatArray,
-    T_map_drive: FloatArray,
+    pose_map_drive: FloatArray,
     ties: list[Tie],
     raised: list[tuple[int, float]],
     settings: SmoothingSettings,
 ) -> Fit | None:
     """Return the drive moved so that the ties that agree hold; the first pose of the graph is the map's origin."""
-    at = np.array([se2.compose(T_map_drive, planar[row]) for row in keys])
+    at = np.array([se2.compose(pose_map_drive, planar[row]) for row in keys])
     graph = np.vstack([np.zeros((1, 3)), at])
     steps = [_UNKNOWN, *(_step(planar[a], planar[b], settings) for a, b in pairwise(keys))]
     judgement = judged(graph, steps, ties)
     if judgement.kept.sum() < 2:
         return None
     kept = [tie for tie, keep in zip(ties, judgement.kept, strict=True) if keep]
-    moves = np.array([se2.compose(tie.T_first_second, se2.inverse(planar[keys[tie.second - 1]])) for tie in kept])
+    moves = np.array([se2.compose(tie.pose_first_second, se2.inverse(planar[keys[tie.second - 1]])) for tie in kept])
     moves[:, 2] = np.unwrap(moves[:, 2])
     times = np.array([drive.views[keys[tie.second - 1]].time_ns for tie in kept], dtype=np.int64)
     rises = np.array([rise for (_, rise), keep in zip(raised, judgement.kept, strict=True) if keep])

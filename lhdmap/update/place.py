@@ -28,12 +28,12 @@ _MOST_PLACES, _LEAST_OF_BEST = 6, 0.4
 
 
 class Placed(NamedTuple):
-    """A place of a drive in a map: `T_map_drive` (3,) and the number of the map's sheet.
+    """A place of a drive in a map: `pose_map_drive` (3,) and the number of the map's sheet.
 
     `score`: share of the drive's walls that are the map's, less what contradicts.
     """
 
-    T_map_drive: FloatArray
+    pose_map_drive: FloatArray
     score: float
     sheet: int
 
@@ -48,16 +48,18 @@ def placings(sheets: list[Sheet], drive: Sheet, start: FloatArray | None = None)
         return []
     centre = walls.mean(axis=0)
     found = [
-        Placed(one.T_map_drive, one.score, number)
+        Placed(one.pose_map_drive, one.score, number)
         for number, sheet in enumerate(sheets)
         for one in WallSearch(sheet).scored(walls, _headings(start), 3)
-        if start is None or _is_near(one.T_map_drive, start)
+        if start is None or _is_near(one.pose_map_drive, start)
     ]
     kept: list[Placed] = []
     for one in sorted(found, key=lambda one: -one.score):
         if one.score < max(_LEAST_SCORE, _LEAST_OF_BEST * kept[0].score if kept else 0.0) or len(kept) == _MOST_PLACES:
             break
-        if not any(one.sheet == better.sheet and _same(one.T_map_drive, better.T_map_drive, centre) for better in kept):
+        if not any(
+            one.sheet == better.sheet and _same(one.pose_map_drive, better.pose_map_drive, centre) for better in kept
+        ):
             kept.append(one)
     return kept
 
@@ -137,9 +139,9 @@ def _moved(pose: FloatArray, point: FloatArray) -> FloatArray:
 
 
 class Candidate(NamedTuple):
-    """A place `T_map_drive` (3,) and its score."""
+    """A place `pose_map_drive` (3,) and its score."""
 
-    T_map_drive: FloatArray
+    pose_map_drive: FloatArray
     score: float
 
 
@@ -155,7 +157,7 @@ class WallSearch:
         centre, kept = walls.mean(axis=0), list[Candidate]()
         found = self.scored(walls, np.arange(0.0, 2.0 * math.pi, step_rad), 2)
         for one in sorted(found, key=lambda one: -one.score):
-            if len(kept) < count and not any(_same(one.T_map_drive, other.T_map_drive, centre) for other in kept):
+            if len(kept) < count and not any(_same(one.pose_map_drive, other.pose_map_drive, centre) for other in kept):
                 kept.append(one)
         return kept
 

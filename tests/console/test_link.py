@@ -5,6 +5,10 @@ from __future__ import annotations
 from lhdmap.console.link import MachineLink
 from lhdmap.console.messages import ANSWER, REARM, STOP, Beat, Command, Outcome, Status, Tick
 from lhdmap.console.settings import ConsoleSettings
+from lhdmap.replay.faults import Faults
+from lhdmap.replay.journal import Journal
+from lhdmap.replay.link import ConsoleRadio, Link, LinkSettings
+from lhdmap.simulation.sensing.faults import FaultSettings
 
 MS = 1_000_000
 ARMED, DISARMED = (Status(0.0, armed, "autonomous", True) for armed in (True, False))
@@ -109,3 +113,33 @@ def test_the_machines_time_waits_for_the_clock_and_does_not_race_after_it() -> N
     for k in range(51, 102):
         rig.link.attend(k * 20 * MS, DISARMED, None)
     assert rig.slept_s - slept_s > 0.45
+
+
+def rig_on(settings: LinkSettings) -> tuple[Rig, Faults]:
+    """Return a rig whose link is that of a scenario."""
+    rig, faults = Rig(), Faults((), Journal())
+    rig.link.crosses(ConsoleRadio(settings, faults, 1, Link(settings, faults, 1)))
+    return rig, faults
+
+
+def test_the_link_of_a_scenario_delays_the_sign_of_life_both_ways() -> None:
+    rig, _ = rig_on(LinkSettings(delay_s=0.05))
+    assert rig.go(2000, DISARMED) + rig.go(4000, ARMED) == []
+    assert 0.05 < rig.link._watch.round_trip_s < 0.15
+    slow, _ = rig_on(LinkSettings(delay_s=0.2))
+    slow.go(2000, DISARMED)
+    ((_, stop),) = slow.go(1000, ARMED)
+    assert stop.cause.startswith(("round trip", "operator's page silent"))
+
+
+def test_a_link_that_a_scenario_loses_stops_an_armed_machine_within_the_limit() -> None:
+    rig, faults = rig_on(LinkSettings(delay_s=0.0))
+    assert rig.go(1000, DISARMED) + rig.go(1000, ARMED) == []
+    lost = faults.inject(FaultSettings(kind="link_lost", target="link"), rig.now_ns)
+    rig.link._heard(Command("1", REARM, by="anna"))
+    ((at_ms, stop),) = rig.go(2000, ARMED)
+    assert 2300 <= at_ms <= 2500
+    assert "silent" in stop.cause
+    faults.active.remove(lost)
+    assert rig.go(1000, DISARMED) == []
+    assert [one.why for one in rig.outcomes] == ["too late: the machine was not ready"]

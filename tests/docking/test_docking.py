@@ -17,8 +17,8 @@ from lhdmap.docking.settings import DockingSettings
 from lhdmap.errors import InputError
 from lhdmap.messages import FloatArray
 from lhdmap.tracking.kernel import moved
-from tools.evaluate.docking import apron, dock_on, docked, rear_of, start_on
 
+from tests.docking.aprons import apron, dock_on, docked, rear_of, start_on
 from tests.tracking.machines import BODIES, LENGTHS, MODELS
 
 SETTINGS = DockingSettings()

@@ -17,7 +17,8 @@ from lhdmap.geometry import se3
 from lhdmap.machine import Machine, machine_toml
 from lhdmap.simulation.drive import SimulatedDrive
 from lhdmap.trajectory import Trajectory, read_tum
-from tools.evaluate.integration import distances_to_mesh, in_truth_frame
+
+from tests.integration.truth import distances_to_mesh, in_truth_frame
 
 
 def test_the_trajectory_is_that_of_the_drive(built: lhdmap.Map, drive: SimulatedDrive) -> None:

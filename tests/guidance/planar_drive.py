@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import math
 import time
+from collections.abc import Iterator
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 from lhdmap.driving.kernel import stepped
@@ -76,7 +78,7 @@ class Truth:
         self.state = np.array(stepped(state, self.speed, rate, 0.01, model.front_m, model.rear_m, lag))
 
 
-def drive(
+def driving(
     line: FloatArray,
     walls: FloatArray,
     gear: int = 1,
@@ -90,8 +92,11 @@ def drive(
     short_m: float = 5.0,
     until_m: float = math.inf,
     route: FloatArray | float = 1.0,
-) -> Drive:
-    """Drive a line from near its start to a stop before its end; in reverse the rear axle goes first. `route`: its weights."""
+) -> Iterator[Drive]:
+    """Drive a line from near its start to a stop before its end; in reverse the rear axle goes first. `route`: its weights.
+
+    Yields what has come of it so far, each 0.1 s.
+    """
     used, model = settings or GuidanceSettings(), drive_model(MACHINE, load_kg)
     guidance = Guidance(model, BODIES, EYES_M, used, method_of(used))
     lead = lead_of(gear, model, BODIES)
@@ -103,6 +108,7 @@ def drive(
     truth, rng = Truth(np.array([*base, 0.0, 0.0]), model, errors), np.random.default_rng(errors.seed)
     now, out = 0, Drive()
     queue: Setpoints = ()
+    out.commands = truth.sent
     while now < seconds * _SECOND_NS and not out.arrived and not out.contact:
         if now % PERIOD_NS == 0:
             motion = _measured(now, truth, errors, rng)
@@ -121,9 +127,16 @@ def drive(
             leading = lead.state(_motion(now, truth))
             out.left_m.append(directive.stop_m - _along(path, leading[0], leading[1]))
             out.arrived = out.left_m[-1] < 0.3 and abs(truth.speed) < 0.03
+            yield out
             if out.left_m[-1] < directive.stop_m - until_m:
                 break
-    out.commands = truth.sent
+
+
+def drive(line: FloatArray, walls: FloatArray, gear: int = 1, **how: Any) -> Drive:
+    """Drive to the end (`driving`)."""
+    out = Drive()
+    for out in driving(line, walls, gear, **how):  # noqa: B007  # the last one is wanted
+        pass
     return out
 
 

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from lhdmap.guidance.settings import GuidanceSettings
 from lhdmap.messages import FloatArray
-from tools.evaluate.guidance import CLASSES, row_of
 
+from tests.guidance.drawn_drives import CLASSES, row_of
 from tests.guidance.planar_drive import Drive, Errors, drive
 from tests.guidance.tunnels import MODEL, bend_line, narrow, walls_beside
 

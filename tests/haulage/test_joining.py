@@ -61,6 +61,25 @@ def test_the_arm_of_a_change_of_gear_is_held_with_its_intersection(topology: Top
     assert {node: name for node, name in held.items() if "+" not in name}.keys() == set(held) - {"I1"}
 
 
+def test_a_stub_in_which_machines_turn_may_be_entered_with_its_intersection(
+    topology: TopologicalMap, layout: Layout
+) -> None:
+    """No way of the map leads through it, so that no edge tells it."""
+    turns = leg(["T1.2", "I1"], [""] * 1 + ["I1.T1.1.1"], inversion=True)
+    errands = {"lhd1": ERRANDS["lhd1"]}
+    drives: Drives = dict.fromkeys(ways_of(errands["lhd1"]), ()) | {("DP1", "OP1"): [turns]}
+    fleet = Fleet(with_sections(layout, topology, errands, drives, 0.0), errands)
+    now_ns = 0
+    for section in ("T1.3", "T1.5"):
+        assert section not in fleet.nodes_of("lhd1")
+    while "I1" not in fleet.nodes_of("lhd1") and now_ns < 50:
+        now_ns += 1
+        fleet.control.left("lhd1")
+        fleet.control.wants("lhd1", now_ns)
+        fleet.control.step(now_ns)
+    assert {"I1", "T1.1"} <= fleet.nodes_of("lhd1")
+
+
 def test_each_section_between_two_others_has_room_for_a_machine(topology: TopologicalMap, layout: Layout) -> None:
     made = with_sections(layout, topology, ERRANDS, no_turns(), LEAST_M)
     for start, goal in no_turns():

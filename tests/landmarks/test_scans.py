@@ -52,7 +52,7 @@ def test_the_scan_nearest_to_each_spacing_is_taken() -> None:
 
 def test_poses_are_in_the_nodes_frame() -> None:
     cloud = along_tunnel([scan(0.0), scan(2.0)], FRAME, SETTINGS)[1]
-    assert cloud.T_node_base == pytest.approx([2.0, 0.2, 0.1])
+    assert cloud.pose_node_base == pytest.approx([2.0, 0.2, 0.1])
 
 
 def test_far_points_are_left_out_about_the_machines_centre() -> None:
@@ -67,11 +67,11 @@ def test_an_intersection_is_one_cloud_in_its_frame() -> None:
     scans = []
     for at in (0.0, 1.0):
         one = scan(at, node="x")
-        T = se2.between(FRAME[[0, 1, 3]], one.T_map_base)
+        T = se2.between(FRAME[[0, 1, 3]], one.pose_map_base)
         scans.append(one._replace(points_m=se2.transform(se2.inverse(T), post_node)))
     cloud = of_intersection(scans, FRAME, SETTINGS)
     assert cloud.points_m == pytest.approx(post_node, abs=1e-9)
-    assert cloud.T_node_base == pytest.approx([0.0, 0.0, 0.0])
+    assert cloud.pose_node_base == pytest.approx([0.0, 0.0, 0.0])
 
 
 def test_hits_that_are_no_numbers_are_left_out() -> None:
@@ -82,10 +82,10 @@ def test_hits_that_are_no_numbers_are_left_out() -> None:
 @pytest.mark.parametrize(
     ("wrong", "told"),
     [
-        (scan(0.0)._replace(T_map_base=np.array([np.nan, 0.0, 0.0])), "not a number"),
+        (scan(0.0)._replace(pose_map_base=np.array([np.nan, 0.0, 0.0])), "not a number"),
         (scan(np.nan), "not a number"),
         (scan(0.0, np.zeros((3, 3))), r"\(N, 2\)"),
-        (scan(0.0)._replace(T_map_base=np.zeros(4)), r"\(3,\)"),
+        (scan(0.0)._replace(pose_map_base=np.zeros(4)), r"\(3,\)"),
         (scan(0.0, node="elsewhere"), "no frame"),
     ],
 )

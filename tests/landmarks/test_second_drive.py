@@ -35,7 +35,7 @@ def test_what_is_within_a_radius_is_found_by_another_drive(name: str, request: p
     for j in np.flatnonzero(made.radius > 0).tolist():
         target = prepare(made.cloud(j).astype(np.float64), model)
         for i in range(max(j - made.radius[j], 0), min(j + made.radius[j] + 1, len(other))):
-            true = se2.between(made.poses_node[j], other[i].T_node_base)
+            true = se2.between(made.poses_node[j], other[i].pose_node_base)
             found = align(target, other[i].points_m, true + np.array([0.3, 0.1, 0.01]), model)
             error = se2.between(true, found.pose)
             assert math.hypot(error[0], error[1]) <= 0.10
@@ -61,7 +61,7 @@ def test_the_matrix_is_the_fitness_of_source_on_target(rough: Taught) -> None:
     clouds, model = clouds_of(rough), icp_model(SETTINGS)
     F = rough.landmarks.similarity["t"]
     for i, j in ((3, 4), (4, 3), (10, 9)):
-        known = se2.between(clouds[j].T_node_base, clouds[i].T_node_base)
+        known = se2.between(clouds[j].pose_node_base, clouds[i].pose_node_base)
         expected = align(prepare(clouds[j].points_m, model), clouds[i].points_m, known, model).fitness
         assert F[i, j] == pytest.approx(expected, rel=1e-5)
     assert not np.diag(F).any()

@@ -34,7 +34,7 @@ class TunnelWorld:
         return np.array([x - lateral_m * math.sin(h), y + lateral_m * math.cos(h), h + turn_rad])
 
     def frame(self) -> FloatArray:
-        """Return T_map_node (4,): at the tunnel's start, x along it."""
+        """Return pose_map_node (4,): at the tunnel's start, x along it."""
         x, y, h = self.pose(0.0)
         return np.array([x, y, 0.0, h])
 
@@ -103,12 +103,12 @@ def _niches(rng: np.random.Generator, n: int) -> FloatArray:
     return depth
 
 
-def seen(world: TunnelWorld, T_map_base: FloatArray, rng: np.random.Generator, range_m: float = 30.0) -> FloatArray:
+def seen(world: TunnelWorld, pose_map_base: FloatArray, rng: np.random.Generator, range_m: float = 30.0) -> FloatArray:
     """Return the hits (N, 2) of both scanners in the base frame: 190 degrees, a beam each half degree, 12 mm of noise."""
     angles = np.radians(np.arange(-95.0, 95.01, 0.5))
     parts = []
     for mount in SCANNERS:
-        at = se2.compose(T_map_base, mount)
+        at = se2.compose(pose_map_base, mount)
         ranges = np.full(angles.size, np.inf)
         _rasterise(world.segments_m, at, angles[0], angles[1] - angles[0], range_m, ranges)
         hit = np.isfinite(ranges)

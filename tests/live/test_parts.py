@@ -5,16 +5,21 @@ from __future__ import annotations
 import threading
 import time
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
+from lhdmap.config import Settings
 from lhdmap.live.inbox import Inbox
 from lhdmap.live.latency import Latency
 from lhdmap.live.link import Link
 from lhdmap.live.recorder import LiveRecorder
 from lhdmap.live.source import Announced, LinkLost, LiveMessage, Sink
 from lhdmap.live.tally import MessageTally
+from lhdmap.live.warm_up import warm_up
 from lhdmap.logs.formats import open_log
+from lhdmap.odometry.anchored import rear_view
+from lhdmap.scan_matching import submap
 
 from tests.live.peers import messages_of
 
@@ -155,3 +160,21 @@ def test_what_ends_a_source_is_raised_where_its_messages_are_read(tmp_path: Path
     with pytest.raises(ValueError, match="a fault"):
         inbox.get(5.0)
     link.close()
+
+
+def test_the_warm_up_runs_the_kernels_that_a_link_that_breaks_needs(monkeypatch: pytest.MonkeyPatch) -> None:
+    ran = list[str]()
+
+    def counted(module: Any, name: str) -> None:
+        kernel = getattr(module, name)
+
+        def run(*arguments: Any, **more: Any) -> Any:
+            ran.append(name)
+            return kernel(*arguments, **more)
+
+        monkeypatch.setattr(module, name, run)
+
+    counted(submap, "search")
+    counted(rear_view, "_joint_equation")
+    warm_up(Settings(), None)
+    assert set(ran) == {"search", "_joint_equation"}

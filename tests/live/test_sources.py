@@ -91,9 +91,16 @@ def test_a_file_that_is_none_is_refused(tmp_path: Path) -> None:
         McapFollow(tmp_path / "a.mcap", quiet_s=0.1).run(Caught(), threading.Event())
 
 
-def test_a_file_that_does_not_appear(tmp_path: Path) -> None:
+def test_a_file_that_does_not_appear_is_waited_for_aloud(tmp_path: Path) -> None:
+    caught = Caught()
     with pytest.raises(InputError, match="no such file"):
-        McapFollow(tmp_path / "a.mcap", quiet_s=0.1).run(Caught(), threading.Event())
+        McapFollow(tmp_path / "a.mcap", quiet_s=0.1).run(caught, threading.Event())
+    assert "a.mcap: not there yet; waiting for it" in caught.said[0]
+
+
+def test_a_file_in_a_folder_that_is_not_there_is_refused_at_once(tmp_path: Path) -> None:
+    with pytest.raises(UsageError, match="there is no folder"):
+        source_of(str(tmp_path / "drvies" / "a.mcap"))
 
 
 def test_a_bridge_sends_what_it_was_asked_for() -> None:

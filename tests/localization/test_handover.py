@@ -68,7 +68,7 @@ def parted_map() -> KnownMap:
         for y in range(-20, 20)
     ]
     nodes: list[Tunnel | Intersection] = [*tunnels, node]
-    frames = {one.id: one.T_map_node for one in nodes}
+    frames = {one.id: one.pose_map_node for one in nodes}
     landmarks = landmarks_of(scans, frames, {"a", "b", "up"}, LandmarkSettings())
     return KnownMap(topology, landmarks, known.known_map().sheets)
 

@@ -47,7 +47,7 @@ def test_beyond_a_tunnels_ends_it_goes_on() -> None:
 
 
 def test_in_an_intersection_it_is_the_nodes_frame() -> None:
-    turned = replace(intersection("I1", 10.0, 20.0, 3), T_map_node=pose(10.0, 20.0, 90.0))
+    turned = replace(intersection("I1", 10.0, 20.0, 3), pose_map_node=pose(10.0, 20.0, 90.0))
     place = Placer(TopologicalMap(intersections=(turned,))).at(at(9.0, 22.0, 120.0), 0.0, 1.0)
     assert place.node == "i1"
     assert (place.rho_m, place.lateral_m, place.heading_rad) == pytest.approx((2.0, 1.0, math.radians(30.0)))
@@ -99,7 +99,7 @@ def two_levels() -> TopologicalMap:
     tunnels = [
         replace(
             tunnel(name, (DEAD_END, DEAD_END), straight(pose(0.0, 0.0, 0.0, z), pose(30.0, 0.0, 0.0, z))),
-            T_map_node=pose(0.0, 0.0, 0.0, z),
+            pose_map_node=pose(0.0, 0.0, 0.0, z),
         )
         for name, z in (("Low", 0.0), ("High", 8.0))
     ]

@@ -32,9 +32,9 @@ def walls_of(worlds: Mapping[str, tuple[TunnelWorld, float]]) -> MapWalls:
         frame = world.frame() + np.array([0.0, 0.0, height_m, 0.0])
         line = np.array([[*world.pose(at)[:2], height_m] for at in np.arange(0.0, world.length_m + 0.1)])
         tunnels.append(Tunnel(name, name, (DEAD_END, DEAD_END), line, np.full((len(line), 2), 2.2), frame))
-        T_node_map = se2.inverse(frame[[0, 1, 3]])
+        pose_node_map = se2.inverse(frame[[0, 1, 3]])
         placed = [
-            se2.transform(se2.compose(T_node_map, scan.T_map_base), near(scan.points_m))
+            se2.transform(se2.compose(pose_node_map, scan.pose_map_base), near(scan.points_m))
             for scan in drive(world, 1, every_m=0.5)
         ]
         surfaces[name] = NodeSurface(fused(placed, CELL_M), UNMEASURED, None)
@@ -66,10 +66,10 @@ def winding_walls(windings: Sequence[tuple[TunnelWorld, float]], *, told: bool =
     `told`: whether the map tells the heights of its walls, as older ones do not.
     """
     frame, placed, heights, line = windings[0][0].frame(), list[FloatArray](), list[float](), list[FloatArray]()
-    T_node_map = se2.inverse(frame[[0, 1, 3]])
+    pose_node_map = se2.inverse(frame[[0, 1, 3]])
     for world, height_m in windings:
         scans = drive(world, 1, every_m=0.5)
-        placed += [se2.transform(se2.compose(T_node_map, one.T_map_base), near(one.points_m)) for one in scans]
+        placed += [se2.transform(se2.compose(pose_node_map, one.pose_map_base), near(one.points_m)) for one in scans]
         heights += [height_m] * len(scans)
         line += [np.array([*world.pose(at)[:2], height_m]) for at in np.arange(0.0, world.length_m + 0.1)]
     one = Tunnel("w", "W", (DEAD_END, DEAD_END), np.array(line), np.full((len(line), 2), 2.2), frame)

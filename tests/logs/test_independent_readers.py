@@ -13,7 +13,8 @@ from lhdmap.messages import GroundTruth, LaserScan, WheelPose
 from mcap.reader import make_reader
 from mcap_ros2.decoder import DecoderFactory
 from rosbags.highlevel import AnyReader
-from tools.fuzz_logs import sample_messages
+
+from tests.logs.small_logs import sample_messages
 
 
 def _stamp(message: Any) -> int:

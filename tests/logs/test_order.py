@@ -13,7 +13,8 @@ from lhdmap.logs.blocks import ChunkBlock, Loaded, in_time_order
 from lhdmap.logs.ros_messages import definition, serialized
 from lhdmap.messages import Tachometer, Text
 from mcap.writer import CompressionType, IndexType, Writer
-from tools.fuzz_logs import write_bag
+
+from tests.logs.small_logs import write_bag
 
 KIND = "geometry_msgs/msg/TwistStamped"
 

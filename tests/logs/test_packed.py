@@ -19,7 +19,8 @@ from lhdmap.errors import InputError
 from lhdmap.logs import LogSource, open_log
 from lhdmap.logs.doctor.health import LogVerdict, examine
 from mcap.writer import CompressionType
-from tools.fuzz_logs import write_bag, write_db3, write_mcap
+
+from tests.logs.small_logs import write_bag, write_db3, write_mcap
 
 PACKERS: dict[str, Callable[[bytes], bytes]] = {
     ".zst": zstandard.compress,

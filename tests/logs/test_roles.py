@@ -16,7 +16,8 @@ from lhdmap.logs.topics import assign_topics
 from lhdmap.logs.writer import LogWriter
 from lhdmap.messages import Command, LaserScan, Message, Pressure, Tachometer, Text
 from lhdmap.roles import PRESSURE, ROLES, SCAN, TEXT, TYPE_OF, read_by, recorded
-from tools.fuzz_logs import sample_messages
+
+from tests.logs.small_logs import sample_messages
 
 # docs: the contract's table of topics
 CONTRACT = {

@@ -23,7 +23,8 @@ from rosbags.rosbag1 import Writer as BagWriter
 from rosbags.rosbag2 import StoragePlugin
 from rosbags.rosbag2 import Writer as Bag2Writer
 from rosbags.typesys import Stores, get_typestore
-from tools.fuzz_logs import write_carmen
+
+from tests.logs.small_logs import write_carmen
 
 COUNT, CUTS = 60, 200
 TOPIC, KIND = "/lidar/front/scan", "sensor_msgs/msg/LaserScan"

@@ -20,7 +20,8 @@ from mcap.writer import Writer
 from rosbags.rosbag2 import StoragePlugin
 from rosbags.rosbag2 import Writer as Bag2Writer
 from rosbags.typesys import Stores, get_typestore
-from tools.fuzz_logs import sample_messages, write_db3
+
+from tests.logs.small_logs import sample_messages, write_db3
 
 SECOND = 10**9
 START = 1_712_345_678_123_456_789

@@ -14,7 +14,7 @@ from lhdmap.mine.plan import find_plan, load_plan
 from lhdmap.mine.route import Start, parse_route, start_of
 from lhdmap.mine.routes import RouteFinder
 from lhdmap.mine.runs import Run
-from lhdmap.mine.stands import overhang_m
+from lhdmap.mine.stands import overhang_m, stand_at
 from lhdmap.mine.ways import STEP_M, Leg, legs_of
 
 from tests.mine.plans import TEE, lines, network_of
@@ -114,6 +114,17 @@ def test_a_teaching_drive_that_ends_at_a_node_has_no_bumper_in_the_wall_ahead(na
     nose_m = np.array([leg.x_m[-1], leg.y_m[-1]]) + ahead
     places_m = tube.line.at(np.arange(0.0, tube.length_m, 0.1))[:, :2]
     assert np.hypot(*(places_m - nose_m).T).min() < tube.half_width_m(tube.length_m)
+
+
+def test_a_teaching_drive_comes_to_each_draw_point_and_dump_bucket_first() -> None:
+    """Into the short drift of DP2 of `branches` it could back to turn: it would never stand where machines load."""
+    network = make_network(load_plan(find_plan("branches")))
+    runs = RouteFinder(network, MACHINE).teaching(start_of(network, MACHINE, None))
+    for place in network.plan.places:
+        if place.kind in ("draw_point", "dump"):
+            tube, at_m, facing = stand_at(network, place, MACHINE)
+            ends = [run for run in runs if run.tube == tube and abs(run.to_m - at_m) < 0.1]
+            assert any(run.gear > 0 and (run.to_m - run.from_m) * facing > 0.0 for run in ends), place.name
 
 
 @pytest.mark.parametrize(("route", "start"), [("S1,DP1,-S1,OP1", None), ("-S1,OP1,-W,S2,TB1,-S2,DP9", "DP3")])

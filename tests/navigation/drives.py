@@ -88,8 +88,8 @@ class Rod:
         if directive is None:
             return
         path, gear = directive.path, directive.gear
-        T_map_odom = self.located()
-        lead = se2.compose(T_map_odom.pose_odom, np.array([-MODEL.wheelbase_m if gear < 0 else 0.0, 0.0, 0.0]))
+        pose_map_odom = self.located()
+        lead = se2.compose(pose_map_odom.pose_odom, np.array([-MODEL.wheelbase_m if gear < 0 else 0.0, 0.0, 0.0]))
         near = int(np.hypot(path[:, 0] - lead[0], path[:, 1] - lead[1]).argmin())
         at = path[near, 5] + float((lead[:2] - path[near, :2]) @ [math.cos(path[near, 2]), math.sin(path[near, 2])])
         wanted = min(at + min(path[near, 3], 2.0) * STEP_S, directive.stop_m)

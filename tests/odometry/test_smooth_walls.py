@@ -36,7 +36,7 @@ def _length_m(poses: FloatArray) -> float:
 
 def test_the_speed_does_not_creep_towards_standing_still() -> None:
     """It was 1.2 % too slow on the median of 30 drives, while lines were fitted once a scan."""
-    errors = [scale_error_pct(seed) for seed in (401, 402, 403, 404, 405)]
+    errors = [scale_error_pct(seed) for seed in (401, 402, 403)]
     assert abs(float(np.median(errors))) < 0.4
     assert max(map(abs, errors)) < 1.0
 
@@ -48,7 +48,7 @@ def begun(velocity: FloatArray | None) -> PlanarOdometry:
 @pytest.mark.parametrize(("speed_mps", "rate_hz"), [(12.0 / 3.6, 25.0), (12.0 / 3.6, 50.0), (24.0 / 3.6, 25.0)])
 def test_the_first_scans_tell_the_speed_of_a_machine_that_drives_already(speed_mps: float, rate_hz: float) -> None:
     """A map of a few scans held any speed fast, zero before all: one drive in ten was taken to stand for its first 10 s."""
-    for seed in range(411, 415):
+    for seed in (411, 412):
         world = drift_world(seed, rms_m=0.005)
         poses = drive_along(world.centre_line_m, speed_mps, rate_hz)[:WARM_SCANS]
         scans = simulate_scans(world, poses, PlanarScanner(noise_m=0.012), rate_hz, seed)
@@ -152,7 +152,7 @@ STRAIGHT = (
 @pytest.mark.parametrize("kind", STRAIGHT)
 def test_straight_smooth_drifts_are_measured(kind: Straight) -> None:
     """Of 18 such drives the worst ended 0.33 m off, the worst segment of 10 m was 2.8 % off."""
-    for seed in (501, 502, 503):
+    for seed in (501, 502):
         driven = straight_drive(kind, seed)
         assert np.mean([step.degenerate for step in driven.steps if step.processed]) > 0.5
         unseen = np.mean([step.unseen for step in driven.steps if step.processed])

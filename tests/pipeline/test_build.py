@@ -21,7 +21,8 @@ from lhdmap.pipeline.inputs import ROLES_READ
 from lhdmap.provenance import sha256_of
 from lhdmap.simulation.drive import SimulatedDrive
 from lhdmap.trajectory import read_tum
-from tools.evaluate.integration import distances_to_mesh, in_truth_frame
+
+from tests.integration.truth import distances_to_mesh, in_truth_frame
 
 FILES = {
     "map.json",

@@ -53,7 +53,7 @@ def test_the_map_is_of_both(joined: Path) -> None:
     topology = read_topology(joined)
     (node,) = topology.intersections
     assert node.degree == 3
-    assert node.T_map_node[:2] == pytest.approx([BRANCH_M - 0.5, 0.0], abs=0.6)
+    assert node.pose_map_node[:2] == pytest.approx([BRANCH_M - 0.5, 0.0], abs=0.6)
     assert min(tunnel.line_m[:, 1].min() for tunnel in topology.tunnels) < -0.6 * DEEP_M
     assert topology.version == 1
 

@@ -8,12 +8,15 @@ from typing import Any
 
 import numpy as np
 import pytest
+from lhdmap.driving.bodies import bodies_of
 from lhdmap.haulage.mission_io import Buckets, MissionInput, MissionOutput
 from lhdmap.haulage.records import Cycle, Interval, Phase
 from lhdmap.haulage.states import Event, State
 from lhdmap.loading.states import State as Loading
+from lhdmap.machine import Machine
 from lhdmap.messages import Joints, Text
 from lhdmap.navigation.along import Located
+from lhdmap.navigation.presence import Presence
 from lhdmap.navigation.progress import Allowed
 from lhdmap.replay.journal import Event as Line
 from lhdmap.replay.journal import Journal
@@ -33,7 +36,7 @@ from lhdmap.replay.process import (
     Process,
     Received,
 )
-from lhdmap.replay.processes.executive import Executive
+from lhdmap.replay.processes.executive import Executive, SharedMap
 from lhdmap.replay.processes.feed import JOINTS
 from lhdmap.replay.processes.ordered import OrderedNavigation, straight_left_m
 from lhdmap.replay.processes.site_executive import SiteExecutive
@@ -236,22 +239,35 @@ def test_the_station_stops_answers_and_ends(underground: Bench) -> None:
     assert (underground.heard.estop, underground.heard.abort) == (False, True)
 
 
+def among_others(task: Scripted, free: set[str]) -> Bench:
+    """Return the executive of a machine that shares the map with others, and may be in some nodes."""
+    machine, topology = Machine(), map_of_plan("cycle")
+    shares = SharedMap(lambda: frozenset(free), Presence(topology, bodies_of(machine), machine))
+    return Bench(Executive(task, [], topology, 10.0, Journal().of("mission"), shares=shares), task, [])
+
+
 def test_a_machine_among_others_is_told_where_it_may_be() -> None:
     task = Scripted(TO_LOAD)
-    made = Executive(
-        task, [], map_of_plan("cycle"), 10.0, Journal().of("mission"), free=lambda: frozenset({"T1.1", "I1"})
-    )
-    orders = Bench(made, task, []).orders(TO_LOAD, (LOCATED, located()), (MACHINE_SAYS, HEALTH))
+    orders = among_others(task, {"T1.1", "I1"}).orders(TO_LOAD, (LOCATED, located()), (MACHINE_SAYS, HEALTH))
     assert orders.free == frozenset({"T1.1", "I1"})
 
 
 @pytest.mark.parametrize(("its_own", "begun"), [({"T1.1"}, 0), ({"T1.1", "I1", "T1.2"}, 1)])
 def test_loading_is_not_begun_before_the_draw_point_is_its_own(its_own: set[str], begun: int) -> None:
-    task, topology = Scripted(TO_LOAD), map_of_plan("cycle")
-    made = Executive(task, [], topology, 10.0, Journal().of("mission"), free=lambda: frozenset(its_own))
-    bench = Bench(made, task, [])
+    bench = among_others(Scripted(TO_LOAD), its_own)
     number = bench.orders(TO_LOAD, (LOCATED, located()), (MACHINE_SAYS, HEALTH)).number
     assert bench.orders(TO_LOAD, navigating(number, 20.0)).loading == begun
+
+
+@pytest.mark.parametrize(("x_m", "said"), [(20.0, "driving"), (45.0, "arrived")])
+def test_a_machine_among_others_is_at_its_draw_point_by_its_place_not_by_who_drives_it(x_m: float, said: str) -> None:
+    """The loading task takes the machine over some way before; sections are given back by where it truly is."""
+    bench = among_others(Scripted(TO_LOAD), {"T1.1", "I1", "T1.2"})
+    number = bench.orders(TO_LOAD, (LOCATED, located(5.0)), (MACHINE_SAYS, HEALTH)).number
+    task = bench.orders(TO_LOAD, navigating(number, 20.0)).loading
+    bench.turn(TO_LOAD, loading(task, Loading.POSITIONING), (LOCATED, located(x_m)))
+    assert (bench.heard.navigation.state, bench.heard.navigation.goal) == (said, "DP1")
+    assert ("T1.2" in bench.heard.inside) is (said == "arrived")
 
 
 @pytest.mark.parametrize("bench", ["underground", "surface"])

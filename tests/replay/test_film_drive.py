@@ -98,9 +98,9 @@ def _driven(error_m: float = 0.0, seconds: float = 4.0) -> tuple[DriveFilm, list
             off = error_m if t > 0.5 * seconds else 0.0
             place = np.array([2.0 * t, off, 0.0])
             film.take(LOCATED, Located(now_ns, "tracking", place, odom, np.eye(3) * 1e-4, 0.0))
-            T_odom_map = se2.compose(odom, se2.inverse(place))
+            pose_odom_map = se2.compose(odom, se2.inverse(place))
             moved = path_map.copy()
-            moved[:, :2] = se2.transform(T_odom_map, path_map[:, :2])
+            moved[:, :2] = se2.transform(pose_odom_map, path_map[:, :2])
             film.take(DIRECTIVE, Asked(now_ns, Directive(now_ns, 1, moved, 40.0), "driving"))
             film.take(PLAN, _plan(now_ns, odom))
             way = film.look(now_ns, 0.0)

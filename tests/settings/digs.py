@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
+from collections.abc import Iterator
 from typing import Any
 
 from lhdmap.config import Settings
@@ -31,36 +32,38 @@ _PILES = (
 )
 
 
-def charges(settings: Settings, detector: str = "") -> list[Any]:
-    """Return what is asked for while charging: plain, over a bump, on ice, into nothing, into a wall."""
-    return [[run(Charge(settings.charging, detector), Loader(world), 9.0)[1]] for world in _WORLDS]
+def charges(settings: Settings, detector: str = "") -> Iterator[Any]:
+    """Yield what is asked for while charging: plain, over a bump, on ice, into nothing, into a wall."""
+    for world in _WORLDS:
+        yield run(Charge(settings.charging, detector), Loader(world), 9.0)[1]
 
 
-def digs(settings: Settings, method: str = "") -> list[Any]:
-    """Return what is asked for in piles: soft, hard, slippery, next to none; and before a wall that holds the bucket."""
+def digs(settings: Settings, method: str = "") -> Iterator[Any]:
+    """Yield what is asked for in piles: soft, hard, slippery, next to none; and before a wall that holds the bucket."""
     sections = DigSettings(settings.excavation, settings.excavation_paper, settings.excavation_tuned)
-    found = [run(excavation_of(sections, method), Loader(world, speed_mps=0.8), 15.0)[1] for world in _PILES]
+    for world in _PILES:
+        yield run(excavation_of(sections, method), Loader(world, speed_mps=0.8), 15.0)[1]
     wall = World(toe_m=0.2, hardness_kn=2000.0, grip_kn=500.0)
-    return [*found, run(excavation_of(sections, method), Loader(wall, way_m=0.6), 6.0)[1]]
+    yield run(excavation_of(sections, method), Loader(wall, way_m=0.6), 6.0)[1]
 
 
-def weighings(settings: Settings) -> list[Any]:
-    """Return shakes and weighings of two buckets, one of which never comes to rest."""
+def weighings(settings: Settings) -> Iterator[Any]:
+    """Yield shakes and weighings of two buckets, one of which never comes to rest."""
 
     class Restless(Loader):
         def lift_bar(self) -> float:
             return 90.0 + 9.0 * math.sin(7.0 * self.now_ns * 1e-9)
 
-    found: list[Any] = []
     for loader in (Loader(World(fill=0.8, noise=1.0), boom_rad=0.3), Restless(World(fill=0.8), boom_rad=-0.3)):
         loader.bucket_rad = -0.8
         shaken = run(Shake(settings.weighing, settings.excavation), loader, 20.0)[1]
-        found.append([shaken, run(Weighing(settings.weighing), loader, 40.0)[1]])
-    return found
+        yield shaken
+        yield run(Weighing(settings.weighing), loader, 40.0)[1]
 
 
-def decisions(settings: Settings) -> list[Any]:
-    """Return what the rule says of fills after each attempt."""
+def decisions(settings: Settings) -> Iterator[Any]:
+    """Yield what the rule says of fills after each attempt."""
     rule = Attempts(settings.attempts, 11.0)
     fills = [0.1 * k for k in range(13)]
-    return [rule.decide(fill, 0.03, attempt) for fill, attempt in itertools.product(fills, range(1, 9))]
+    for fill, attempt in itertools.product(fills, range(1, 9)):
+        yield rule.decide(fill, 0.03, attempt)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from dataclasses import replace
 from typing import Any
 
@@ -21,21 +22,28 @@ from lhdmap.navigation.control import NavigationControl
 from lhdmap.navigation.room import with_room
 from lhdmap.topology.model import TopologicalMap
 
-from tests.guidance.planar_drive import Errors, drive
+from tests.guidance.planar_drive import Drive, Errors, driving
 from tests.guidance.tunnels import BODIES, MODEL, narrow
 from tests.movement.mines import fast_ladder
 
 _SECONDS = 7.0
 
 
-def plans(settings: GuidanceSettings) -> list[Any]:
-    """Return what is commanded in a narrow bend, from standstill, with an error in the joint."""
+def _told(drive: Iterator[Drive]) -> Iterator[Any]:
+    """Yield commands and states each 0.1 s."""
+    known = 0
+    for out in drive:
+        yield out.commands[known:], out.states[-1][:4]
+        known = len(out.commands)
+
+
+def plans(settings: GuidanceSettings) -> Iterator[Any]:
+    """Yield what is commanded in a narrow bend, from standstill, with an error in the joint."""
     line, walls = narrow(6.0, 70.0, 0.18, 3)
-    out = drive(
-        line, walls, settings=settings, seconds=_SECONDS, begin_m=17.0, limit_mps=4.0,
-        errors=Errors(bend_offset_rad=math.radians(0.5), route_m=0.1),
-    )  # fmt: skip
-    return [out.commands, [one[:4] for one in out.states]]
+    errors = Errors(bend_offset_rad=math.radians(0.5), route_m=0.1)
+    yield from _told(
+        driving(line, walls, settings=settings, seconds=_SECONDS, begin_m=17.0, limit_mps=4.0, errors=errors)
+    )
 
 
 def remembered(settings: GuidanceSettings) -> list[Any]:
@@ -47,20 +55,22 @@ def remembered(settings: GuidanceSettings) -> list[Any]:
     return kept
 
 
-def stops(settings: GuidanceSettings) -> list[Any]:
-    """Return what is commanded on a short straight, fast, to its stop."""
+def stops(settings: GuidanceSettings) -> Iterator[Any]:
+    """Yield what is commanded on a short straight, fast, to its stop."""
     line, walls = narrow(30.0, 10.0, 1.5, 3)
-    out = drive(line, walls, settings=settings, seconds=9.0, begin_m=12.0, short_m=24.0, limit_mps=MODEL.top_speed_mps)
-    return [out.commands]
+    fast_mps = MODEL.top_speed_mps
+    yield from _told(
+        driving(line, walls, settings=settings, seconds=9.0, begin_m=12.0, short_m=24.0, limit_mps=fast_mps)
+    )
 
 
-def barred(settings: GuidanceSettings) -> list[Any]:
-    """Return what is commanded where something stands in the middle of a straight."""
+def barred(settings: GuidanceSettings) -> Iterator[Any]:
+    """Yield what is commanded where something stands in the middle of a straight."""
     line, walls = narrow(30.0, 10.0, 1.5, 3)
     middle = line[int(np.hypot(*(line[:, :2] - line[0, :2]).T).searchsorted(24.0)), :2]
     thing = middle + np.array([[x, y] for x in np.arange(-0.2, 0.3, 0.1) for y in np.arange(-0.2, 0.3, 0.1)])
     bars = np.concatenate([walls, thing])
-    return [drive(line, bars, settings=settings, seconds=10.0, begin_m=12.0, limit_mps=2.0).commands]
+    yield from _told(driving(line, bars, settings=settings, seconds=10.0, begin_m=12.0, limit_mps=2.0))
 
 
 class Trip:
@@ -139,31 +149,32 @@ def _map() -> TopologicalMap:
     return replace(topology, tunnels=tuple(preferring), waypoints=tuple(faced))
 
 
-def trips(settings: Settings) -> list[Any]:
-    """Return what is said and asked on trips: as planned, loaded, held up, odometer wrong, place less and less known."""
-    told = []
+def trips(settings: Settings) -> Iterator[Any]:
+    """Yield what is said and asked on trips: as planned, loaded, held up, odometer wrong, place less and less known."""
     for loaded, turned, goal in (
         (False, False, "DP1"), (True, False, "DP1"), (False, True, "DP1"), (False, True, "t1.end"),
     ):  # fmt: skip
         trip = Trip(settings, loaded=loaded, goal=goal, turned=turned)
         trip.go(240.0)
-        told.append(trip.said)
+        yield trip.said
     held = Trip(settings, loaded=False, goal="DP1", held_m=9.0)
     held.go(120.0)
-    barred_way = []
+    yield held.said
     for sight_m in (1.0, 5.0):
         waits = Trip(settings, loaded=False, goal="DP1", held_m=9.0)
         waits.control.allowed.sight_m = sight_m
         waits.go(60.0)
-        barred_way.append(waits.said)
+        yield waits.said
     slipping = Trip(settings, loaded=False, goal="DP1")
     slipping.wander_m = 0.4
     slipping.go(120.0)
+    yield slipping.said
     unsure = Trip(settings, loaded=False, goal="DP1")
     for _ in range(30):
         unsure.std_m += 0.08
         unsure.go(0.5)
-    return [*told, *barred_way, held.said, slipping.said, unsure.said, _turned_in_a_stub(settings)]
+    yield unsure.said
+    yield _turned_in_a_stub(settings)
 
 
 def _turned_in_a_stub(settings: Settings) -> list[Any]:

@@ -52,9 +52,7 @@ def asked(settings: HaulageSettings) -> Iterator[tuple[str, str]]:
         yield fleet.update({"lhd": told})["lhd"].motion, fleet.control.place("lhd").section
 
 
-def fleet(settings: TrafficSettings) -> list[tuple[Throughput | None, list[str]]]:
-    """Return what three machines achieve on a level and on a decline, and what check-map says of them."""
-    return [
-        (throughput(topology, dump, 3, settings), [one.text for one in traffic_findings(topology, 3, settings)])
-        for topology, dump in ((map_of_plan("level"), "OP2"), (map_of_plan("decline"), "OP1"))
-    ]
+def fleet(settings: TrafficSettings) -> Iterator[tuple[Throughput | None, list[str]]]:
+    """Yield what three machines achieve on a level and on a decline, and what check-map says of them."""
+    for topology, dump in ((map_of_plan("level"), "OP2"), (map_of_plan("decline"), "OP1")):
+        yield throughput(topology, dump, 3, settings), [one.text for one in traffic_findings(topology, 3, settings)]

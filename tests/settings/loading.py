@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -26,9 +27,8 @@ _PILE = target_of(_DRIFT.snapshot(0).estimate, 0)
 _SECOND_NS = 1_000_000_000
 
 
-def cycle(settings: LoadingSettings) -> list[Any]:
-    """Return what is said and asked in cycles: from the drift, and from a start that has to be corrected near the pile."""
-    told: list[Any] = []
+def cycle(settings: LoadingSettings) -> Iterator[Any]:
+    """Yield what is said and asked in cycles: from the drift, and from a start that has to be corrected near the pile."""
     for start, bend, end in (
         ((17.0, 0.2, 0.0), 0.0, State.DONE),
         ((22.0, 0.3, 0.1), 0.1, State.CHARGING),
@@ -36,25 +36,18 @@ def cycle(settings: LoadingSettings) -> list[Any]:
     ):
         one = bench(start=start, bend_rad=bend, settings=settings)
         one.run(60.0, lambda out, end=end: out.state == end or out.request is not None)  # type: ignore[misc]
-        told.append([[out.state, out.phase, out.pedals, out.directive and out.directive.stop_m] for out in one.said])
-        told.append([[when, note.cause] for when, note in one.notes])
-        told.append(one.truth.state)
-    return told
+        yield [[out.state, out.phase, out.pedals, out.directive and out.directive.stop_m] for out in one.said]
+        yield [[when, note.cause] for when, note in one.notes]
+        yield one.truth.state
 
 
-def limits(settings: LoadingSettings) -> list[Any]:
-    """Return when each limit counts, each in a world of its own."""
-    return [
-        [_ends(settings, state, count) for state in MOVING | ASSISTANCE | {State.HELD} for count in (0, 7, 11)],
-        _looks(settings),
-        _ages(settings),
-        _restored(settings),
-        _aims(settings),
-        _newer(settings),
-        _toes(settings),
-        _faces(settings),
-        _squares(settings),
-    ]
+def limits(settings: LoadingSettings) -> Iterator[Any]:
+    """Yield when each limit counts, each in a world of its own."""
+    for look in (_looks, _ages, _restored, _aims, _newer, _toes, _faces, _squares):
+        yield look(settings)
+    for state in MOVING | ASSISTANCE | {State.HELD}:
+        for count in (0, 7, 11):
+            yield _ends(settings, state, count)
 
 
 def _motion(now_ns: int, x: float = 0.0, y: float = 0.0, speed: float = 0.0) -> Motion:

@@ -1,6 +1,7 @@
-"""What a user gets out of a short run, as one digest: a probe for each part of the settings.
+"""What a user gets out of a short run, part by part as it comes: a probe for each part of the settings.
 
-A probe takes settings and runs the same small scenario with them. Two runs with the same settings give the same digest.
+A probe takes settings and runs the same small scenario with them. Two runs with the same settings give the same parts; one
+that has differed need not go on.
 """
 
 from __future__ import annotations
@@ -10,7 +11,7 @@ import hashlib
 import json
 import math
 import tempfile
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, fields, is_dataclass
 from functools import partial
 from pathlib import Path
@@ -61,7 +62,8 @@ from tests.settings.hauled import asked, fleet, tried
 from tests.settings.streams import Stream
 from tests.settings.tracked import docks, tracks
 
-Probe = Callable[[Settings], str]
+Told = Iterator[Any]
+Probe = Callable[[Settings], Told]
 
 
 def digest(*parts: Any) -> str:
@@ -100,15 +102,20 @@ class _Watched(StepRecorder):
         super().record(stamp_ns, time_ns, step, odometry)
 
 
-def run(settings: Settings, stream: Stream, primary: Literal["front", "points"] = "front", *, own: bool = False) -> str:
-    """Return the digest of a map: paths, diagnostics, curves, cloud, warnings; `own`: hits on the machine's bodies occur."""
+def run(
+    settings: Settings, stream: Stream, primary: Literal["front", "points"] = "front", *, own: bool = False
+) -> Told:
+    """Yield covariances, then a map: paths, diagnostics, curves, cloud, warnings; `own`: hits on the machine's bodies occur."""
     pipeline = MappingPipeline(settings, Machine() if own else None, MappingOptions(primary))
     pipeline._steps = watched = _Watched(pipeline.front_end.wheels, settings.slip)
+    told = 0
     for role, message in stream:
         pipeline.update(role, message)
+        yield from watched.covariances[told:]
+        told = len(watched.covariances)
     pipeline.finish()
     records = pipeline.records
-    return digest(
+    yield (
         pipeline.track.rows(),
         pipeline.path.final.rows(),
         records.diagnostics(),
@@ -116,7 +123,7 @@ def run(settings: Settings, stream: Stream, primary: Literal["front", "points"] 
         records.speed(),
         records.tachometer(),
         records.articulation(),
-        watched.covariances,
+        watched.covariances[told:],
         expected_error(pipeline.evidence.smoother.keys, pipeline.front_end.inclinometer.attitude.height_std_m(10.0)),
         pipeline.sweeps.cloud(),
         pipeline.warnings,
@@ -124,8 +131,8 @@ def run(settings: Settings, stream: Stream, primary: Literal["front", "points"] 
     )
 
 
-def turning(settings: Settings) -> str:
-    """Return the digest of how a gyroscope moves a path whose scans drift in heading."""
+def turning(settings: Settings) -> Told:
+    """Yield how a gyroscope moves a path whose scans drift in heading."""
     pipeline = MappingPipeline(settings)
     for k, message in enumerate(streams.turning()):
         pipeline.front_end.update("inclinometer", message)
@@ -139,24 +146,24 @@ def turning(settings: Settings) -> str:
     x, y = 0.3 * np.cumsum(np.cos(heading)), 0.3 * np.cumsum(np.sin(heading))
     zero = np.zeros(len(t))
     rows = TrackRows(np.round(t * 1e9).astype(np.int64), np.column_stack([x, y, zero, zero, zero, heading]))
-    return digest(gyro_correction(pipeline, rows))
+    yield gyro_correction(pipeline, rows)
 
 
-def lap(settings: Settings) -> str:
-    """Return the digest of the smoother's corrections after a lap and a quarter around a pillar, scans each half metre."""
+def lap(settings: Settings) -> Told:
+    """Yield the smoother's corrections after a lap and a quarter around a pillar, scans each half metre."""
     stage = MappingPipeline(settings).evidence.smoother
     for key in streams.lap_scans():
         stage.keys.update(key.time_ns, key.pose, key.points.astype(np.float64), key.error)
-    return digest(stage.correction())
+    yield stage.correction()
 
 
-def pile(settings: Settings) -> str:
-    """Return the digest of `pile.json`, and of the distances of all estimates, after a drive towards a pile."""
+def pile(settings: Settings) -> Told:
+    """Yield `pile.json`, and of the distances of all estimates, after a drive towards a pile."""
     watch = PileWatch(settings)
     for scan in streams.towards_a_pile():
         watch.update(cast("PlacedScan", _Hits(scan)))
     report = watch.report()
-    return digest(report.to_json(), [one.distance_m for one in report.history])
+    yield (report.to_json(), [one.distance_m for one in report.history])
 
 
 @dataclass(frozen=True, slots=True)
@@ -169,15 +176,15 @@ class _Hits:
         return self.known
 
 
-def recording(settings: Settings) -> str:
-    """Return the digest of a Rerun recording, read back: what is drawn, and when."""
+def recording(settings: Settings) -> Told:
+    """Yield a Rerun recording, read back: what is drawn, and when."""
     with tempfile.TemporaryDirectory() as folder:
         inspection = Inspection(Path(folder), "drive", START_NS, settings)
         for number in range(20):
             inspection.record(START_NS + number * 200_000_000, np.ones((7, 3)), "front")
         inspection.write(report_data(scans=60, points=400), Machine())
         inspection.close()
-        return digest(*(_drawn(batches) for _, batches in sorted(read(Path(folder) / "recording.rrd").items())))
+        yield [_drawn(batches) for _, batches in sorted(read(Path(folder) / "recording.rrd").items())]
 
 
 def _drawn(batches: list[Any]) -> list[Any]:
@@ -194,42 +201,42 @@ def _values(batch: Any, name: str) -> list[Any]:
     return [value for value in batch.column(name).to_pylist() if value is not None]
 
 
-def plan(settings: Settings) -> str:
-    """Return the digest of the plan and table of a rockbreaker whose orientation has to be shifted on the way."""
+def plan(settings: Settings) -> Told:
+    """Yield the plan and table of a rockbreaker whose orientation has to be shifted on the way."""
     ends = ["--from", "2.2,2.15,-1", "--to", "2.2,-2.15,-1", "--phi-from", "270", "--phi-to", "270", "--path", "cslm"]
-    return _planned(settings, ends)
+    yield _planned(settings, ends)
 
 
-def rock(settings: Settings) -> str:
-    """Return the digest of the plan to the largest rock on a grizzly."""
+def rock(settings: Settings) -> Told:
+    """Yield the plan to the largest rock on a grizzly."""
     with tempfile.TemporaryDirectory() as folder:
         cloud = Path(folder) / "grizzly.ply"
         write_cloud(cloud, GridCloud(simulate_grizzly(Rockbreaker(), 3).points_m.astype(np.float32)))
-        return _planned(settings, ["--cloud", str(cloud)])
+        yield _planned(settings, ["--cloud", str(cloud)])
 
 
-def routes(settings: Settings) -> str:
-    """Return the digest of routes on a map with fast tunnels and a turning bay, and of its check: twins that are a little off."""
+def routes(settings: Settings) -> Told:
+    """Yield routes on a map with fast tunnels and a turning bay, and of its check: twins that are a little off."""
     topology = fast_ladder()
     ways = [(loaded, RouteOptions(*headings)) for loaded in (False, True) for headings in _HEADINGS]
     found = [
         route_json(route(topology, "t1.start", "DP1", asked, settings.movement, loaded=loaded))
         for loaded, asked in ways
     ]
-    return digest(found, list(topology_findings(topology, settings.movement)))
+    yield (found, list(topology_findings(topology, settings.movement)))
 
 
 _HEADINGS = (("along", "along"), ("along", "against"), ("against", "along"), ("against", "against"))
 
 
-def _planned(settings: Settings, words: list[str]) -> str:
+def _planned(settings: Settings, words: list[str]) -> Any:
     with tempfile.TemporaryDirectory() as folder:
         file, target = Path(folder) / "settings.toml", Path(folder) / "plan"
         file.write_text(settings_toml(settings, ["rockbreaker"]), encoding="utf-8")
         command = ["rockbreaker", "plan", *words, "--config", str(file), "--no-pictures", "--quiet", "-o", str(target)]
         assert main(command) == 0
         values = json.loads((target / "plan.json").read_text(encoding="utf-8"))
-        return digest(_untimed(values), (target / "trajectory.csv").read_text(encoding="utf-8"))
+        return _untimed(values), (target / "trajectory.csv").read_text(encoding="utf-8")
 
 
 def _untimed(values: Any) -> Any:
@@ -245,42 +252,56 @@ def _taught() -> tuple[TunnelWorld, list[NodeScan]]:
     return world, drive(world, seed=1)
 
 
-def landmarks(settings: Settings) -> str:
-    """Return the digest of the landmarks of a tunnel with bends and niches."""
+def landmarks(settings: Settings) -> Told:
+    """Yield the landmarks of a tunnel with bends and niches."""
     world, scans = _taught()
     made = landmarks_of(scans, {"t": world.frame()}, {"t"}, settings.landmarks)
-    return digest(made, made.not_distinctive_m("t", settings.landmarks))
+    yield (made, made.not_distinctive_m("t", settings.landmarks))
 
 
-def topology(settings: Settings, seen: Callable[[], Seen]) -> str:
-    """Return the digest of the topological map, as its file has it, and of the free space of a drive; None where it is off."""
+def topology(settings: Settings, seen: Callable[[], Seen]) -> Told:
+    """Yield the topological map, as its file has it, and of the free space of a drive; None where it is off."""
     if settings.topology.method == "off":
-        return digest(None)
+        yield None
+        return
     found = topology_of(seen(), settings.topology)
-    return digest(json.dumps(to_geojson(found.map)), found.sheets, found.niches)
+    yield (json.dumps(to_geojson(found.map)), found.sheets, found.niches)
 
 
-def localized(settings: Settings, *, way_m: float, jump_m: float = 0.0, known_start: bool = False) -> str:
-    """Return the digest of what localization says of a drive, of which the start is known or not, and how often it withheld."""
+def localized(settings: Settings, *, way_m: float, jump_m: float = 0.0, known_start: bool = False) -> Told:
+    """Yield what localization says of a drive, of which the start is known or not, then how often it withheld."""
     stream, poses = known.drive(5.0, way_m, jump_m=jump_m)
-    localizer = Localizer(known.known_map(), settings, None, poses[0] if known_start else None)
+    localizer, told = Localizer(known.known_map(), settings, None, poses[0] if known_start else None), 0
     for role, message in stream:
         localizer.update(role, message)
+        yield from _untimed_rows(localizer, told)
+        told = len(localizer.rows)
     localizer.finish()
-    rows = [row._replace(latency_ms=0.0) for row in localizer.rows]
     searches = [(one.stamp_ns, one.purpose) for one in localizer.searches]
-    return digest(rows, localizer.facts.withheld, localizer.facts.lost_stretches, localizer.facts.first_fix, searches)
+    yield (
+        _untimed_rows(localizer, told),
+        localizer.facts.withheld,
+        localizer.facts.lost_stretches,
+        localizer.facts.first_fix,
+        searches,
+    )
 
 
-def driven(settings: Settings) -> str:
-    """Return the digest of what a machine is told while inputs fail, pose and scan disagree, and things are near."""
+def _untimed_rows(localizer: Localizer, known: int) -> list[Any]:
+    return [row._replace(latency_ms=0.0) for row in localizer.rows[known:]]
+
+
+def driven(settings: Settings) -> Told:
+    """Yield what a machine is told while inputs fail, pose and scan disagree, and things are near."""
     inputs = {"motion": 0.01, "scan_front": 0.04, "pose": 0.04, "link": 0.1, "operator": 0.2}
-    rig, told = Rig(settings.executor, inputs), []
+    rig = Rig(settings.executor, inputs)
     control = rig.control
     rig.beside = [(60.0, 1.225 + 0.056)]
     rig.own = [(2.0, 1.225 - 0.12)]
 
-    def go(seconds: float, mode: str = "") -> None:
+    def go(seconds: float, mode: str = "") -> list[Any]:
+        told: list[Any] = []
+
         def each() -> None:
             if mode and not (control.watchdog.armed and control.modes.name == mode) and rig.speed == 0.0:
                 control.rearm(rig.now_ns, mode)
@@ -288,83 +309,85 @@ def driven(settings: Settings) -> str:
             told.append((rig.command, *control.take_notes()))
 
         rig.run(seconds, each)
+        return told
 
-    go(5.0, "autonomous")
+    yield go(5.0, "autonomous")
     for name, failed_s in (("motion", 0.4), ("link", 2.5)):
         rig.failed.add(name)
-        go(failed_s)
+        yield go(failed_s)
         rig.failed.clear()
-        go(6.0, "autonomous")
+        yield go(6.0, "autonomous")
     for apart in ((0.25, 0.0), (0.0, math.radians(1.2))):
         rig.apart_m, rig.apart_rad = apart
-        go(0.5)
+        yield go(0.5)
         rig.apart_m, rig.apart_rad = 0.0, 0.0
-        go(6.0, "autonomous")
+        yield go(6.0, "autonomous")
     rig.rate_wanted = math.radians(0.4)
-    go(1.0)
+    yield go(1.0)
     rig.rate_wanted = math.radians(-10.0)
-    go(1.0)
+    yield go(1.0)
     rig.rate_wanted = 0.0
     control.mode("idle", rig.now_ns)
-    go(3.0)
-    go(5.0, "teleoperated")
+    yield go(3.0)
+    yield go(5.0, "teleoperated")
     rig.failed.add("operator")
-    go(0.7)
+    yield go(0.7)
     rig.failed.clear()
-    go(5.0, "teleoperated")
+    yield go(5.0, "teleoperated")
     rig.operates = False
-    go(6.0)
-    return digest(told)
+    yield go(6.0)
 
 
-def guided(settings: Settings) -> str:
-    """Return the digest of what guidance commands in a narrow bend, and on the way to a stop."""
+def guided(settings: Settings) -> Told:
+    """Yield what guidance commands in a narrow bend, and on the way to a stop."""
     parts = plans, stops, remembered, barred
-    return digest(*(part(settings.guidance) for part in parts))
+    for part in parts:
+        yield from part(settings.guidance)
 
 
-def navigated(settings: Settings) -> str:
-    """Return the digest of what navigation control says and asks for on trips over a small map."""
-    return digest(trips(settings))
+def navigated(settings: Settings) -> Told:
+    """Yield what navigation control says and asks for on trips over a small map."""
+    yield from trips(settings)
 
 
 def _dug(method: str) -> Probe:
-    return lambda settings: digest(digs(settings, method))
+    return lambda settings: digs(settings, method)
 
 
-def loading_cycle(settings: Settings) -> str:
-    """Return the digest of what the loading task says and asks for in short cycles."""
-    return digest(loading.cycle(settings.loading))
+def loading_cycle(settings: Settings) -> Told:
+    """Yield what the loading task says and asks for in short cycles."""
+    yield from loading.cycle(settings.loading)
 
 
-def loading_limits(settings: Settings) -> str:
-    """Return the digest of when each limit of the loading task counts."""
-    return digest(loading.limits(settings.loading))
+def loading_limits(settings: Settings) -> Told:
+    """Yield when each limit of the loading task counts."""
+    yield from loading.limits(settings.loading)
 
 
-def tracked(settings: Settings) -> str:
-    """Return the digest of what a tracker commands on a drive with slip, noise, an offset, and poses that fail."""
-    return digest(tracks(settings.tracking))
+def tracked(settings: Settings) -> Told:
+    """Yield what a tracker commands on a drive with slip, noise, an offset, and poses that fail."""
+    yield from tracks(settings.tracking)
 
 
-def attended(settings: Settings) -> str:
-    """Return the digest of when a silent or slow operator stops a machine, of sessions, tries and alarms."""
-    return digest(operated(settings.console))
+def attended(settings: Settings) -> Told:
+    """Yield when a silent or slow operator stops a machine, of sessions, tries and alarms."""
+    yield operated(settings.console)
 
 
-def docked(settings: Settings) -> str:
-    """Return the digest of ways to a dock on wide and tight aprons, or why there is none."""
-    return digest(docks(settings.docking))
+def docked(settings: Settings) -> Told:
+    """Yield ways to a dock on wide and tight aprons, or why there is none."""
+    yield from docks(settings.docking)
 
 
-def hauled(settings: Settings) -> str:
-    """Return the digest of how often a mission tries, and when it asks for its next section."""
-    return digest(tried(settings.haulage), list(asked(settings.haulage)))
+def hauled(settings: Settings) -> Told:
+    """Yield how often a mission tries, and when it asks for its next section."""
+    yield tried(settings.haulage)
+    yield from asked(settings.haulage)
 
 
-def shared(settings: Settings) -> str:
-    """Return the digest of what three machines achieve on a level."""
-    return digest(fleet(settings.traffic))
+def shared(settings: Settings) -> Told:
+    """Yield what three machines achieve on a level."""
+    yield from fleet(settings.traffic)
 
 
 def _mapped(stream: Callable[[], Stream], primary: Literal["front", "points"] = "front", *, own: bool = False) -> Probe:
@@ -389,13 +412,13 @@ PROBES: dict[str, Probe] = {
     "driven": driven,
     "guided": guided,
     "navigated": navigated,
-    "charged": lambda settings: digest(charges(settings)),
-    "charged_as_printed": lambda settings: digest(charges(settings, "paper")),
+    "charged": charges,
+    "charged_as_printed": lambda settings: charges(settings, "paper"),
     "dug": _dug(""),
     "dug_as_printed": _dug("paper"),
     "dug_tuned": _dug("paper-tuned"),
-    "weighed": lambda settings: digest(weighings(settings)),
-    "decided": lambda settings: digest(decisions(settings)),
+    "weighed": weighings,
+    "decided": decisions,
     "loading_cycle": loading_cycle,
     "loading_limits": loading_limits,
     "tracked": tracked,

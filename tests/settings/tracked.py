@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -13,27 +14,26 @@ from lhdmap.driving.motion import Motion, Setpoint
 from lhdmap.messages import FloatArray
 from lhdmap.tracking.settings import TrackingSettings
 from lhdmap.tracking.tracker import Tracker
-from tools.evaluate.tracking_paths import turn
-from tools.evaluate.tracking_plant import Errors, Plant, placed
 
 from tests.guidance.tunnels import BODIES, MODEL
+from tests.tracking.paths import turn
+from tests.tracking.plant import Errors, Plant, placed
 
 
-def tracks(settings: TrackingSettings) -> list[Any]:
-    """Return commands: a bend from 1.5 m beside it, with failing poses; and from 22 m beside the path."""
-    rows, told = turn(10.0 / 3.6, step=True, ends_m=12.0), []
+def tracks(settings: TrackingSettings) -> Iterator[Any]:
+    """Yield commands: a bend from 1.5 m beside it, with failing poses; and from 22 m beside the path."""
+    rows = turn(10.0 / 3.6, step=True, ends_m=12.0)
     for aside in (1.5, 22.0):
         tracker = Tracker(MODEL, settings)
         curve = tracker.follow(
             rows[::10, :2] + 0.01 * np.random.default_rng(4).standard_normal((len(rows[::10]), 2)), 8.0
         )
         plant = Plant(placed(-3.4, aside, 0.1, 0.05), MODEL, Errors(seed=5))
-        told.append((curve.rows, _commands(tracker, plant)))
-    return told
+        yield curve.rows
+        yield from _commands(tracker, plant)
 
 
-def _commands(tracker: Tracker, plant: Plant) -> list[Any]:
-    told = []
+def _commands(tracker: Tracker, plant: Plant) -> Iterator[Any]:
     for k in range(600):
         motion: Motion | None = plant.measured()
         if 160 <= k < 164:
@@ -41,16 +41,14 @@ def _commands(tracker: Tracker, plant: Plant) -> list[Any]:
         if 200 <= k < 214 or k == 100:
             motion = None if k % 2 else Motion(plant.now_ns, math.nan, 0.0, 0.0, 0.0, 0.0, 0.0)
         step = tracker.step(plant.now_ns, motion)
-        told.append((step.speed_mps, step.steering_rate_rps, step.setpoints, step.state, step.reason))
+        yield step.speed_mps, step.steering_rate_rps, step.setpoints, step.state, step.reason
         plant.sent.append(Setpoint(plant.now_ns, step.speed_mps, step.steering_rate_rps))
         for _ in range(5):
             plant.step()
-    return told
 
 
-def docks(settings: DockingSettings) -> list[Any]:
-    """Return plans: with room, with little, with something before the dock, and in a drift in which nobody turns round."""
-    told = []
+def docks(settings: DockingSettings) -> Iterator[Any]:
+    """Yield plans: with room, with little, with something before the dock, and in a drift in which nobody turns round."""
     nothing = np.zeros((0, 2))
     for width, height, start, dock, blocked in (
         (45.0, 40.0, (10.0, 12.0, 0.5, 0.1), (22.0, 32.95, -0.5 * math.pi), nothing),
@@ -59,8 +57,7 @@ def docks(settings: DockingSettings) -> list[Any]:
         (20.0, 4.0, (10.0, 2.0, 0.0, 0.0), (9.0, 2.0, math.pi), nothing),
     ):
         room = room_of(apron(width, height), MODEL, BODIES, settings.margin_m, blocked)
-        told.append(plan_dock(np.array(start), np.array(dock), room, MODEL, settings))
-    return told
+        yield plan_dock(np.array(start), np.array(dock), room, MODEL, settings)
 
 
 def apron(width_m: float, height_m: float) -> FloatArray:

@@ -87,7 +87,7 @@ def least_squares(loops: Loops, used: npt.NDArray[np.bool_]) -> FloatArray:
         _add(graph, row, row + 1, se2.between(before, after), loops.steps[row])
     for tie, use in zip(loops.ties, used, strict=True):
         if use:
-            _add(graph, tie.first, tie.second, tie.T_first_second, tie.covariance)
+            _add(graph, tie.first, tie.second, tie.pose_first_second, tie.covariance)
     found = gtsam.LevenbergMarquardtOptimizer(graph, values).optimize()
     poses = [found.atPose2(row) for row in range(len(loops.odometry))]
     return np.array([[pose.x(), pose.y(), pose.theta()] for pose in poses])

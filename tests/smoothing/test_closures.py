@@ -35,7 +35,7 @@ def test_a_second_lap_closes_the_loop(twice_round: tuple[FloatArray, list[KeySca
     closures = find_closures(keys, SETTINGS)
     assert len(closures) >= 8
     for closure in closures:
-        error = se2.between(se2.between(true[closure.earlier], true[closure.current]), closure.T_earlier_current)
+        error = se2.between(se2.between(true[closure.earlier], true[closure.current]), closure.pose_earlier_current)
         assert np.hypot(error[0], error[1]) < 0.05
         assert abs(math.degrees(error[2])) < 0.5
 

@@ -30,14 +30,14 @@ def wall_y(x_m: FloatArray, z_m: FloatArray, side: float) -> FloatArray:
     return np.asarray(side * 2.0 + rough, dtype=float)
 
 
-def seen(T_map_base: FloatArray, x_base_m: float, ahead: float, rng: np.random.Generator) -> FloatArray:
+def seen(pose_map_base: FloatArray, x_base_m: float, ahead: float, rng: np.random.Generator) -> FloatArray:
     """Return hits on both walls, base frame, of a scanner at x that looks ahead (1) or back (-1) and a little down."""
     away = np.geomspace(1.0, 16.0, 120)
     hits = []
     for side in (1.0, -1.0):
-        x, z = T_map_base[0] + x_base_m + ahead * away, SCANNER_M - FALL * away
+        x, z = pose_map_base[0] + x_base_m + ahead * away, SCANNER_M - FALL * away
         hits.append(np.column_stack([x, wall_y(x, z, side) + rng.normal(0.0, 0.008, len(x)), z]))
-    return se2.transform(se2.inverse(T_map_base), np.concatenate(hits))
+    return se2.transform(se2.inverse(pose_map_base), np.concatenate(hits))
 
 
 def turned_about_joint(hits: FloatArray, angle_rad: float) -> FloatArray:
@@ -69,10 +69,10 @@ def test_a_wrong_scale_and_heading_are_put_right(joint_deg: float) -> None:
         realigner.update(scan)
     realigner.finish()
     before, after = [], []
-    for time_ns, T_map_odom in realigner.moves:
+    for time_ns, pose_map_odom in realigner.moves:
         true, scan = scans[time_ns // STEP_NS]
         before.append(se2.between(true, scan.pose))
-        after.append(se2.between(true, se2.compose(T_map_odom, scan.pose)))
+        after.append(se2.between(true, se2.compose(pose_map_odom, scan.pose)))
     error, left = np.abs(before).mean(axis=0), np.abs(after).mean(axis=0)
     assert left[0] < 0.2 * error[0]
     assert left[2] < 0.4 * error[2]

@@ -49,7 +49,7 @@ def test_where_all_are_false_none_is_kept(seed: int) -> None:
 def test_a_right_closure_alone_is_kept_and_a_false_one_is_not() -> None:
     loops = twice_round(4, right=1, share=0.0)
     assert judge(loops).tolist() == [True]
-    lie = loops.ties[0]._replace(T_first_second=np.array([60.0, 0.0, 0.0]))
+    lie = loops.ties[0]._replace(pose_first_second=np.array([60.0, 0.0, 0.0]))
     assert judge(loops._replace(ties=[lie])).tolist() == [False]
 
 

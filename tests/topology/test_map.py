@@ -51,7 +51,7 @@ def test_a_branch() -> None:
     topology = found(tee())
     assert [(node.name, node.degree) for node in topology.intersections] == [("X", 3)]
     node = topology.intersections[0]
-    assert np.linalg.norm(node.T_map_node[:2] - [30.0, 0.0]) < 0.3
+    assert np.linalg.norm(node.pose_map_node[:2] - [30.0, 0.0]) < 0.3
     assert sorted(tunnel.name for tunnel in topology.tunnels) == ["T7", "T8", "T9"]
     assert ends(topology) == [(DEAD_END, "i1")] * 3
     lengths = {tunnel.name: tunnel.length_m for tunnel in topology.tunnels}

@@ -12,7 +12,8 @@ from lhdmap.errors import InputError
 from lhdmap.messages import FloatArray
 from lhdmap.tracking.circles import circle_beside, three_points
 from lhdmap.tracking.path import beside, nearest, path_of
-from tools.evaluate.tracking_paths import bend, exact, straight
+
+from tests.tracking.paths import bend, exact, straight
 
 LINE = exact(
     np.concatenate([straight(20.0), bend(12.0, 90.0, 8.0), straight(10.0), bend(15.0, -60.0, 8.0), straight(20.0)])

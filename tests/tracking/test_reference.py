@@ -11,9 +11,9 @@ from lhdmap.tracking.equations import equilibrium
 from lhdmap.tracking.kernel import front_axle
 from lhdmap.tracking.path import STEP_M, Path, beside, path_of
 from lhdmap.tracking.reference import Curve, reference_of
-from tools.evaluate.tracking_paths import bend, exact, straight
 
 from tests.tracking.machines import LENGTHS
+from tests.tracking.paths import bend, exact, straight
 
 CLOTHOIDS = exact(np.concatenate([straight(20.0), bend(12.0, 90.0, 8.0), straight(20.0)]))
 STEP = exact(np.concatenate([straight(20.0), bend(12.0, -90.0, 0.0), straight(20.0)]))

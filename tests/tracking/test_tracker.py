@@ -13,10 +13,10 @@ from lhdmap.messages import FloatArray
 from lhdmap.tracking.equations import equilibrium
 from lhdmap.tracking.settings import TrackingSettings
 from lhdmap.tracking.tracker import Tracker
-from tools.evaluate.tracking_paths import turn
-from tools.evaluate.tracking_plant import CALM, Drive, Errors, Plant, drive, placed
 
 from tests.tracking.machines import LENGTHS, MODELS
+from tests.tracking.paths import turn
+from tests.tracking.plant import CALM, Drive, Errors, Plant, drive, placed
 
 SETTINGS = TrackingSettings()
 LINE = turn(1.0, ends_m=100.0)[:1000]
@@ -165,7 +165,7 @@ def test_wrong_speeds_are_refused(speeds: float | FloatArray) -> None:
 
 
 def test_a_path_that_bends_too_much_is_refused_before_moving() -> None:
-    from tools.evaluate.tracking_paths import bend, exact, straight
+    from tests.tracking.paths import bend, exact, straight
 
     tight = exact(np.concatenate([straight(15.0), bend(3.0, 150.0, 2.0), straight(15.0)]))
     with pytest.raises(InputError, match=r"bends (more|too much)"):

@@ -41,8 +41,8 @@ def turned(line: FloatArray, pose: FloatArray) -> FloatArray:
 def test_a_drive_is_found_from_any_heading(heading_deg: float) -> None:
     pose = np.array([30.0, -12.0, math.radians(heading_deg)])
     best, *_ = placings([sheet_of(BENT, BRANCH)], sheet_of(turned(BENT[1:], pose), turned(BRANCH, pose)))
-    assert best.T_map_drive[:2] == pytest.approx(pose[:2], abs=2.5)  # 2° over 50 m; scans do the rest
-    assert abs(math.remainder(best.T_map_drive[2] - pose[2], 2.0 * math.pi)) < math.radians(3.0)
+    assert best.pose_map_drive[:2] == pytest.approx(pose[:2], abs=2.5)  # 2° over 50 m; scans do the rest
+    assert abs(math.remainder(best.pose_map_drive[2] - pose[2], 2.0 * math.pi)) < math.radians(3.0)
     assert best.score > 0.5
 
 
@@ -56,14 +56,14 @@ def test_two_parts_that_are_alike_are_both_named() -> None:
     hook = np.array([[0.0, 0.0], [20.0, 0.0], [20.0, 15.0], [32.0, 15.0]])
     first, second, *_ = placings([sheet_of(hook, hook + np.array([60.0, 0.0]))], sheet_of(hook))
     assert second.score > 0.9 * first.score
-    assert abs(first.T_map_drive[0] - second.T_map_drive[0]) == pytest.approx(60.0, abs=2.0)
+    assert abs(first.pose_map_drive[0] - second.pose_map_drive[0]) == pytest.approx(60.0, abs=2.0)
 
 
 def test_who_knows_where_it_begins_gets_that_one() -> None:
     hook = np.array([[0.0, 0.0], [20.0, 0.0], [20.0, 15.0], [32.0, 15.0]])
     found = placings([sheet_of(hook, hook + np.array([60.0, 0.0]))], sheet_of(hook), np.array([57.0, 3.0, 0.1]))
-    assert found[0].T_map_drive[0] == pytest.approx(60.0, abs=1.0)
-    assert all(abs(one.T_map_drive[0] - 60.0) < 15.0 for one in found)
+    assert found[0].pose_map_drive[0] == pytest.approx(60.0, abs=1.0)
+    assert all(abs(one.pose_map_drive[0] - 60.0) < 15.0 for one in found)
 
 
 def test_the_level_is_told() -> None:

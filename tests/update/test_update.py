@@ -29,7 +29,7 @@ def test_the_new_tunnel_is_there_and_where_it_is(updated: Updated) -> None:
     assert updated.result.version == found.version == 2
     (node,) = found.intersections
     assert node.degree == 3
-    assert node.T_map_node[:2] == pytest.approx([BRANCH_M - 0.5, 0.0], abs=0.6)  # base_link began at x = 0.5
+    assert node.pose_map_node[:2] == pytest.approx([BRANCH_M - 0.5, 0.0], abs=0.6)  # base_link began at x = 0.5
     (new,) = (one for one in found.tunnels if one.name in updated.result.difference["tunnels_new"])
     assert new.line_m[:, 1].min() < -0.6 * DEEP_M
     assert np.median(np.abs(new.line_m[:, 0] - BRANCH_M + 0.5)) < 0.3

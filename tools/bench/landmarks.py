@@ -38,7 +38,7 @@ def landmark_figures() -> Iterator[Figure]:
         dense = LandmarkSettings(voxel_m=voxel_m, range_m=range_m)
         model, clouds = icp_model(dense), along_tunnel(scans[20:24], world.frame(), dense)
         prepared, source = prepare(clouds[0].points_m, model), clouds[1].points_m
-        start = se2.between(clouds[0].T_node_base, clouds[1].T_node_base) + np.array([0.3, 0.1, 0.01])
+        start = se2.between(clouds[0].pose_node_base, clouds[1].pose_node_base) + np.array([0.3, 0.1, 0.01])
         spent = _cpu_ms(lambda: align(prepared, source, start, model), _REPEATS)  # noqa: B023
         yield Figure(
             _GROUP,

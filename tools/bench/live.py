@@ -4,7 +4,8 @@
 
 A process of its own plays a simulated drive of 40 m forwards and backwards with stamps of now, over zenoh on this machine or
 into an MCAP file that is flushed at each message; `lhdmap live` follows it in another. `--cuts N`: the link is cut for 2 s each
-N seconds.
+N seconds: over zenoh what is sent meanwhile is gone, the file (as on a share that hangs) gets it afterwards. `--again`: the log is
+mapped once more by `build-map`, and the map compared with the live one.
 """
 
 from __future__ import annotations
@@ -24,6 +25,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pyarrow.parquet as pq
 from lhdmap.live.zenoh_keys import dds_type
 from lhdmap.logs.formats import open_log
 from lhdmap.roles import SCAN
@@ -44,6 +46,7 @@ _NOT_BACKWARDS = ("tachometer", "odom")  # played backwards they would say the w
 _FIXED = "tf2_msgs/msg/TFMessage"
 _PORT, _CUT_S = 17448, 2.0
 _SCANS = "/lidar/"
+_COMPARED = (".tum", ".parquet", ".laz", ".ply", ".csv")
 
 
 def played(log: Path, seconds: float, begin: Callable[[], None] = lambda: None) -> Iterator[Sent]:
@@ -69,14 +72,24 @@ def stamped(message: Sent, now_ns: int) -> Sent:
     return message._replace(log_time_ns=now_ns, data=message.data[:4] + stamp + message.data[12:])
 
 
-def send_file(log: Path, target: Path, seconds: float, _cuts_s: float, result: Any) -> None:
-    """Write the drive into a growing file."""
-    sent, grown = Counter[str](), GrowingLog(target)
+def send_file(log: Path, target: Path, seconds: float, cuts_s: float, result: Any) -> None:
+    """Write the drive into a growing file; while the link is cut, what is to be written waits."""
+    sent, grown, waiting = Counter[str](), GrowingLog(target), list[Sent]()
+    cuts, next_cut_s, back_s = 0, time.monotonic() + (cuts_s or np.inf), 0.0
     for message in played(log, seconds):
-        grown.write(message)
+        now_s = time.monotonic()
+        if now_s > next_cut_s:
+            cuts, next_cut_s, back_s = cuts + 1, now_s + cuts_s, now_s + _CUT_S
+        waiting.append(message)
         sent[message.topic] += 1
+        if now_s > back_s:
+            for one in waiting:
+                grown.write(one)
+            waiting.clear()
+    for one in waiting:
+        grown.write(one)
     grown.finish()
-    result.put((dict(sent), 0))
+    result.put((dict(sent), dict(sent), cuts))
 
 
 def send_zenoh(log: Path, _target: Path, seconds: float, cuts_s: float, result: Any) -> None:
@@ -88,7 +101,7 @@ def send_zenoh(log: Path, _target: Path, seconds: float, cuts_s: float, result: 
     config.insert_json5("listen/endpoints", f'["tcp/127.0.0.1:{_PORT}"]')
     config.insert_json5("scouting/multicast/enabled", "false")
     config.insert_json5("timestamping/enabled", "true")
-    sent, cuts, heard = Counter[str](), 0, _Session(config)
+    sent, linked, cuts, heard = Counter[str](), Counter[str](), 0, _Session(config)
     next_cut_s, back_s = time.monotonic() + (cuts_s or np.inf), 0.0
     for message in played(log, seconds, heard.opened):
         now_s = time.monotonic()
@@ -100,9 +113,10 @@ def send_zenoh(log: Path, _target: Path, seconds: float, cuts_s: float, result: 
         sent[message.topic] += 1
         if heard.open:
             heard.put(message, sent[message.topic])
+            linked[message.topic] += 1
     time.sleep(0.5)
     heard.close()
-    result.put((dict(sent), cuts))
+    result.put((dict(sent), dict(linked), cuts))
 
 
 class _Session:
@@ -135,6 +149,8 @@ class _Session:
         self._session, self._publishers = None, {}
 
     def put(self, message: Sent, number: int) -> None:
+        """Publish a message; where the network is behind, wait: by default zenoh drops what a burst has too much, unheard."""
+        import zenoh
         from zenoh import ext
 
         fixed, topic = message.type_name == _FIXED, message.topic
@@ -143,7 +159,7 @@ class _Session:
             self._publishers[topic] = (
                 ext.declare_advanced_publisher(self._session, _key(message), cache=cache, publisher_detection=True)
                 if fixed
-                else self._session.declare_publisher(_key(message))
+                else self._session.declare_publisher(_key(message), congestion_control=zenoh.CongestionControl.BLOCK)
             )
         if fixed and message not in self._mounts:
             self._mounts.append(message)
@@ -165,7 +181,7 @@ def watch_memory(process: int, every_s: float, until: threading.Event, found: li
         found.append(int(words[1]) * os.sysconf("SC_PAGE_SIZE") / 2**20)
 
 
-def run(how: str, seconds: float, cuts_s: float, work: Path) -> dict[str, Any]:
+def run(how: str, seconds: float, cuts_s: float, work: Path, *, again: bool = False) -> dict[str, Any]:
     """Run sender and `lhdmap live`; return the figures."""
     log = simulate_drift(SCENARIO, work / "drive.mcap").log
     context = multiprocessing.get_context("spawn")
@@ -183,20 +199,44 @@ def run(how: str, seconds: float, cuts_s: float, work: Path) -> dict[str, Any]:
         over, memory = threading.Event(), list[float]()
         watch = threading.Thread(target=watch_memory, args=(follower.pid, 10.0, over, memory))
         watch.start()
-        sent, cuts = result.get(timeout=seconds + 120.0)
+        sent, linked, cuts = result.get(timeout=seconds + 120.0)
         sender.join(20.0)
-        stream_ended = len(memory)
-        follower.wait(600.0)
+        stream_ended, load = len(memory), os.getloadavg()
+        follower.wait(3600.0)
         over.set()
         watch.join()
     told = json.loads((work / "out.json").read_text())
-    return {"how": how, "seconds": seconds, "cuts": cuts, **_figures(told, sent, work / "run" / "log.mcap")} | {
+    figures = _figures(told, sent, linked, work / "run" / "log.mcap")
+    if again and "failed" not in figures:
+        figures["unlike_build_map"] = unlike(work / "run" / "map", mapped(work / "run" / "log.mcap", work / "again"))
+    return {"how": how, "seconds": seconds, "cuts": cuts, **figures} | {
         "memory_mib_each_10_s": [round(value) for value in memory[: stream_ended + 1]],
-        "load_average": os.getloadavg(),
+        "load_average_of_the_stream": load,
     }
 
 
-def _figures(told: dict[str, Any], sent: dict[str, int], log: Path) -> dict[str, Any]:
+def mapped(log: Path, target: Path) -> Path:
+    """Build the map of the log as anybody would."""
+    subprocess.run([sys.executable, "-m", "lhdmap", "build-map", str(log), "-o", str(target)], check=True)
+    return target
+
+
+def unlike(one: Path, other: Path) -> list[str]:
+    """Return the names of the files of two map folders whose bytes or rows differ; JSON and reports hold paths and times."""
+    names = {path.name for folder in (one, other) for path in folder.iterdir() if path.suffix in _COMPARED}
+    return sorted(name for name in names if not _same(one / name, other / name))
+
+
+def _same(one: Path, other: Path) -> bool:
+    if not (one.exists() and other.exists()):
+        return False
+    if one.suffix != ".parquet":
+        return one.read_bytes() == other.read_bytes()
+    tables = [pq.read_table(path).to_pandas() for path in (one, other)]
+    return bool(tables[0].equals(tables[1]))  # where both have no value they are alike
+
+
+def _figures(told: dict[str, Any], sent: dict[str, int], linked: dict[str, int], log: Path) -> dict[str, Any]:
     if "stream" not in told:
         return {"failed": told}
     with open_log(log) as reader:
@@ -205,7 +245,8 @@ def _figures(told: dict[str, Any], sent: dict[str, int], log: Path) -> dict[str,
     kept = ("scans", "distance_m", "degenerate_share", "lost_stretches", "peak_memory_mib")
     return {
         "scans_sent": sum(scans.values()),
-        "scans_lost": sum(count - counts.get(topic, 0) for topic, count in scans.items()),
+        "scans_sent_while_linked": sum(linked[topic] for topic in scans),
+        "scans_lost": sum(linked[topic] - counts.get(topic, 0) for topic in scans),
         "stream": told["stream"],
         **{key: told[key] for key in kept},
         "warnings": told["warnings"][-6:],
@@ -217,10 +258,11 @@ def main(words: Sequence[str] | None = None) -> int:
     parser.add_argument("how", choices=("zenoh", "mcap"))
     parser.add_argument("--seconds", type=float, default=300.0)
     parser.add_argument("--cuts", type=float, default=0.0, metavar="SECONDS", help="cut the link so often")
+    parser.add_argument("--again", action="store_true", help="compare with build-map of the log")
     parser.add_argument("-o", "--output", type=Path)
     arguments = parser.parse_args(words)
     with tempfile.TemporaryDirectory() as folder:
-        found = run(arguments.how, arguments.seconds, arguments.cuts, Path(folder))
+        found = run(arguments.how, arguments.seconds, arguments.cuts, Path(folder), again=arguments.again)
     text = json.dumps(found, indent=1)
     if arguments.output is not None:
         arguments.output.write_text(text + "\n", encoding="utf-8")

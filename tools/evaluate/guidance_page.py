@@ -11,9 +11,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from tests.guidance.drawn_drives import Row
 
 from tools.evaluate.bends import Bend, told
-from tools.evaluate.guidance import Row, summary
+from tools.evaluate.guidance import summary
 
 SOURCES = {
     "jinchuan": "a survey of a real drift",

@@ -17,19 +17,18 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import numpy as np
 from lhdmap.config import Settings
-from lhdmap.geometry import se3
 from lhdmap.logs.source import LogSource
 from lhdmap.machine import Machine
 from lhdmap.messages import FloatArray
 from lhdmap.pipeline.again import integrate_again
 from lhdmap.pipeline.inputs import ROLES_READ, Inputs
 from lhdmap.pipeline.mapping import MappingPipeline, feed
-from lhdmap.pipeline.track import TrackRows, resample, trajectory_of
+from lhdmap.pipeline.track import resample, trajectory_of
 from lhdmap.simulation.drive import SimulatedDrive, simulate_drift
 from lhdmap.simulation.scenario import DriftScenario
 from lhdmap.simulation.sections import DriftSettings, DriveSettings
 from lhdmap.simulation.sensing.sections import InclinometerSettings, ScannerSettings
-from lhdmap.trajectory import Trajectory
+from tests.integration.truth import distances_to_mesh, in_truth_frame, rows_of
 
 from tools.evaluate.figures import Figure, number, write
 
@@ -82,33 +81,6 @@ def mapped(log: Path) -> MappingPipeline:
     pipeline = MappingPipeline(Settings(), Machine())
     with LogSource([log]) as source:
         return feed(pipeline, source.messages([role for role in ROLES_READ if role in source.roles]))
-
-
-def rows_of(trajectory: Trajectory) -> TrackRows:
-    """Return a trajectory as rows of x, y, z, roll, pitch, heading."""
-    rpy = se3.rpy_from_quaternions(trajectory.quaternions_xyzw)
-    rpy[:, 2] = np.unwrap(rpy[:, 2])
-    return TrackRows(trajectory.stamps_ns, np.column_stack([trajectory.positions_m, rpy]))
-
-
-def in_truth_frame(points_m: FloatArray, estimate: Trajectory, truth: Trajectory) -> FloatArray:
-    """Return points (N, 3) moved so that the first pose of `estimate` has the true position and heading."""
-    first, true = rows_of(estimate).poses[0], rows_of(truth).poses[0]
-    turn = true[5] - first[5]
-    c, s = np.cos(turn), np.sin(turn)
-    R = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
-    moved: FloatArray = (points_m - first[:3]) @ R.T + true[:3]
-    return moved
-
-
-def distances_to_mesh(points_m: FloatArray, mesh_file: Path) -> FloatArray:
-    """Return the distance (N,) of each point to the mesh."""
-    import open3d as o3d
-
-    scene = o3d.t.geometry.RaycastingScene()
-    scene.add_triangles(o3d.t.io.read_triangle_mesh(str(mesh_file)))
-    found: FloatArray = scene.compute_distance(o3d.core.Tensor(points_m.astype(np.float32))).numpy().astype(float)  # type: ignore[call-overload]
-    return found
 
 
 def height_errors(positions_m: FloatArray, drive: SimulatedDrive) -> FloatArray:

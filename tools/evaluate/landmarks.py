@@ -94,7 +94,7 @@ def _looked_for(
     model = icp_model(settings)
     target = prepare(made.cloud(j).astype(np.float64), model)
     for i, cloud in enumerate(other):
-        true = se2.between(made.poses_node[j], cloud.T_node_base)
+        true = se2.between(made.poses_node[j], cloud.pose_node_base)
         near = abs(i - j) <= made.radius[j]
         fit = (
             align(target, cloud.points_m, true + _OFF, model)
@@ -191,7 +191,7 @@ def _captured(world: TunnelWorld, settings: LandmarkSettings) -> FloatArray:
     for j, cloud in enumerate(own):
         target = prepare(cloud.points_m, model)
         for i in range(max(j - 1, 0), min(j + 2, len(other))):
-            true = se2.between(cloud.T_node_base, other[i].T_node_base)
+            true = se2.between(cloud.pose_node_base, other[i].pose_node_base)
             poses = [
                 align(target, other[i].points_m, true + np.array([off, 0.1, 0.01]), model).pose for off in _STARTS_M
             ]

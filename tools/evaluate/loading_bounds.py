@@ -8,8 +8,7 @@ from typing import Any
 
 import numpy as np
 from lhdmap.loading.excavation import excavation_of
-
-from tools.evaluate.loading_loads import TICK_S, Dug, Plan, charged, loader_on, run_load, with_common, with_paper
+from tests.loading.digging.loads import TICK_S, Dug, Plan, charged, loader_on, run_load, with_common, with_paper
 
 PILES, TUNED_LOADS = 12, 40
 _EP_MAX_BAR, _RELIEVED_BAR = 300.0, 385.0

@@ -16,10 +16,10 @@ from lhdmap.loading.digging_settings import ChargingSettings
 from lhdmap.loading.weighing_settings import AttemptSettings, WeighingSettings
 from lhdmap.resources import resource
 from lhdmap.simulation.ground.sections import load_ground
+from tests.loading.digging.charges import MIX, Charges, charge_all
+from tests.loading.digging.loads import Dug, Plan, run_load, with_common, with_paper
 
 from tools.evaluate.loading_bounds import bounds
-from tools.evaluate.loading_charges import MIX, Charges, charge_all
-from tools.evaluate.loading_loads import Dug, Plan, run_load, with_common, with_paper
 from tools.evaluate.loading_weighed import weigh_in_loop
 from tools.evaluate.loading_weighing import Found, weigh_all
 

@@ -6,9 +6,9 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 from lhdmap.evaluation.loading.paper import printed_3, printed_5
+from tests.loading.digging.charges import MIX
 
 from tools.evaluate.loading_bounds import section
-from tools.evaluate.loading_charges import MIX
 
 Found = Mapping[str, Any]
 _HEAD = """\

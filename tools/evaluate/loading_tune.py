@@ -16,8 +16,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-
-from tools.evaluate.loading_loads import Dug, Plan, run_load
+from tests.loading.digging.loads import Dug, Plan, run_load
 
 ROUNDS = ((120, range(10)), (16, range(100, 130)), (4, range(200, 280)))
 """Candidates and loads of each round."""

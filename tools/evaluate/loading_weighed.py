@@ -9,8 +9,8 @@ from lhdmap.loading.signals import Controller, Pedals, Signals
 from lhdmap.loading.weighing import Weighing
 from lhdmap.loading.weighing_settings import WeighingSettings
 from lhdmap.simulation.ground.loader import Loader
+from tests.loading.digging.loads import TICK_S, Plan, charged, dug, loader_on
 
-from tools.evaluate.loading_loads import TICK_S, Plan, charged, dug, loader_on
 from tools.evaluate.loading_weighing import Found
 
 _LONGEST = 3000

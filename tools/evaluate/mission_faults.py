@@ -11,7 +11,6 @@ way; each moment is in one phase. Runs that miss are kept as scenario files.
 
 from __future__ import annotations
 
-import argparse
 import json
 import time
 from collections.abc import Sequence
@@ -31,6 +30,7 @@ from lhdmap.replay.scenario import Scenario, load_scenario, scenario_toml
 from lhdmap.simulation.history import SECOND_NS, START_NS
 
 from tools.evaluate import replay_faults as drives
+from tools.evaluate.fault_options import fault_parser, wrote_page
 
 SPILLED_KG = 300.0
 """More than a load loses by being shaken: ore that is gone."""
@@ -130,22 +130,10 @@ def _hauls(events: Sequence[Event]) -> list[tuple[float, float]]:
 
 def main() -> None:
     """Run and tell."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("scenario", nargs="?", type=Path, default=Path("pipelines/scenarios/demo_cycle.toml"))
-    parser.add_argument("--runs", type=int, default=20)
-    parser.add_argument("--seed", type=int, default=0, help="of the first run")
-    parser.add_argument("--most", type=int, default=3, help="faults of a run at most")
-    parser.add_argument("--until", type=float, default=150.0, help="latest begin of a fault, s")
-    parser.add_argument(
-        "--keep", type=Path, default=Path("mission_faults"), help="folder for the map and runs that miss"
-    )
+    parser = fault_parser(__doc__, "demo_cycle.toml", 150.0, "mission_faults")
     parser.add_argument("--map", type=Path, help="a map of the mine that is there already")
-    parser.add_argument("--lines", type=Path, nargs="*", default=[], help="what runs have printed, for the page alone")
-    parser.add_argument("--page", type=Path, help="page to write")
     arguments = parser.parse_args()
-    if arguments.lines:
-        texts = [line for path in arguments.lines for line in path.read_text(encoding="utf-8").splitlines()]
-        arguments.page.write_text(page([one for one in map(json.loads, texts) if "seed" in one]), encoding="utf-8")
+    if wrote_page(arguments, page):
         return
     arguments.keep.mkdir(parents=True, exist_ok=True)
     base = load_scenario(arguments.scenario)

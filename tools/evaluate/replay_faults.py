@@ -8,7 +8,6 @@ distance; no motion on data that are old; after a stop nothing moves before it w
 
 from __future__ import annotations
 
-import argparse
 import json
 import time
 from collections.abc import Sequence
@@ -26,6 +25,8 @@ from lhdmap.replay.processes.film import Film
 from lhdmap.replay.scenario import Scenario, load_scenario, scenario_toml
 from lhdmap.simulation.history import SECOND_NS, START_NS
 from lhdmap.simulation.sensing.faults import FaultSettings
+
+from tools.evaluate.fault_options import fault_parser, wrote_page
 
 FRONT, REAR = "/lidar/front/scan", "/lidar/rear/scan"
 TACHOMETER, JOINTS, INCLINOMETER = "/machine/tachometer", "/machine/joints", "/inclinometer"
@@ -183,23 +184,9 @@ def stale_missed(faults: Sequence[FaultSettings], rows: FloatArray, events: list
 
 def main() -> None:
     """Run and tell."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("scenario", nargs="?", type=Path, default=Path("pipelines/scenarios/tram_short.toml"))
-    parser.add_argument("--runs", type=int, default=20)
-    parser.add_argument("--seed", type=int, default=0, help="of the first run")
-    parser.add_argument("--most", type=int, default=3, help="faults of a run at most")
-    parser.add_argument("--until", type=float, default=16.0, help="latest begin of a fault, s")
-    parser.add_argument(
-        "--keep", type=Path, default=Path("replay_faults"), help="folder for the map and runs that miss"
-    )
-    parser.add_argument(
-        "--lines", type=Path, nargs="*", default=[], help="what runs before have printed, for the page alone"
-    )
-    parser.add_argument("--page", type=Path, help="page to write")
+    parser = fault_parser(__doc__, "tram_short.toml", 16.0, "replay_faults")
     arguments = parser.parse_args()
-    if arguments.lines:
-        texts = [line for path in arguments.lines for line in path.read_text(encoding="utf-8").splitlines()]
-        arguments.page.write_text(page([one for one in map(json.loads, texts) if "seed" in one]), encoding="utf-8")
+    if wrote_page(arguments, page):
         return
     arguments.keep.mkdir(parents=True, exist_ok=True)
     base = load_scenario(arguments.scenario)

@@ -59,7 +59,7 @@ def named(canvas: Canvas, topology: Topology, number: int = 0) -> Canvas:
     sheet = topology.sheets[number]
     low = _low(sheet)
     out = np.ascontiguousarray(canvas[::-1])
-    places = [(node.name, node.T_map_node, (6, -9)) for node in topology.map.intersections]
+    places = [(node.name, node.pose_map_node, (6, -9)) for node in topology.map.intersections]
     places += [(point.name, point.pose, (8, 16)) for point in topology.map.waypoints]
     for name, pose, (right, down) in places:
         x, y = (_pixels(sheet, pose[None, :2])[0] >> _SHIFT) - low

@@ -50,7 +50,7 @@ def real_score(name: str, log: Path, truth_file: Path, folder: Path) -> RealScor
     """Return how the map of a log compares with the drawing, which is fitted onto it by its core intersections."""
     truth: dict[str, Any] = json.loads(truth_file.read_text(encoding="utf-8"))
     nodes = topology_of(log_views(log, folder), TopologySettings()).map.intersections
-    places = np.array([node.T_map_node[:2] for node in nodes]).reshape(-1, 2)
+    places = np.array([node.pose_map_node[:2] for node in nodes]).reshape(-1, 2)
     drawn = [node for node in truth["nodes"] if node["kind"] == "intersection"]
     core = [node for node in drawn if not node.get("optional")]
     match, loose = _matched(truth, core, core, places), _matched(truth, core, drawn, places)

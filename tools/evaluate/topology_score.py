@@ -109,7 +109,7 @@ def _pairs(found: TopologicalMap, truth: Mapping[str, Any], placement: Placement
     if not nodes or not found.intersections:
         return {}
     true = np.array([placement.point(node["position"]) for node in nodes])
-    there = np.array([node.T_map_node[:3] for node in found.intersections])
+    there = np.array([node.pose_map_node[:3] for node in found.intersections])
     apart = np.linalg.norm((true[:, None] - there[None]) * [1.0, 1.0, 2.0], axis=2)
     rows, columns = linear_sum_assignment(apart)
     return {int(k): int(i) for i, k in zip(rows, columns, strict=True) if apart[i, k] < _NEAR_M}
@@ -124,7 +124,7 @@ def _access(
 ) -> list[tuple[float, float, float, str]]:
     """Return for each true access point of a node: error in the map (m), in the node's frame (m), heading (deg), which it is."""
     own = [point for point in found.access_points if point.node == node.id]
-    shift = node.T_map_node[:2] - placement.point(true["position"])[:2]
+    shift = node.pose_map_node[:2] - placement.point(true["position"])[:2]
     rows = []
     for one in true["access_points"] if own else []:
         place, heading = placement.point(one["position"])[:2], math.radians(one["heading_deg"]) + placement.turn_rad

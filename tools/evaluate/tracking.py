@@ -24,9 +24,8 @@ from lhdmap.tracking.path import beside
 from lhdmap.tracking.reference import Curve
 from lhdmap.tracking.settings import TrackingSettings
 from lhdmap.tracking.tracker import Tracker
-
-from tools.evaluate.tracking_paths import site, turn
-from tools.evaluate.tracking_plant import CALM, Drive, Errors, Plant, drive, placed
+from tests.tracking.paths import site, turn
+from tests.tracking.plant import CALM, Drive, Errors, Plant, drive, placed
 
 Row = dict[str, Any]
 FILES = {"truck": "truck_28t", "LHD": "lhd_11t"}

@@ -9,11 +9,11 @@ import matplotlib as mpl
 import numpy as np
 from lhdmap.tracking.path import beside
 from lhdmap.tracking.settings import TrackingSettings
+from tests.tracking.paths import site
+from tests.tracking.plant import Errors
 
 from tools.evaluate.docking import APRONS
 from tools.evaluate.tracking import followed, machine
-from tools.evaluate.tracking_paths import site
-from tools.evaluate.tracking_plant import Errors
 
 mpl.use("Agg")
 import matplotlib.pyplot as plt

@@ -26,8 +26,8 @@ from lhdmap.simulation.sensing.sections import InclinometerSettings, ScannerSett
 from lhdmap.smoothing.keys import KeyScans
 from lhdmap.smoothing.settings import SmoothingSettings
 from lhdmap.smoothing.trust import ExpectedError, expected_error
+from tests.integration.truth import rows_of
 
-from tools.evaluate.integration import rows_of
 from tools.evaluate.worlds import MODERATE_M, ROUGH_M, SMOOTH_M, odometry, run, wheels_of
 
 WALLS = {"rough": ROUGH_M, "moderate": MODERATE_M, "smooth": SMOOTH_M}

@@ -49,21 +49,59 @@ class _Block(NamedTuple):
     travelled_m: float
 
 
+class _KeptHits:
+    """Hits of both scanners that the machine, of a length, has not passed yet."""
+
+    def __init__(self, length_m: float) -> None:
+        self._length_m = length_m
+        self._blocks: deque[_Block] = deque()
+        self._kept_at_m: dict[str, float] = {}
+        self._stretch = -1
+
+    def add(self, frame: str, points: FloatArray, moment: Moment) -> None:
+        """Keep hits of a scanner, where it has come far enough since the last ones."""
+        if abs(moment.travelled_m - self._kept_at_m.get(frame, -np.inf)) >= _KEPT_EACH_M:
+            self._kept_at_m[frame] = moment.travelled_m
+            self._blocks.append(_Block(points, moment.travelled_m))
+
+    def forget(self, moment: Moment) -> None:
+        """Drop hits that are passed, and all of them after a gap."""
+        if moment.stretch != self._stretch:
+            self._stretch = moment.stretch
+            self._blocks.clear()
+            self._kept_at_m.clear()
+        while self._blocks and moment.travelled_m - self._blocks[0].travelled_m > self._length_m + _KEPT_MORE_M:
+            self._blocks.popleft()
+
+    def points(self) -> list[FloatArray]:
+        """Return the hits, (N, 2) each, in the frame of the path."""
+        return [block.points_odom for block in self._blocks]
+
+
+class _Sides(NamedTuple):
+    """The machine in plan.
+
+    `boxes_m` (N, 4): x and y from, x and y to; `on_rear` (N,): whether on the rear body; `begins_m` (2,): where the bins of
+    each body begin; `bins`: how many both have together.
+    """
+
+    boxes_m: FloatArray
+    on_rear: FloatArray
+    begins_m: FloatArray
+    bins: int
+
+
 class WallGauge:
     """Takes scans in the order of the log; `rows` has the moments."""
 
     def __init__(self, path: WheelPath, machine: Machine, start_ns: int) -> None:
         self._path, self._machine, self._start_ns = path, machine, start_ns
         self._rigs: dict[str, Rig] = {}
-        self._blocks: deque[_Block] = deque()
-        self._kept_at_m: dict[str, float] = {}
+        self._kept = _KeptHits(machine.dimensions.length_m)
         self._last_ranges: dict[str, Float32Array] = {}
         self.frozen = 0  # scans of a moving machine that said the same as the one before
-        self._stretch = -1
         self._last_s = -np.inf
-        self._boxes, self._on_rear = _footprints(machine)
-        self._bins = _bins(self._boxes, self._on_rear)
-        self._length_m = machine.dimensions.length_m
+        self._sides = _sides_of(machine)
         self.rows: list[WallRow] = []
 
     def update(self, scan: LaserScan, mount: Mount) -> None:
@@ -72,15 +110,14 @@ class WallGauge:
         moment = self._path.at(time_s)
         if moment is None:
             return
-        self._forget(moment)
+        self._kept.forget(moment)
         if mount.child_frame not in self._rigs:
             self._rigs[mount.child_frame] = rig_of(mount, self._machine, _OWN_M)
         points = self._points(scan, self._rigs[mount.child_frame], moment)
         if self._is_frozen(scan, mount.child_frame, moment):
             points = points[:0]
-        elif abs(moment.travelled_m - self._kept_at_m.get(mount.child_frame, -np.inf)) >= _KEPT_EACH_M:
-            self._kept_at_m[mount.child_frame] = moment.travelled_m
-            self._blocks.append(_Block(points, moment.travelled_m))
+        else:
+            self._kept.add(mount.child_frame, points, moment)
         if time_s - self._last_s >= _MOMENT_S:
             self._last_s = time_s
             self.rows.append(self._row(time_s, moment, points))
@@ -92,15 +129,6 @@ class WallGauge:
         self.frozen += int(same)
         return same
 
-    def _forget(self, moment: Moment) -> None:
-        """Drop hits that are passed, and all of them after a gap."""
-        if moment.stretch != self._stretch:
-            self._stretch = moment.stretch
-            self._blocks.clear()
-            self._kept_at_m.clear()
-        while self._blocks and moment.travelled_m - self._blocks[0].travelled_m > self._length_m + _KEPT_MORE_M:
-            self._blocks.popleft()
-
     def _points(self, scan: LaserScan, rig: Rig, moment: Moment) -> FloatArray:
         limits = np.array([scan.range_min_m, min(scan.range_max_m, _SEEN_M)])
         top_m = self._machine.dimensions.height_m + _OVER_M
@@ -110,11 +138,11 @@ class WallGauge:
         )  # fmt: skip
 
     def _row(self, time_s: float, moment: Moment, points: FloatArray) -> WallRow:
-        size = self._machine.dimensions
-        every = np.concatenate([*(block.points_odom for block in self._blocks), points])
+        size, sides = self._machine.dimensions, self._sides
+        every = np.concatenate([*self._kept.points(), points])
         joint = np.array([moment.articulation_rad, size.joint_to_front_axle_m, size.joint_to_rear_axle_m])
-        left_m, right_m, left, right = _beside(every, moment.pose, joint, self._boxes, self._on_rear, self._bins[0])
-        shares = (float(left.sum()) / self._bins[1], float(right.sum()) / self._bins[1])
+        left_m, right_m, left, right = _beside(every, moment.pose, joint, sides.boxes_m, sides.on_rear, sides.begins_m)
+        shares = (float(left.sum()) / sides.bins, float(right.sum()) / sides.bins)
         return WallRow(time_s, left_m, right_m, *shares, abs(moment.speed_mps) > STANDING_MPS)
 
 
@@ -135,12 +163,12 @@ def wall_figures(rows: list[WallRow]) -> dict[str, float | None]:
     return found
 
 
-def _footprints(machine: Machine) -> tuple[FloatArray, FloatArray]:
-    """Return the boxes of both bodies in plan, (N, 4): x and y from, x and y to, and whether each is on the rear body (N,)."""
+def _sides_of(machine: Machine) -> _Sides:
     both = [machine.boxes("base_link"), machine.boxes("rear_link")]
     boxes = np.concatenate(both)
+    plan = np.column_stack([boxes[:, 0, :2], boxes[:, 1, :2]])
     on_rear = np.repeat([False, True], [len(one) for one in both])
-    return np.column_stack([boxes[:, 0, :2], boxes[:, 1, :2]]), on_rear
+    return _Sides(plan, on_rear, *_bins(plan, on_rear))
 
 
 def _bins(boxes: FloatArray, on_rear: FloatArray) -> tuple[FloatArray, int]:

@@ -21,26 +21,92 @@ _MAX_RANGE_M = 500.0
 _Geometry = tuple[int, float, float]
 
 
+class _Beams:
+    """Counts scans without a hit, and beams: all, those with a hit, and what is odd of the others."""
+
+    def __init__(self, topic: str) -> None:
+        self._topic = topic
+        self._all = self._valid = self._nan = self._negative = self._top = self._scans = self._dead = 0
+
+    def update(self, scan: LaserScan) -> None:
+        ranges = scan.ranges_m
+        hits = _valid(ranges, scan)
+        valid = int(np.count_nonzero(hits))
+        self._scans += 1
+        self._all += len(ranges)
+        self._valid += valid
+        self._dead += valid == 0
+        self._nan += int(np.count_nonzero(np.isnan(ranges)))
+        self._negative += int(np.count_nonzero(ranges < 0))
+        self._top += int(np.count_nonzero(hits & (ranges >= 0.995 * scan.range_max_m)))
+
+    def findings(self) -> list[LogFinding]:
+        share = self._valid / max(self._all, 1)
+        found = []
+        if _DEAD_SHARE <= share < _WEAK_SHARE:
+            text = f"only {100 * share:.0f} % of the beams have a valid range"
+            found.append(
+                LogFinding(Severity.PROBLEM, self._topic, text, "check the scanner's window and its range limits")
+            )
+        if 0 < self._dead < self._scans:
+            text = f"{self._dead} of {self._scans} scans have no valid beam"
+            found.append(LogFinding(Severity.REMARK, self._topic, text, "motion is bridged by prediction there"))
+        if self._top > _SATURATED_SHARE * self._valid > 0:
+            text = f"saturated: {100 * self._top / self._valid:.0f} % of the valid ranges are at the greatest range"
+            found.append(
+                LogFinding(Severity.PROBLEM, self._topic, text, "the scanner seems to report no return as a range")
+            )
+        if self._nan:
+            text = f"{100 * self._nan / self._all:.1f} % of the ranges are NaN (taken as no return)"
+            found.append(LogFinding(Severity.NOTE, self._topic, text))
+        if self._negative:
+            found.append(
+                LogFinding(Severity.REMARK, self._topic, f"{self._negative} negative ranges (taken as no return)")
+            )
+        return found
+
+
+class _Repeats:
+    """Counts scans that are those before again."""
+
+    def __init__(self) -> None:
+        self._last: Float32Array | None = None
+        self._run = self._longest = self._identical = 0
+
+    def update(self, scan: LaserScan) -> None:
+        last, self._last = self._last, scan.ranges_m
+        same = last is not None and last.tobytes() == scan.ranges_m.tobytes()
+        self._identical += same
+        self._run = self._run + 1 if same else 0
+        self._longest = max(self._longest, self._run)
+
+    def findings(self, topic: str) -> list[LogFinding]:
+        if self._longest < _FROZEN_RUN:
+            return []
+        text = f"frozen: {self._longest + 1} identical scans in a row ({self._identical} repeated in all)"
+        return [
+            LogFinding(Severity.PROBLEM, topic, text, "check the driver; a simulated scanner without noise does this")
+        ]
+
+
 class ScanWatch:
     """Gathers what the scans of one topic show."""
 
     def __init__(self, topic: str) -> None:
         self.topic = topic
         self.frame_id = ""
-        self._count = self._dead = self._valid = self._beams = self._nan = self._negative = self._top = 0
-        self._run = self._longest_run = self._identical = 0
-        self._last: Float32Array | None = None
+        self._beams, self._repeats = _Beams(topic), _Repeats()
         self._first: LaserScan | None = None
         self._geometries: Counter[_Geometry] = Counter()
         self._samples: list[LaserScan] = []
-        self._stride = 1
+        self._count, self._stride = 0, 1
 
     def update(self, scan: LaserScan) -> None:
         """Take in one scan."""
         if self._first is None:
             self._first, self.frame_id = scan, scan.frame_id
-        self._count_beams(scan)
-        self._compare(scan)
+        self._beams.update(scan)
+        self._repeats.update(scan)
         if len(self._geometries) < _KINDS:
             key = (len(scan.ranges_m), round(scan.angle_min_rad, 5), round(scan.angle_increment_rad, 7))
             self._geometries[key] += 1
@@ -59,66 +125,13 @@ class ScanWatch:
         if first is None:
             return []
         return [
-            *self._validity(),
-            *self._frozen(),
+            *self._beams.findings(),
+            *self._repeats.findings(self.topic),
             *self._geometry(),
             *_stated_end(self.topic, first, stated_end_rad),
             *_unusual_limits(self.topic, first),
             *_timing(self.topic, first, period_s),
             *self._own_body(),
-        ]
-
-    def _count_beams(self, scan: LaserScan) -> None:
-        ranges = scan.ranges_m
-        valid = int(np.count_nonzero(_valid(ranges, scan)))
-        self._beams += len(ranges)
-        self._valid += valid
-        self._dead += valid == 0
-        self._nan += int(np.count_nonzero(np.isnan(ranges)))
-        self._negative += int(np.count_nonzero(ranges < 0))
-        near_top = _valid(ranges, scan) & (ranges >= 0.995 * scan.range_max_m)
-        self._top += int(np.count_nonzero(near_top))
-
-    def _compare(self, scan: LaserScan) -> None:
-        last, self._last = self._last, scan.ranges_m
-        same = last is not None and last.tobytes() == scan.ranges_m.tobytes()
-        self._identical += same
-        self._run = self._run + 1 if same else 0
-        self._longest_run = max(self._longest_run, self._run)
-
-    def _validity(self) -> list[LogFinding]:
-        share = self._valid / max(self._beams, 1)
-        found = []
-        if _DEAD_SHARE <= share < _WEAK_SHARE:
-            text = f"only {100 * share:.0f} % of the beams have a valid range"
-            found.append(
-                LogFinding(Severity.PROBLEM, self.topic, text, "check the scanner's window and its range limits")
-            )
-        if 0 < self._dead < self._count:
-            text = f"{self._dead} of {self._count} scans have no valid beam"
-            found.append(LogFinding(Severity.REMARK, self.topic, text, "motion is bridged by prediction there"))
-        if self._top > _SATURATED_SHARE * self._valid > 0:
-            text = f"saturated: {100 * self._top / self._valid:.0f} % of the valid ranges are at the greatest range"
-            found.append(
-                LogFinding(Severity.PROBLEM, self.topic, text, "the scanner seems to report no return as a range")
-            )
-        if self._nan:
-            text = f"{100 * self._nan / self._beams:.1f} % of the ranges are NaN (taken as no return)"
-            found.append(LogFinding(Severity.NOTE, self.topic, text))
-        if self._negative:
-            found.append(
-                LogFinding(Severity.REMARK, self.topic, f"{self._negative} negative ranges (taken as no return)")
-            )
-        return found
-
-    def _frozen(self) -> list[LogFinding]:
-        if self._longest_run < _FROZEN_RUN:
-            return []
-        text = f"frozen: {self._longest_run + 1} identical scans in a row ({self._identical} repeated in all)"
-        return [
-            LogFinding(
-                Severity.PROBLEM, self.topic, text, "check the driver; a simulated scanner without noise does this"
-            )
         ]
 
     def _geometry(self) -> list[LogFinding]:

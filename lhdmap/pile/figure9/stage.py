@@ -39,7 +39,7 @@ class Figure9Stage:
         if self._ended:
             return None
         self._fresh.append(scan.points_map)
-        position = scan.T_map_base[:3]
+        position = scan.pose_map_base[:3]
         if len(self._fresh) >= _SCANS_BETWEEN:
             self._merge(position)
         if self._position is not None and np.hypot(*(position - self._position)[:2]) < self._settings.update_m:
@@ -56,13 +56,13 @@ class Figure9Stage:
         )
 
     def _estimate(self, scan: ScanHits) -> Snapshot:
-        self._merge(scan.T_map_base[:3])
-        x, y, z, heading = (float(value) for value in scan.T_map_base)
+        self._merge(scan.pose_map_base[:3])
+        x, y, z, heading = (float(value) for value in scan.pose_map_base)
         T_map_base = se3.from_rpy(0.0, 0.0, heading, (x, y, z))
         estimate = figure9(self._points, T_map_base, self._constants)
         distance = math.nan
         if len(estimate.toe_m):
-            distance = float(np.linalg.norm(estimate.toe_m - scan.T_map_base[:3], axis=1).min())
+            distance = float(np.linalg.norm(estimate.toe_m - scan.pose_map_base[:3], axis=1).min())
         snapshot = Snapshot(scan.stamp_ns, distance, estimate)
         self._history.append(snapshot)
         self._ended = loop_ends(estimate, T_map_base, self._constants)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Sequence
+from typing import NamedTuple
 
 import numpy as np
 
@@ -11,6 +12,7 @@ from lhdmap.haulage.mission_io import Buckets, MissionInput, MissionOutput, Navi
 from lhdmap.loading.states import ASSISTANCE, State
 from lhdmap.messages import FloatArray
 from lhdmap.navigation.along import Located
+from lhdmap.navigation.presence import Presence
 from lhdmap.replay.journal import Scribe
 from lhdmap.replay.process import (
     DUMPING,
@@ -25,6 +27,7 @@ from lhdmap.replay.process import (
     Process,
     Received,
 )
+from lhdmap.replay.processes.feed import JOINTS
 from lhdmap.replay.processes.order_book import OrderBook, Task
 from lhdmap.replay.processes.told import DumpingNow, Health, LoadingNow, Navigating, Orders
 from lhdmap.topology.model import TopologicalMap
@@ -36,6 +39,13 @@ HAS_THE_MACHINE = frozenset(State) - {State.IDLE, State.IDENTIFICATION, State.DO
 """States of the loading task in which it drives the machine, and navigation does not."""
 
 
+class SharedMap(NamedTuple):
+    """What a machine among others knows of the map: the nodes (ids) that it may be in, and what it is in itself."""
+
+    free: Callable[[], frozenset[str]]
+    presence: Presence
+
+
 class Executive(Process):
     """Each 100 ms the mission task is told what is, and its outputs become orders.
 
@@ -44,7 +54,7 @@ class Executive(Process):
     """
 
     name, period_ns, latency_ns, priority = EXECUTIVE, 100 * MILLISECOND_NS, 5 * MILLISECOND_NS, 15
-    reads = (POSE, LOCATED, NAVIGATING, LOADING, DUMPING, MACHINE_SAYS, STATION_SAYS)
+    reads = (POSE, JOINTS, LOCATED, NAVIGATING, LOADING, DUMPING, MACHINE_SAYS, STATION_SAYS)
 
     def __init__(
         self,
@@ -54,10 +64,10 @@ class Executive(Process):
         full_t: float,
         scribe: Scribe,
         *,
-        free: Callable[[], frozenset[str]] | None = None,
+        shares: SharedMap | None = None,
     ) -> None:
-        """`free`: of a machine among others tells which nodes of the map it may be in."""
-        self.task, self._buckets, self._book, self._free = task, tuple(orders), OrderBook(scribe), free
+        """`shares`: of a machine among others."""
+        self.task, self._buckets, self._book, self._shares = task, tuple(orders), OrderBook(scribe), shares
         self._topology, self._full_t = topology, full_t
         self._located: Located | None = None
         self._navigating: Navigating | None = None
@@ -67,6 +77,7 @@ class Executive(Process):
         self._orders, self._key, self._loads = Orders(0, 0, "", loaded=False), ("", False, 0), 0
         self._emergency = self._go_on = self._gave_up = False
         self._task = 0
+        self._articulation_rad, self._inside, self._node = 0.0, frozenset[str](), ""
         self._odometer_m, self._place = 0.0, np.full(2, np.nan)
 
     def step(self, now_ns: int, inbox: Sequence[Received]) -> Iterator[Outgoing]:
@@ -84,6 +95,10 @@ class Executive(Process):
         located = self._located
         assert located is not None  # noqa: S101  # nothing is told before there is a place
         known = located.status == "tracking"
+        if known and self._shares is not None:
+            place = located.pose_map, located.height_m
+            self._inside = self._shares.presence.nodes(*place, self._articulation_rad)
+            self._node = self._shares.presence.node_at(*place)
         x, y, yaw = located.pose_map.tolist()
         return MissionInput(
             now_ns,
@@ -96,13 +111,18 @@ class Executive(Process):
             orders=self._buckets,
             abort=self._gave_up,
             answer="go_on" if self._go_on else "",
+            inside=self._inside,
         )
 
     def _navigation(self) -> Navigation:
-        """Return what navigation says of the order that holds; arrived where the loading task has taken the machine over."""
+        """Return what navigation says of the order that holds; arrived where the loading task has taken the machine over.
+
+        Among others it has arrived once it truly is in the node of its draw point: sections are given back by that.
+        """
         told, orders = self._navigating, self._orders
         if self._takes_over():
-            return Navigation("arrived", orders.goal)
+            there = self._shares is None or self._node == getattr(self._topology.called(orders.goal), "node", "")
+            return Navigation("arrived" if there else "driving", orders.goal)
         if told is None or told.number != orders.number:
             return Navigation()
         return Navigation(told.state, told.goal, told.reason)
@@ -141,7 +161,7 @@ class Executive(Process):
         if out.goal:
             self._key = key
         near = self._navigating is not None and self._navigating.number == number and self._navigating.left_m < _NEAR_M
-        free = None if self._free is None else self._free()
+        free = None if self._shares is None else self._shares.free()
         begins = not out.loaded and near and self._draws(out.goal, free)
         if (begins or out.begin == "load") and not self._orders.loading:
             self._loads += 1
@@ -166,6 +186,9 @@ class Executive(Process):
         topic, _, message = received
         if topic == POSE:
             self._drive(message.T_odom_base[:2, 3])
+        elif topic == JOINTS:
+            bend_rad = message.positions_rad.get("articulation", math.nan)
+            self._articulation_rad = bend_rad if math.isfinite(bend_rad) else self._articulation_rad
         elif topic == LOCATED:
             self._located = message
         elif topic == NAVIGATING:

@@ -198,8 +198,8 @@ class DriveFilm:
                 self._legs.append(("forward" if asked.gear > 0 else "reverse", []))
         new = (way > self._along_m) & (way < asked.stop_m + _ON_PATH_M)
         if new.any():
-            T_map_odom = se2.compose(self._located.pose_map, se2.inverse(self._located.pose_odom))
-            self._legs[-1][1].append(moved(asked.path[new], T_map_odom)[:, :2])
+            pose_map_odom = se2.compose(self._located.pose_map, se2.inverse(self._located.pose_odom))
+            self._legs[-1][1].append(moved(asked.path[new], pose_map_odom)[:, :2])
             self._along_m = float(way[new][-1])
 
     def _begin_m(self, asked: Directive) -> float:

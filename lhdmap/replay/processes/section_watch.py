@@ -10,19 +10,17 @@ import numpy as np
 
 from lhdmap.driving.bodies import Bodies
 from lhdmap.geometry import se2
-from lhdmap.kinematics import T_base_rear
 from lhdmap.machine import Machine
 from lhdmap.messages import FloatArray
+from lhdmap.navigation.presence import Presence
 from lhdmap.replay.journal import Scribe
 from lhdmap.replay.namespace import topic_of
 from lhdmap.replay.parts import State
 from lhdmap.replay.process import EVERYWHERE, MILLISECOND_NS, STATE, Outgoing, Process, Received
 from lhdmap.simulation.history import SECOND_NS, START_NS
-from lhdmap.topology.lookup import Lookup
 from lhdmap.topology.model import TopologicalMap
 
 SECTION_WATCH = "crew/monitor"
-_APART_M = 1.0  # points along the middle of a body
 
 
 class SectionWatch(Process):
@@ -41,8 +39,7 @@ class SectionWatch(Process):
     ) -> None:
         self._name_of = {topic_of(space, STATE): name for name, space in machines.items()}
         self.reads = tuple(self._name_of)
-        self._lookup, self._section_of, self._T_mine_map = Lookup(topology), section_of, T_mine_map
-        (self._front_m, self._rear_m), self._machine = (_middle(box) for box in bodies[0][2:]), bodies[1]
+        self._presence, self._section_of, self._T_mine_map = Presence(topology, *bodies), section_of, T_mine_map
         self._states: dict[str, State] = {}
         self._shared: set[tuple[str, str, str]] = set()
         self._scribe = scribe
@@ -66,15 +63,5 @@ class SectionWatch(Process):
         x0, y0, z0, yaw = self._T_mine_map.tolist()
         place = np.array([state.x_m, state.y_m, state.yaw_rad])
         T_map_base = se2.compose(se2.inverse(np.array([x0, y0, yaw])), place)
-        T = T_base_rear(state.articulation_rad, self._machine)
-        T_map_rear = se2.compose(T_map_base, np.array([T[0, 3], T[1, 3], np.arctan2(T[1, 0], T[0, 0])]))
-        flat = np.concatenate([se2.transform(T_map_base, self._front_m), se2.transform(T_map_rear, self._rear_m)])
-        nodes = self._lookup.nodes_at(np.column_stack([flat, np.full(len(flat), state.z_m - z0)]))
+        nodes = self._presence.nodes(T_map_base, state.z_m - z0, state.articulation_rad)
         return {self._section_of.get(node, node) for node in nodes}
-
-
-def _middle(box_m: FloatArray) -> FloatArray:
-    """Return points (N, 2) along the middle of a body."""
-    (x0, _), (x1, _) = box_m.tolist()
-    x = np.linspace(x0, x1, max(int(np.ceil((x1 - x0) / _APART_M)), 1) + 1)
-    return np.column_stack([x, np.zeros(len(x))])

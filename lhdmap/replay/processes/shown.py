@@ -121,7 +121,7 @@ class Shown:
         if self._on_map:
             if self._located is None or self._located.status != "tracking":
                 return None
-            pose = se2.compose(se2.inverse(self._located.T_odom_map), pose)
+            pose = se2.compose(se2.inverse(self._located.pose_odom_map), pose)
         x, y, heading = (round(value, 4) for value in pose.tolist())
         return (x, y, heading) if all(map(math.isfinite, (x, y, heading))) else None
 

@@ -7,8 +7,9 @@ import math
 import numpy as np
 import pytest
 from lhdmap.loading.digging_settings import ChargingSettings
-from tools.evaluate.loading_charges import charge_all
-from tools.evaluate.loading_loads import Dug, Plan, charged, dug, loader_on
+
+from tests.loading.digging.charges import charge_all
+from tests.loading.digging.loads import Dug, Plan, charged, dug, loader_on
 
 SEEDS = range(8100, 8106)
 

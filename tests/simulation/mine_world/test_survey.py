@@ -18,9 +18,8 @@ from lhdmap.simulation.mine_world.bumper import Bumper
 from lhdmap.simulation.mine_world.collada import read_dae
 from lhdmap.simulation.mine_world.world import MineWorld
 from lhdmap.simulation.vehicle.vehicle import Vehicle
-from tools.survey_mine import make_plan
 
-HALF_M, HEIGHT_M, LENGTH_M = 2.0, 3.5, 40.0
+from tests.simulation.mine_world.boxes import HALF_M, tunnel
 
 DAE = """<?xml version="1.0"?>
 <COLLADA xmlns="http://www.collada.org/2005/11/COLLADASchema" version="1.4.1">
@@ -40,16 +39,6 @@ FACES = {
     "triangles": f'<triangles count="2">{INPUTS}<p>0 9 1 9 2 9 0 9 2 9 3 9</p></triangles>',
     "polylist": f'<polylist count="1">{INPUTS}<vcount>4</vcount><p>0 9 1 9 2 9 3 9</p></polylist>',
 }
-
-
-def tunnel() -> Mesh:
-    """Return a straight box of a drift along x, floor at z = 0."""
-    x = np.arange(0.0, LENGTH_M + 0.1, 0.25)
-    ring = np.array([[-HALF_M, 0.0], [-HALF_M, HEIGHT_M], [HALF_M, HEIGHT_M], [HALF_M, 0.0]])
-    vertices = np.concatenate([np.column_stack([np.full(4, at), ring]) for at in x])
-    sides = [[k, (k + 1) % 4, k + 4] for k in range(4)] + [[(k + 1) % 4, (k + 1) % 4 + 4, k + 4] for k in range(4)]
-    triangles = np.concatenate([np.array(sides) + 4 * n for n in range(len(x) - 1)])
-    return Mesh(vertices, triangles.astype(np.uint32))
 
 
 def world_of(folder: Path, file: str, more: str = "") -> MineWorld:
@@ -168,19 +157,3 @@ def test_the_lines_of_surveyed_plans_are_between_their_walls(name: str) -> None:
     beside = np.abs(sides[0] - sides[1])[np.maximum(*sides) < 3.0]
     assert len(beside) > 10
     assert np.median(beside) < 0.35
-
-
-def test_a_rough_line_is_put_in_the_middle(tmp_path: Path) -> None:
-    write_ply(tmp_path / "drift.ply", [tunnel()])
-    rough, out = tmp_path / "rough.toml", tmp_path / "out.toml"
-    rough.write_text(
-        '[surface]\nfile = "drift.ply"\nkind = "mesh"\n'
-        '[[drift]]\nname = "A"\nline_m = [[3, 0, 0.3], [20, 0.9, 0.4], [37, 0, 0.3]]\n',
-        encoding="utf-8",
-    )
-    make_plan(rough, out)
-    line = np.array(load_plan(out).drifts[0].line_m)
-    assert np.abs(line[:, 1]).max() < 0.12  # it was off by 0.9 m
-    assert np.abs(line[:, 2]).max() < 0.02
-    widths = np.array(load_plan(out).drifts[0].width_m)[:, 1]
-    assert np.abs(widths - 2.0 * HALF_M).max() < 0.2

@@ -9,7 +9,9 @@ from pathlib import Path
 import pytest
 from lhdmap.logs import open_log
 from mcap.writer import CompressionType
-from tools.fuzz_logs import SEEDS, mutated, read_all, write_mcap
+from tools.fuzz_logs import SEEDS, mutated, read_all
+
+from tests.logs.small_logs import write_mcap
 
 COUNT = 300
 

@@ -13,7 +13,7 @@ from lhdmap.machine import Machine
 from lhdmap.simulation.ground.loader import Loader
 from lhdmap.simulation.ground.sections import Grounds, load_ground
 
-from tools.evaluate.loading_loads import Charged, Plan, charged
+from tests.loading.digging.loads import Charged, Plan, charged
 
 MIX = {"clean": 0.15, "bumps": 0.30, "wet": 0.20, "pressed hard": 0.15, "lip high": 0.20}
 """Shares of what disturbs a charge: spikes of the floor (1 per metre), a wet floor, 60 bar of press, a lip 5 to 15 cm high."""

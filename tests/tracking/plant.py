@@ -143,7 +143,7 @@ def drive(tracker: Tracker, plant: Plant, truth: FloatArray, seconds: float, ste
             out.arrived = step.state == "arrived" and abs(plant.speed) < 0.01
             if out.arrived or (step.state == "stopped" and abs(plant.speed) < 0.01):
                 break
-        plant.sent.append(_at(queue, plant.now_ns, plant._model))  # noqa: SLF001
+        plant.sent.append(_at(queue, plant.now_ns, plant._model))
         plant.step()
     return out
 

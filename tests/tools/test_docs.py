@@ -9,9 +9,9 @@ from pathlib import Path
 
 import pytest
 from lhdmap.config import Settings, settings_table
-from tools.docs_hooks import linked, notebook_text
+from tools.docs_hooks import linked, notebook_text, without_network
 
-ROOT = Path(__file__).resolve().parents[1]
+ROOT = Path(__file__).resolve().parents[2]
 
 
 @pytest.mark.parametrize(
@@ -41,6 +41,12 @@ def test_the_notebook_is_a_page_with_its_pictures() -> None:
     assert "](data:image/png;base64," in text
 
 
+def test_the_search_of_a_site_on_disk_needs_no_network() -> None:
+    html = without_network('<script src="https://unpkg.com/iframe-worker/shim"></script>', "api/lhdmap.html")
+    assert html == '<script src="../js/iframe-worker.js"></script>'
+    assert (ROOT / "docs" / "js" / "iframe-worker.js").is_file()
+
+
 def test_the_settings_that_pages_name_exist() -> None:
     table = settings_table(Settings())
     text = (ROOT / "docs" / "symptoms.md").read_text(encoding="utf-8")
@@ -58,3 +64,4 @@ def test_mkdocs_takes_it_strictly(tmp_path: Path) -> None:
     command = [mkdocs, "build", "--strict", "--quiet", "--site-dir", str(tmp_path / "site")]
     done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr[-3000:]
+    assert 'src="http' not in (tmp_path / "site" / "index.html").read_text(encoding="utf-8")
