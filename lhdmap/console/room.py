@@ -172,7 +172,7 @@ class Room:
             if message.armed:
                 self.alarms.clear("stopped", name)
             else:
-                self.alarms.raises("stopped", STOPPED, name, f"not armed: {'; '.join(message.causes)}", now_s)
+                self.alarms.raises("stopped", STOPPED, name, f"stopped: {'; '.join(message.causes)}", now_s)
             return before != self.alarms.shown(now_s)
         if isinstance(message, Asked):
             self.alarms.clear("asks", name)

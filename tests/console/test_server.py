@@ -115,7 +115,7 @@ def test_a_page_that_comes_late_is_told_what_is(served: Served, anna: Page) -> N
     assert late.until("status", machine="m5")["causes"] == ["link lost"]
     assert late.until("event", machine="m5")["text"] == "stops"
     alarms = [one["text"] for one in late.until("alarms")["alarms"] if one["machine"] == "m5"]
-    assert alarms == ["not armed: link lost", "asks for help: time limit", "stops"]
+    assert alarms == ["stopped: link lost", "asks for help: time limit", "stops"]
 
 
 def test_wrong_codes_are_refused_counted_and_then_not_looked_at(served: Served) -> None:
