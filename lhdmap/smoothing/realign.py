@@ -24,6 +24,7 @@ from lhdmap.smoothing.settings import SmoothingSettings
 from lhdmap.smoothing.window import Offset, Window, WindowNode, solved
 
 _SOLVE_SHARE = 0.3  # of the lag between two solutions
+_LATE_SHARE = 0.1  # of the lag in time between two solutions of a slow machine
 _REST_SHARE = 0.2  # of the lag in time between nodes at rest
 _MOST_FINAL = 300  # of a machine that stands
 _ANCHOR_M = 30.0  # of final poses that the others are tied to: farther than the rear scanner looks back
@@ -74,7 +75,7 @@ class Realigner:
         self._worker = ThreadPoolExecutor(max_workers=1, thread_name_prefix="realign")
         self._pending: Future[Window] | None = None
         self._way = _Way()
-        self._solved_m = 0.0
+        self._solved_m, self._solved_ns = 0.0, 0
         self.moves = Moves()
 
     def update(self, scan: AlignedScan) -> None:
@@ -82,11 +83,11 @@ class Realigner:
         self._way.go_on(scan)
         if self._due(scan.time_ns):
             self._append(scan)
-        late = self._nodes[min(self._final, len(self._nodes) - 1)].time_ns < scan.time_ns - self._settings.lag_s * 1e9
-        if late or self._way.travelled_m - self._solved_m >= _SOLVE_SHARE * self._settings.lag_m:
+        if self._is_late(scan.time_ns) or self._way.travelled_m - self._solved_m >= _SOLVE_SHARE * self._settings.lag_m:
             # A solution is asked for when the next is due, never when it happens to be ready: the result must not depend on it.
             self._collect()
             self._settle(scan.time_ns)
+            self._solved_ns = scan.time_ns
             self._solve()
 
     def finish(self) -> None:
@@ -97,6 +98,15 @@ class Realigner:
         while self._final < len(self._nodes):
             self._make_final()
         self._worker.shutdown()
+
+    def _is_late(self, now_ns: int) -> bool:
+        """Return whether a node waits for too long, and the last solution was not just now.
+
+        A machine that is slower than `lag_m` in `lag_s` would have one for each node otherwise.
+        """
+        lag_ns = self._settings.lag_s * 1e9
+        oldest_ns = self._nodes[min(self._final, len(self._nodes) - 1)].time_ns
+        return oldest_ns < now_ns - lag_ns and now_ns - self._solved_ns >= _LATE_SHARE * lag_ns
 
     def _due(self, time_ns: int) -> bool:
         """Return whether a node is due: by travel, and at rest now and then, so that the path does not stop."""

@@ -100,6 +100,24 @@ def test_poses_are_final_after_the_lag_and_not_before() -> None:
     assert realigner.moves.last_ns >= 12.0 / STEP_M * STEP_NS - 3 * STEP_NS
 
 
+def test_a_slow_machine_has_no_solution_for_each_node(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Slower than the lag in travel by the lag in time, it had one: ten times the work of a fast drive."""
+    windows: list[Window] = []
+
+    def counted(window: Window) -> Window:
+        windows.append(window)
+        return window._replace(unpaired=len(window.nodes))
+
+    monkeypatch.setattr(realign, "solved", counted)
+    realigner, slow_ns, (_, scan) = Realigner(SETTINGS), 250_000_000, drive(0.0)[0]  # 0.4 m/s
+    for k in range(800):
+        pose = np.array([STEP_M * k, 0.0, 0.0])
+        realigner.update(scan._replace(time_ns=k * slow_ns, pose=pose))
+    duration_s = 800 * slow_ns * 1e-9
+    assert len(windows) <= duration_s / (0.1 * SETTINGS.lag_s) + duration_s * 0.4 / (0.3 * SETTINGS.lag_m) + 1
+    assert realigner.moves.last_ns >= (duration_s - 1.2 * SETTINGS.lag_s) * 1e9
+
+
 def test_at_rest_the_path_goes_on() -> None:
     """What waits for it, sweeps of all scanners, must not grow while the machine stands."""
     realigner, (_, scan) = Realigner(SETTINGS), drive(0.0)[0]
