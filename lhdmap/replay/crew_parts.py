@@ -100,7 +100,7 @@ def _like(first: Parts, scenario: Scenario, network: Network, world: MineWorld, 
     if given is None or not isinstance(vehicle, LoadingVehicle):
         raise UsageError("several machines: kind = 'mission' was wanted")
     mode = ModeNow("idle")
-    other = LoadingVehicle(first.machine, world, vehicle.piles, seed=seed)
+    other = LoadingVehicle(first.machine, world, vehicle.piles.for_another(seed), seed=seed)
     x, y, z, yaw = network.tubes[begin.tube].pose(begin.at_m, begin.facing).tolist()
     return replace(
         first,

@@ -67,7 +67,7 @@ class Cut:
 
 @dataclass
 class Piles:
-    """Piles by name. `show` takes a pile's surface whenever it has changed: `MineWorld.dig`."""
+    """Piles by name as one machine digs in them. `show` takes a pile's surface whenever it has changed: `MineWorld.dig`."""
 
     heaps: dict[str, Heap]
     ground: Grounds
@@ -81,6 +81,10 @@ class Piles:
     _turned_ns: int = -1
     _shown_ns: int = -1
     _shown: dict[str, int] = field(default_factory=dict)
+
+    def for_another(self, seed: int) -> Piles:
+        """Return the same piles for another machine: attempts and chance of its own, in the same heaps."""
+        return Piles(self.heaps, self.ground, self.width_m, seed, self.show, _shown=self._shown)
 
     def follow(
         self, now_ns: int, lip_m: FloatArray, heading_rad: float, load_kg: float, *, lowered: bool
@@ -99,7 +103,8 @@ class Piles:
         elif now_ns - self._turned_ns >= TURN_NS:
             self._turned_ns = now_ns
             for heap in self.heaps.values():
-                if not heap.calm:
+                if not heap.calm and now_ns - heap.slid_ns >= TURN_NS:  # another machine's piles let it slide already
+                    heap.slid_ns = now_ns
                     heap.slide(TURN_NS * 1e-9, self.ground.face.slide_per_s)
             if lowered:
                 self._begin(lip_m, heading_rad, load_kg)

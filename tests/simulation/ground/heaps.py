@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from functools import partial
 
 import numpy as np
 from lhdmap.messages import FloatArray
@@ -14,8 +15,9 @@ TOE_M, HALF_M = 20.0, 2.6
 SLOPE = math.tan(math.radians(48.0))
 
 
-def inside(points_m: FloatArray) -> Bools:
-    found: Bools = (np.abs(points_m[..., 1]) < HALF_M) & (points_m[..., 0] > TOE_M - 8.0) & (points_m[..., 0] < 32.0)
+def inside(points_m: FloatArray, y_m: float = 0.0) -> Bools:
+    x, y = points_m[..., 0], points_m[..., 1] - y_m
+    found: Bools = (np.abs(y) < HALF_M) & (x > TOE_M - 8.0) & (x < 32.0)
     return found
 
 
@@ -23,9 +25,10 @@ def level(points_m: FloatArray) -> FloatArray:
     return np.zeros(points_m.shape[:-1])
 
 
-def heap(*, fed: bool = False, rough_m: float = 0.0, crest_m: float = 3.5) -> Heap:
-    grid = Grid(TOE_M - 6.0, -2.95, 0.0, (round(18.0 / ALONG_M), round(6.0 / ACROSS_M)))
+def heap(*, fed: bool = False, rough_m: float = 0.0, crest_m: float = 3.5, y_m: float = 0.0) -> Heap:
+    """`y_m`: of the middle of its drift."""
+    grid = Grid(TOE_M - 6.0, y_m - 2.95, 0.0, (round(18.0 / ALONG_M), round(6.0 / ACROSS_M)))
     x = grid.points()[:, :, 0] - TOE_M
     heights = np.clip(SLOPE * x, 0.0, crest_m)
     heights += np.where(heights > 0.3, rough_m * np.random.default_rng(1).standard_normal(heights.shape), 0.0)
-    return Heap(grid, heights, SLOPE, inside, level, fed=fed)
+    return Heap(grid, heights, SLOPE, partial(inside, y_m=y_m), level, fed=fed)

@@ -112,6 +112,30 @@ def test_a_state_can_be_stepped_again_where_no_pile_is() -> None:
     assert vehicle.step(state, given, STEP_S) == vehicle.step(state, given, STEP_S)
 
 
+def by_the_clock(state: VehicleState) -> Command:
+    """Charge, tilt and push by turns: what is asked for at a time, whatever comes of it."""
+    second = state.time_ns * 1e-9
+    tilts = second > 8.0 and second % 1.7 < 1.0
+    return Command(state.time_ns, 0.5, 0.0, 0.6 if tilts else 0.0, 0.0, full_rpm=not tilts, brake=False)
+
+
+def test_two_machines_dig_at_the_same_time_as_each_would_alone() -> None:
+    """The attempt of one ended that of the other: buckets stayed empty, and a machine drove through its pile into the wall."""
+
+    def loads_kg(working: tuple[int, ...]) -> list[float]:
+        piles = Piles({"DP": heap(), "DP2": heap(y_m=60.0)}, quiet(rock={"hardness": 1.5, "hardness_sigma": 0.0}), seed=3)
+        both = [LoadingVehicle(MACHINE, Plane(), one, seed=3) for one in (piles, piles.for_another(4))]
+        states = [start(one, x_m=TOE_M - 5.5, y_m=60.0 * k)._replace(bucket_rad=-0.8) for k, one in enumerate(both)]
+        for _ in range(round(18.0 / STEP_S)):
+            for k in working:
+                states[k] = both[k].step(states[k], by_the_clock(states[k]), STEP_S)
+        return [states[k].load_kg for k in working]
+
+    together = loads_kg((0, 1))
+    assert min(together) > 2000.0
+    assert together == [*loads_kg((0,)), *loads_kg((1,))]
+
+
 @pytest.mark.parametrize(("y_m", "yaw"), [(0.0, 0.0), (0.3, -0.08)])
 def test_it_fills_its_bucket_and_no_litre_is_lost(y_m: float, yaw: float) -> None:
     vehicle, state, piles = digging(y_m=y_m, yaw=yaw)
