@@ -37,7 +37,6 @@ demo: $(STAMP) ## Simulate the sample drive, build its map, evaluate it: demo/ (
 	$(BIN)/lhdmap demo --output demo --force
 
 test: $(STAMP) ## Run all tests
-	$(BIN)/python -m tools.kernels > /dev/null
 	$(BIN)/python -m pytest -n $(JOBS) --dist worksteal
 
 lint: $(STAMP) ## Check style, formatting and types

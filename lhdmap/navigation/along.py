@@ -58,12 +58,20 @@ def part_of(now_ns: int, gear: int, path: FloatArray, stop_m: float, at_m: float
     return Directive(now_ns, gear, path[part], stop_m)
 
 
-def facing(topology: TopologicalMap, goal: str) -> str | None:
-    """Return the heading at a goal: a draw point or a dump at a dead end is faced with the bucket; None: any will do."""
+def facing(topology: TopologicalMap, goal: str, tail_m: float = 0.0) -> str | None:
+    """Return the heading at a goal at a dead end; None: any will do.
+
+    A draw point or a dump is faced with the bucket, and so is a place where less than `tail_m` is left to the end: the machine,
+    which reaches so far behind `base_link`, stood there bucket first when it was taught, and cannot back up to it.
+    """
     point = topology.called(goal)
-    if not isinstance(point, Waypoint) or point.purpose not in ("draw_point", "dump"):
+    if not isinstance(point, Waypoint):
         return None
     node = topology.nodes[point.node]
     if not isinstance(node, Tunnel) or DEAD_END not in node.ends:
         return None
-    return "along" if node.ends[1] == DEAD_END else "against"
+    last = node.ends[1] == DEAD_END
+    left_m = float(np.linalg.norm(node.line_m[-1 if last else 0][:2] - point.pose[:2]))
+    if point.purpose not in ("draw_point", "dump") and left_m >= tail_m:
+        return None
+    return "along" if last else "against"

@@ -46,10 +46,11 @@ class Reach(NamedTuple):
 
 
 def route_from(planner: RoutePlanner, point: str, errand: Errand, reach: Reach) -> Route:
-    """Return the route from a point to the goal on which each change of gear has room."""
+    """Return the route from a point to the goal on which each change of gear has room, and the machine at the goal."""
     topology = planner.topology
     heading = f"{math.degrees(errand.heading_rad):.1f}"
-    asked = RouteOptions(heading=heading, goal_heading=facing(topology, errand.goal), alternatives=0)
+    ends = facing(topology, errand.goal, reach.tail_m)
+    asked = RouteOptions(heading=heading, goal_heading=ends, alternatives=0)
 
     def ask(avoid: tuple[str, ...]) -> Route:
         return planner.route(point, errand.goal, replace(asked, avoid=avoid))

@@ -123,7 +123,9 @@ def test_two_machines_dig_at_the_same_time_as_each_would_alone() -> None:
     """The attempt of one ended that of the other: buckets stayed empty, and a machine drove through its pile into the wall."""
 
     def loads_kg(working: tuple[int, ...]) -> list[float]:
-        piles = Piles({"DP": heap(), "DP2": heap(y_m=60.0)}, quiet(rock={"hardness": 1.5, "hardness_sigma": 0.0}), seed=3)
+        piles = Piles(
+            {"DP": heap(), "DP2": heap(y_m=60.0)}, quiet(rock={"hardness": 1.5, "hardness_sigma": 0.0}), seed=3
+        )
         both = [LoadingVehicle(MACHINE, Plane(), one, seed=3) for one in (piles, piles.for_another(4))]
         states = [start(one, x_m=TOE_M - 5.5, y_m=60.0 * k)._replace(bucket_rad=-0.8) for k, one in enumerate(both)]
         for _ in range(round(18.0 / STEP_S)):

@@ -1,0 +1,27 @@
+"""With which end first a machine comes to a goal at a dead end."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+from lhdmap.navigation.along import facing
+
+from tests.topology.maps import ladder
+
+
+@pytest.mark.parametrize(
+    ("purpose", "tail_m", "heading"),
+    [("draw_point", 3.0, "along"), ("dump", 3.0, "along"), ("park", 6.0, "along"), ("park", 3.5, None)],
+)
+def test_a_machine_is_not_backed_to_where_its_tail_has_no_room(
+    purpose: str, tail_m: float, heading: str | None
+) -> None:
+    """4 m are left behind the place: with a tail of 6 m it stood before the end of the drift and was taken to be stuck."""
+    topology = ladder()
+    topology = replace(topology, waypoints=tuple(replace(one, purpose=purpose) for one in topology.waypoints))
+    assert facing(topology, "DP1", tail_m) == heading
+
+
+def test_a_point_that_is_no_place_may_be_come_to_either_way() -> None:
+    assert facing(ladder(), "t1.end", 6.0) is None
