@@ -19,6 +19,7 @@ from lhdmap.messages import FloatArray
 
 _STEP_RAD = math.radians(0.5)
 _NEAR_M = 14.0
+_WELL_OFF = 3.0  # times the least room beside the bodies
 _INSIDE = 0.6  # share of the room beside the bucket that is kept on either side, where it can be
 
 
@@ -45,7 +46,7 @@ class Aligner:
         """Return whether a charge from now on keeps both boxes free of wall points until the lip is at the pile."""
         landed = self.lands(bend_rad, limits_m)
         start = Posture(np.zeros(3), bend_rad)
-        return self._sweeps_free(iter(()), start, landed, self._walls(limits_m, walls_m))
+        return self._sweeps_free(iter(()), start, landed, self._walls(limits_m, walls_m), self._settings.wall_m)
 
     def boxes_free(self, bend_rad: float, limits_m: FloatArray, walls_m: FloatArray) -> bool:
         """Return whether no wall point is inside a box now: Eq. (6)."""
@@ -55,14 +56,16 @@ class Aligner:
     def aim(self, bend_rad: float, limits_m: FloatArray, walls_m: FloatArray) -> Aim:
         """Return the angle to turn the joint to; limits (2, 2) and wall points (N, 2) in `base_link`.
 
-        Of those that land well inside the nearest one, where there are none of those that land inside at all.
+        Of those that land well inside the nearest one, where there are none of those that land inside at all; among them those
+        first that keep well off the walls, which are rough and not seen at each height.
         """
         aim = Aim(None)
         for margin_m in self._margins_m(limits_m):
-            found = self._aim(bend_rad, limits_m, walls_m, margin_m)
-            if found.bend_rad is not None:
-                return found
-            aim = Aim(None, aim.walled or found.walled)
+            for wall_m in (_WELL_OFF * self._settings.wall_m, self._settings.wall_m):
+                found = self._aim(bend_rad, limits_m, walls_m, margin_m, wall_m)
+                if found.bend_rad is not None:
+                    return found
+                aim = Aim(None, aim.walled or found.walled)
         return aim
 
     def _margins_m(self, limits_m: FloatArray) -> tuple[float, ...]:
@@ -73,7 +76,7 @@ class Aligner:
             dict.fromkeys((max(_INSIDE * 0.5 * room_m, least), max(0.5 * _INSIDE * 0.5 * room_m, least), least))
         )
 
-    def _aim(self, bend_rad: float, limits_m: FloatArray, walls_m: FloatArray, margin_m: float) -> Aim:
+    def _aim(self, bend_rad: float, limits_m: FloatArray, walls_m: FloatArray, margin_m: float, wall_m: float) -> Aim:
         walls, walled = self._walls(limits_m, walls_m), False
         for bend in self._candidates(bend_rad):
             turn = turned(bend_rad, bend, self._model)
@@ -82,7 +85,7 @@ class Aligner:
                 continue
             landed = self.lands(bend, limits)
             start = Posture(np.array([0.0, 0.0, turn]), bend)
-            if self._sweeps_free(turning(bend_rad, bend, self._model), start, landed, walls):
+            if self._sweeps_free(turning(bend_rad, bend, self._model), start, landed, walls, wall_m):
                 return Aim(bend)
             walled = True
         return Aim(None, walled)
@@ -107,11 +110,12 @@ class Aligner:
                 if abs(bend) <= most:
                     yield bend
 
-    def _sweeps_free(self, turn: Iterator[Posture], start: Posture, landed: Landing, walls_m: FloatArray) -> bool:
+    def _sweeps_free(
+        self, turn: Iterator[Posture], start: Posture, landed: Landing, walls_m: FloatArray, margin_m: float
+    ) -> bool:
         """Return whether the boxes stay free while the joint turns, and then along the charge."""
         way_m = landed.way_m if math.isfinite(landed.way_m) else 0.0
         curvature = curvature_pm(start.bend_rad, self._model)
-        margin_m = self._settings.wall_m
         for postures in (turn, charging(start, curvature, way_m)):
             if any(touches(one, walls_m, self._bodies, self._model, margin_m) for one in postures):
                 return False
