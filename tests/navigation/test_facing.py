@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import pytest
 from lhdmap.navigation.along import facing
+from lhdmap.topology.model import Purpose
 
 from tests.topology.maps import ladder
 
@@ -15,7 +16,7 @@ from tests.topology.maps import ladder
     [("draw_point", 3.0, "along"), ("dump", 3.0, "along"), ("park", 6.0, "along"), ("park", 3.5, None)],
 )
 def test_a_machine_is_not_backed_to_where_its_tail_has_no_room(
-    purpose: str, tail_m: float, heading: str | None
+    purpose: Purpose, tail_m: float, heading: str | None
 ) -> None:
     """4 m are left behind the place: with a tail of 6 m it stood before the end of the drift and was taken to be stuck."""
     topology = ladder()
