@@ -158,7 +158,7 @@ TERMS = (
     Term("toe", "The foot of the pile: the line where its face meets the floor.", r"\btoe\b"),
     Term(
         "tunnel",
-        "A node of the topology that is a single way between two ends: intersections, a dead end, or unexplored, where the drift "
+        "A node of the topology that is a single path between two ends: intersections, a dead end, or unexplored, where the drift "
         "goes on but the machine has not been. Only seen: the machine has looked into it and was not in it.",
         r"\btunnels?\b",
     ),

@@ -75,7 +75,7 @@ class Realigner:
         self._worker = ThreadPoolExecutor(max_workers=1, thread_name_prefix="realign")
         self._pending: Future[Window] | None = None
         self._way = _Way()
-        self._solved_m, self._solved_ns = 0.0, 0
+        self._solved_at = 0.0, 0  # travel (m) and time (ns) of the last solution
         self.moves = Moves()
 
     def update(self, scan: AlignedScan) -> None:
@@ -83,17 +83,19 @@ class Realigner:
         self._way.go_on(scan)
         if self._due(scan.time_ns):
             self._append(scan)
-        if self._is_late(scan.time_ns) or self._way.travelled_m - self._solved_m >= _SOLVE_SHARE * self._settings.lag_m:
+        if (
+            self._is_late(scan.time_ns)
+            or self._way.travelled_m - self._solved_at[0] >= _SOLVE_SHARE * self._settings.lag_m
+        ):
             # A solution is asked for when the next is due, never when it happens to be ready: the result must not depend on it.
             self._collect()
             self._settle(scan.time_ns)
-            self._solved_ns = scan.time_ns
-            self._solve()
+            self._solve(scan.time_ns)
 
     def finish(self) -> None:
         """Make all poses final: the log has ended."""
         self._collect()
-        self._solve()
+        self._solve(self._solved_at[1])
         self._collect()
         while self._final < len(self._nodes):
             self._make_final()
@@ -106,7 +108,7 @@ class Realigner:
         """
         lag_ns = self._settings.lag_s * 1e9
         oldest_ns = self._nodes[min(self._final, len(self._nodes) - 1)].time_ns
-        return oldest_ns < now_ns - lag_ns and now_ns - self._solved_ns >= _LATE_SHARE * lag_ns
+        return oldest_ns < now_ns - lag_ns and now_ns - self._solved_at[1] >= _LATE_SHARE * lag_ns
 
     def _due(self, time_ns: int) -> bool:
         """Return whether a node is due: by travel, and at rest now and then, so that the path does not stop."""
@@ -157,9 +159,9 @@ class Realigner:
             self._final -= 1
             self._paired -= 1
 
-    def _solve(self) -> None:
+    def _solve(self, now_ns: int) -> None:
         """Give the worker what there is: it solves while the drive goes on."""
-        self._solved_m = self._way.travelled_m
+        self._solved_at = self._way.travelled_m, now_ns
         first = max(self._final, 1)  # the first pose of all stays
         if first < len(self._nodes):
             window = Window(list(self._nodes), np.array(self._poses), self._joint, first, self._paired, self._offset)

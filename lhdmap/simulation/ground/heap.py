@@ -54,7 +54,7 @@ class Heap:
     ) -> None:
         self._home = grid  # what all grids cover
         self.grid, self.slope, self._inside, self._floor = grid, slope, inside, floor
-        self.version, self.came_m3, self.calm, self.slid_ns = 0, 0.0, False, -(10**9)
+        self.version, self.came_m3, self.calm = 0, 0.0, False
         far_m = (grid.shape[0] - 1) * ALONG_M - _FED_M if fed else math.inf
         self._behind = (grid.x_m, grid.y_m, grid.heading_rad, far_m)
         self.heights_m: FloatArray = np.maximum(heights_m, 0.0)

@@ -66,6 +66,15 @@ class Cut:
 
 
 @dataclass
+class _Common:
+    """What machines that dig in the same heaps share: when each heap slid, when and in which version it was shown."""
+
+    slid_ns: dict[str, int] = field(default_factory=dict)
+    shown_ns: int = -1
+    shown: dict[str, int] = field(default_factory=dict)
+
+
+@dataclass
 class Piles:
     """Piles by name as one machine digs in them. `show` takes a pile's surface whenever it has changed: `MineWorld.dig`."""
 
@@ -79,12 +88,11 @@ class Piles:
     _loads: int = 0
     _digs: int = 0
     _turned_ns: int = -1
-    _shown_ns: int = -1
-    _shown: dict[str, int] = field(default_factory=dict)
+    _common: _Common = field(default_factory=_Common)
 
     def for_another(self, seed: int) -> Piles:
         """Return the same piles for another machine: attempts and chance of its own, in the same heaps."""
-        return Piles(self.heaps, self.ground, self.width_m, seed, self.show, _shown=self._shown)
+        return Piles(self.heaps, self.ground, self.width_m, seed, self.show, _common=self._common)
 
     def follow(
         self, now_ns: int, lip_m: FloatArray, heading_rad: float, load_kg: float, *, lowered: bool
@@ -102,9 +110,9 @@ class Piles:
                 self._turned_ns = now_ns
         elif now_ns - self._turned_ns >= TURN_NS:
             self._turned_ns = now_ns
-            for heap in self.heaps.values():
-                if not heap.calm and now_ns - heap.slid_ns >= TURN_NS:  # another machine's piles let it slide already
-                    heap.slid_ns = now_ns
+            for name, heap in self.heaps.items():
+                if not heap.calm and now_ns - self._common.slid_ns.get(name, -TURN_NS) >= TURN_NS:  # by another machine
+                    self._common.slid_ns[name] = now_ns
                     heap.slide(TURN_NS * 1e-9, self.ground.face.slide_per_s)
             if lowered:
                 self._begin(lip_m, heading_rad, load_kg)
@@ -148,10 +156,11 @@ class Piles:
 
     def _exchange(self, now_ns: int) -> None:
         """Show what has changed, not more often than scanners need it."""
-        if self.show is None or now_ns - self._shown_ns < SHOW_NS:
+        common = self._common
+        if self.show is None or now_ns - common.shown_ns < SHOW_NS:
             return
-        self._shown_ns = now_ns
+        common.shown_ns = now_ns
         for name, heap in self.heaps.items():
-            if self._shown.get(name, 0) != heap.version:
-                self._shown[name] = heap.version
+            if common.shown.get(name, 0) != heap.version:
+                common.shown[name] = heap.version
                 self.show(name, heap.mesh())
