@@ -55,7 +55,12 @@ def route_from(planner: RoutePlanner, point: str, errand: Errand, reach: Reach) 
     def ask(avoid: tuple[str, ...]) -> Route:
         return planner.route(point, errand.goal, replace(asked, avoid=avoid))
 
-    return with_room(topology, ask, errand.closed, *reach)
+    route = with_room(topology, ask, errand.closed, *reach)
+    if not route.feasible and ends != facing(topology, errand.goal):
+        # Bucket first was wanted for the room alone: better backed to than not at all.
+        asked = replace(asked, goal_heading=None)
+        route = with_room(topology, ask, errand.closed, *reach)
+    return route
 
 
 def passed_by(topology: TopologicalMap, nodes: Iterable[str], begins: Iterable[Begin], goal: str) -> list[str]:

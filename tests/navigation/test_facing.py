@@ -3,9 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
+from typing import cast
 
 import pytest
+from lhdmap.movement.routes import RouteOptions, RoutePlanner
 from lhdmap.navigation.along import facing
+from lhdmap.navigation.begin import Errand, Reach, route_from
 from lhdmap.topology.model import Purpose
 
 from tests.topology.maps import ladder
@@ -26,3 +30,21 @@ def test_a_machine_is_not_backed_to_where_its_tail_has_no_room(
 
 def test_a_point_that_is_no_place_may_be_come_to_either_way() -> None:
     assert facing(ladder(), "t1.end", 6.0) is None
+
+
+class Backed:
+    """A planner that knows no route with a heading at the goal."""
+
+    def __init__(self, purpose: Purpose) -> None:
+        topology = ladder()
+        places = tuple(replace(one, purpose=purpose) for one in topology.waypoints)
+        self.topology = replace(topology, waypoints=places)
+
+    def route(self, _start: str, _goal: str, asked: RouteOptions) -> SimpleNamespace:
+        return SimpleNamespace(feasible=asked.goal_heading is None, states=())
+
+
+@pytest.mark.parametrize(("purpose", "feasible"), [("park", True), ("draw_point", False)])
+def test_a_place_that_cannot_be_come_to_bucket_first_is_backed_to(purpose: Purpose, *, feasible: bool) -> None:
+    planner = cast("RoutePlanner", Backed(purpose))
+    assert route_from(planner, "t1.start", Errand("DP1", 0.0, ()), Reach(3.2, 6.0, 0.5)).feasible == feasible
