@@ -1,9 +1,9 @@
 """The topological map: nodes (tunnels, intersections), their access points and waypoints, and the connections within a node.
 
 As in the topological paper, Section 3.2: a tunnel is a single path between two ends, an intersection joins three or more arms.
-Both have access points, which face outward; two nodes meet where an access point `joins` its twin, at one place, facing the other way.
-It is a multigraph: several tunnels may join the same two intersections, and one may end where it began. Poses are (4,): x, y, z
-(m) and yaw (rad) in `map`.
+Both have access points, which face outward; two nodes meet where an access point `joins` its twin, at one place, facing the
+other way. It is a multigraph: several tunnels may join the same two intersections, and one may end where it began. Poses are
+(4,): x, y, z (m) and yaw (rad) in `map`.
 """
 
 from __future__ import annotations
