@@ -26,6 +26,7 @@ from lhdmap.topology.sheet import FREE, OCCUPIED, UNKNOWN, Sheet
 CAME, WENT = "came", "went"
 """Kinds of a change: something stands in what was free; a wall is not there any more."""
 _EVERY_M = 0.3
+_NOT_KNOWN = -1
 _NEW_M, _GONE_M = 0.2, 0.4  # from all walls of the map: nearer is roughness at another height
 _HEIGHT = 0.1  # a metre of height is as far as so many in plan: walls of another level are not near
 _LEVEL_M, _CELL_M, _SURE_VIEWS = 4.0, 0.2, 2
@@ -150,6 +151,11 @@ class WorldChanges:
         """Return which hits (N, 2) in the machine's frame are of something that surely was not there when the map was made."""
         return self._new.has(se2.transform(pose, points), height_m)
 
+    def unknown_share(self, pose: FloatArray, height_m: float, points: FloatArray) -> float:
+        """Return the share of hits (N, 2) in the machine's frame of which the map says nothing: no wall, no free room."""
+        kinds = self._set_against(0, pose, height_m, points).kinds
+        return float((kinds == _NOT_KNOWN).mean()) if len(kinds) else 0.0
+
     def found(self, travelled_m: float, carried: FloatArray, pose: FloatArray) -> None:
         """Say that a lost place may be found at `pose` (3,), while the odometry has led to `carried` (3,)."""
         off = se2.between(carried, pose)
@@ -184,7 +190,7 @@ class WorldChanges:
         behind = (cells == UNKNOWN) & (apart > _GONE_M)
         behind[behind] = self._crossed(pose, in_map[behind], height_m)
         kinds = np.where(new, 1, np.where(behind, 2, 0)).astype(np.int8)
-        kinds[(kinds == 0) & (apart > _GONE_M)] = -1  # of what the map does not know, nothing is said
+        kinds[(kinds == 0) & (apart > _GONE_M)] = _NOT_KNOWN  # of what the map does not know, nothing is said
         return Seen(stamp_ns, in_map, kinds, np.minimum(apart, 5.0), height_m)
 
     def _crossed(self, pose: FloatArray, hits: FloatArray, height_m: float) -> npt.NDArray[np.bool_]:

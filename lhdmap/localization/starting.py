@@ -73,6 +73,15 @@ def poses_along(pose: FloatArray, height_m: float) -> FloatArray:
     return np.concatenate(poses)
 
 
+def poses_round(pose: FloatArray, height_m: float, far_m: float) -> FloatArray:
+    """Return poses (K, 4) all round a pose (3,), up to `far_m` to each side, about in its direction: where odometry has led to."""
+    steps = math.ceil(far_m / _ALONG_STEP_M)
+    way = _ALONG_STEP_M * np.arange(-steps, steps + 1)
+    x, y, turn = np.meshgrid(way, way, np.array(_TURNS_RAD[:3]), indexing="ij")
+    shifted = [pose[0] + x.ravel(), pose[1] + y.ravel(), pose[2] + turn.ravel()]
+    return np.column_stack([*shifted, np.full(x.size, height_m)])
+
+
 def best_start(walls: MapWalls, starts: FloatArray, points: FloatArray) -> BestStart:
     """Return the start of several (K, 4) from which hits (N, 2) in the machine's frame fit the walls best."""
     few, many = (points[:: max(len(points) // most, 1)] for most in (_FEW_HITS, _HITS))

@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
+import numpy as np
+
 _SHARE_OF_PERIOD = 0.3  # a scan sooner than this part of the period came in a bunch
 _BUNCHED_SHARE = 0.08  # share of such scans beyond which the stamps are those of delivery, not of measurement
 _FORGET = 0.01  # what one scan counts for in the period and in the share: a memory of a hundred scans
@@ -11,6 +15,11 @@ _LONGEST_PERIODS = (
 )
 _LEARN_SCANS = 30  # until then any time between scans teaches the period, and stamps are believed
 _STEADY_PERIODS = (0.5, 3.0)  # limits of one step of the steady clock, so that it never stands still nor leaps
+_FEWEST, _UNEVEN, _TAILS = (
+    8,
+    5.0,
+    (0.1, 0.9),
+)  # of the first steps the long ones are so many times the short ones in a bunch
 _LEAST_S = 1e-6  # stamps nearer than this (made rising by a nanosecond) tell no time: a period has passed
 
 
@@ -33,6 +42,16 @@ class ScanClock:
     def bunched(self) -> bool:
         """Whether the stamps are not believed."""
         return self._scans > _LEARN_SCANS and self._bunched > _BUNCHED_SHARE
+
+    def expect(self, stamps_ns: Sequence[int]) -> None:
+        """Look at the stamps of the first scans before they are stepped through: in a bunch the speed of a turn runs away."""
+        steps_s = 1e-9 * np.diff(np.asarray(stamps_ns, dtype=np.int64))
+        if len(steps_s) < _FEWEST:
+            return
+        short_s, long_s = np.quantile(steps_s, _TAILS)
+        if long_s > _UNEVEN * max(short_s, 0.0):
+            usual = steps_s[np.abs(steps_s) < _LONGEST_PERIODS * long_s]
+            self._period_s, self._bunched, self._scans = max(float(usual.mean()), 0.0), 1.0, _LEARN_SCANS
 
     def step(self, stamp_ns: int) -> float:
         """Return the time (s) since the scan before; 0 for the first."""

@@ -79,6 +79,7 @@ def _second_half(steps: Sequence[OdometryStep]) -> list[OdometryStep]:
 
 
 def _run(odometry: PlanarOdometry, inputs: Sequence[ScanInput]) -> list[OdometryStep]:
+    odometry.clock.expect([one.scan.stamp_ns for one in inputs])
     return [odometry.update(*one) for one in inputs]
 
 

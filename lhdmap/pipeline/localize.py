@@ -216,5 +216,8 @@ class Localizer:
         self._start.choose(tracker, points)
         said = tracker.correct(points, front or len(points), on_map.quality(tracker))
         tracker.height_m = on_map.height_m(tracker.pose, tracker.height_m)
+        if said.support < on_map.wanted_support(tracker):
+            told = self.keeper.support_told(said.support, tracker.pose, tracker.height_m, points)
+            said = said._replace(support=told)
         self._place.support.add(said)
         return said.source if said.support > 0.0 else "odometry"

@@ -14,6 +14,8 @@ from lhdmap.messages import FloatArray
 # Time between two looks; travel after the loss until which it looks; what two looks may differ; how much better than any other
 # place the found one must fit; hits that a look needs.
 _LOOK_NS, _NEAR_M, _SAME_M, _CLEARLY, _LEAST_HITS = 400_000_000, 5.0, 0.3, 0.05, 40
+# A place where the odometry leads to needs two looks; another one must be seen from so much way: one that stands sees the same.
+_AS_CARRIED_M, _FROM_M = 0.2, 1.5
 
 
 class NearLook:
@@ -23,6 +25,7 @@ class NearLook:
         self._walls = walls
         self._lost_m, self._next_ns = 0.0, 0
         self._before: tuple[FloatArray, FloatArray] | None = None
+        self._since_m = 0.0  # where the first of the looks was that say the same
 
     def lost(self, stamp_ns: int, travelled_m: float) -> None:
         """Begin to look."""
@@ -43,10 +46,17 @@ class NearLook:
         if found.support < max(wanted(), found.rival + _CLEARLY):
             return None
         self._before = tracker.pose.copy(), found.pose
-        if before is None:
+        if (
+            before is None
+            or _apart_m(se2.compose(before[1], se2.between(before[0], tracker.pose)), found.pose) > _SAME_M
+        ):
+            self._since_m = travelled_m
             return None
-        off = se2.between(se2.compose(before[1], se2.between(before[0], tracker.pose)), found.pose)
-        if math.hypot(off[0], off[1]) > _SAME_M:
+        if _apart_m(tracker.pose, found.pose) > _AS_CARRIED_M and travelled_m - self._since_m < _FROM_M:
             return None
         self._before = None
         return found.pose.copy()
+
+
+def _apart_m(one: FloatArray, other: FloatArray) -> float:
+    return math.hypot(one[0] - other[0], one[1] - other[1])

@@ -244,6 +244,7 @@ class MappingPipeline:
             inputs.append(self.front_end.input(scan, before_ns, time_ns, self.track.height_m))
             before_ns = time_ns
         self.odometry = odometry = self._odometry(starting_velocity(self._odometry, inputs))
+        odometry.clock.expect([one.scan.stamp_ns for one in inputs])
         s = self.settings
         wanted = self._options.cloud and s.smoothing.realign and s.odometry.method == "anchored"
         if wanted and isinstance(one.scan, LaserScan) and self.front_end.sees_again(one.scan, one.stamp_ns):

@@ -19,11 +19,13 @@ from lhdmap.localization.rows import CANDIDATE, LOST, TRACKING
 from lhdmap.localization.search import CHECK, CONFIRM, FIND, PlaceCandidate, Search
 from lhdmap.messages import FloatArray
 from lhdmap.odometry.steps import OdometryStep
+from lhdmap.pipeline.look_carried import CarriedLook, CarriedRules
 from lhdmap.pipeline.look_near import NearLook
 from lhdmap.pipeline.place_held import HeldPlace
 from lhdmap.pipeline.tracks_on_map import TracksOnMap
 from lhdmap.pipeline.way_driven import WayDriven
 
+_LEAST_KNOWN = 0.3  # of the hits are in room that the map knows, or what it does not know counts against the place
 _DENIALS = 2  # checks in a row
 # Deviations (m, m, rad) of a place that a search, or a look near by, has found.
 _SEARCHED_STD = np.array([0.1, 0.1, math.radians(1.0)])
@@ -47,7 +49,7 @@ class PlaceKeeper:
     ) -> None:
         self._place, self._on_map, self._finder, self._world, self._way = place, on_map, finder, world, way
         self._confirm_m = confirm_m
-        self._near = NearLook(on_map.walls)
+        self._near, self._carried = NearLook(on_map.walls), CarriedLook(on_map.walls)
         self._denials = 0
         self.digs = False
 
@@ -61,6 +63,11 @@ class PlaceKeeper:
         if mean is not None:
             self._drop(f"the map's walls agree with {mean:.0%} of the hits, {wanted:.0%} were wanted")
 
+    def support_told(self, support: float, pose: FloatArray, height_m: float, points: FloatArray) -> float:
+        """Return a support as the share of those hits (N, 2) at a pose (3,) the map can tell of: doors stand open elsewhere."""
+        known = 1.0 - self._world.unknown_share(pose, height_m, points)
+        return min(support / known, 1.0) if known >= _LEAST_KNOWN else support
+
     def look_near(self, points: FloatArray) -> None:
         """Take a lost place up again near where the odometry has carried it, by hits (N, 2)."""
         place, tracker, way = self._place, self._place.tracker, self._way
@@ -68,6 +75,9 @@ class PlaceKeeper:
             return
         wanted = partial(self._on_map.wanted_support, tracker)
         found = self._near.look(way.stamp_ns, way.travelled_m, tracker, points, wanted)
+        if found is None:
+            told = partial(self.support_told, height_m=tracker.height_m, points=points)
+            found = self._carried.look(way.travelled_m, tracker, points, CarriedRules(wanted, told))
         if found is not None:
             place.hold(self._on_map.at(found, _FOUND_NEAR_STD, tracker.height_m), TRACKING)
 
@@ -120,13 +130,16 @@ class PlaceKeeper:
         self._finder.again()
         if self._place.give_up(self._way.stamp_ns, why):
             self._near.lost(self._way.stamp_ns, self._way.travelled_m)
+            self._carried.lost(self._way.travelled_m)
             self._finder.forget()
 
     def _try(self, found: PlaceCandidate) -> None:
-        """Put a place that a search has found on trial."""
+        """Put a place that a search has found on trial; one where the odometry has led to from the last place needs none."""
         place, travelled_m = self._place, self._way.travelled_m
         height_m = self._on_map.height_m(found.pose, found.height_m)
+        as_carried = False
         if place.tracker is not None:
             self._world.found(travelled_m, place.tracker.pose, found.pose)
-        place.hold(self._on_map.at(found.pose, _SEARCHED_STD, height_m), CANDIDATE)
-        place.trial_m, place.probability = travelled_m, found.probability
+            as_carried = place.status == LOST and self._carried.leads_to(travelled_m, place.tracker.pose, found.pose)
+        place.hold(self._on_map.at(found.pose, _SEARCHED_STD, height_m), TRACKING if as_carried else CANDIDATE)
+        place.trial_m, place.probability = None if as_carried else travelled_m, found.probability

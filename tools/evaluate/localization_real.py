@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import bz2
 from collections.abc import Iterator
 from pathlib import Path
 from typing import NamedTuple
@@ -13,15 +14,12 @@ from lhdmap.evaluation.localization import planar
 from lhdmap.evaluation.relations import Relations, evaluate_relations, read_relations
 from lhdmap.localization.rows import LOST, TRACKING, LocalizationRow
 from lhdmap.logs.source import LogSource
-from lhdmap.logs.writer import LogWriter
 from lhdmap.mapfolder import MapFolder
-from lhdmap.messages import Mount
 from lhdmap.pipeline.build import BuildRequest, build_map
 from lhdmap.pipeline.inputs import ROLES_READ
 from lhdmap.pipeline.known_map import KnownMap
 from lhdmap.pipeline.localize import Localizer
 from lhdmap.pipeline.localize_run import trajectory_of
-from lhdmap.roles import ROLES
 from lhdmap.trajectory import Trajectory
 
 from tools.evaluate.localization_faults import Messages
@@ -65,15 +63,14 @@ def real(data: Path, folder: Path) -> Iterator[str]:
 
 def row(log: Log, data: Path, folder: Path) -> str:
     """Teach with the first part of a log, localize the second, and return the line of it."""
-    first, second = _parts(data / log.path, log.teaches)
+    first, second = parts(data / log.path, log.teaches, folder)
     made = folder / f"{log.name}.map"
     if not made.exists():
-        _write(folder / f"{log.name}.mcap", first)
-        build_map(BuildRequest([folder / f"{log.name}.mcap"], made, _SETTINGS))
+        build_map(BuildRequest([first], made, _SETTINGS))
     supports: list[float] = []
     start = planar(MapFolder.open(made).trajectory())[-1][[0, 1, 3, 2]]
     with Localizer(KnownMap.read(made), _SETTINGS, None, start) as localizer:
-        for role, message in second:
+        for role, message in _messages(second):
             localizer.update(role, message)
             if localizer.rows and localizer.rows[-1].status == TRACKING and localizer.support is not None:
                 supports.append(localizer.support)
@@ -93,21 +90,20 @@ def row(log: Log, data: Path, folder: Path) -> str:
     return f"| {' | '.join(cells)} |"
 
 
-def _parts(log: Path, share: float) -> tuple[Messages, Messages]:
-    """Return the messages of a log before and after a share of its front scans; what is mounted belongs to both."""
-    with LogSource([log]) as source:
-        messages = list(source.messages([role for role in ROLES_READ if role in source.roles]))
-    scans = [k for k, (role, _) in enumerate(messages) if role == "front"]
+def parts(log: Path, share: float, folder: Path) -> tuple[Path, Path]:
+    """Cut a CARMEN log after a share of its scans, line by line: stamps may run backwards, the order of the file counts."""
+    lines = bz2.decompress(log.read_bytes()).splitlines(keepends=True)
+    scans = [k for k, line in enumerate(lines) if line.startswith(b"FLASER")]
     cut = scans[round(share * len(scans))]
-    mounts = [one for one in messages[:cut] if one[0] == "tf_static"]
-    return messages[:cut], [*mounts, *messages[cut:]]
+    first, second = (folder / f"{log.name.partition('.')[0]}_{part}.clf" for part in ("first", "second"))
+    first.write_bytes(b"".join(lines[:cut]))
+    second.write_bytes(b"".join(lines[cut:]))
+    return first, second
 
 
-def _write(log: Path, messages: Messages) -> None:
-    log.unlink(missing_ok=True)
-    with LogWriter(log) as writer:
-        for role, message in messages:
-            writer.write(ROLES[role].topic, [message] if isinstance(message, Mount) else message)
+def _messages(log: Path) -> Messages:
+    with LogSource([log]) as source:
+        return list(source.messages([role for role in ROLES_READ if role in source.roles]))
 
 
 def _agreement(taught: Trajectory, rows: list[LocalizationRow], relations: Relations) -> tuple[str, str]:

@@ -28,7 +28,16 @@ from lhdmap.roles import BUILD_MAP, ROLES, read_by
 _ROLE_OF = {ROLES[name].topic: name for name in read_by(BUILD_MAP)}
 
 
-_DIGS = (State.CHARGING, State.EXCAVATION, State.PULL_BACK, State.HELD, *ASSISTANCE)
+# Before a pile that has been dug since the map was made, what is seen is not what the map has.
+_DIGS = (
+    State.POSITIONING,
+    State.CHARGING,
+    State.EXCAVATION,
+    State.PULL_BACK,
+    State.WEIGHING,
+    State.HELD,
+    *ASSISTANCE,
+)
 
 
 class Locating(Process):
