@@ -53,6 +53,26 @@ def test_stamps_made_rising_by_a_nanosecond_tell_no_time() -> None:
     assert [clock.step(stamp) for stamp in stamps][-2:] == pytest.approx([0.04, 0.04], rel=0.1)
 
 
+def test_bunches_among_the_first_scans_are_known_from_the_first_step_on() -> None:
+    """Of the Intel log's middle: three scans at once each 0.6 s; a speed from two of a bunch were a hundred times too large."""
+    stamps = [START_NS + (k // 3) * 600_000_000 + (k % 3) * 1_000_000 for k in range(25)]
+    clock = ScanClock()
+    clock.expect(stamps)
+    steps = [clock.step(stamp) for stamp in stamps]
+    assert clock.bunched
+    assert min(steps[1:]) > 0.08
+    assert max(steps) < 0.45
+
+
+@pytest.mark.parametrize("gaps", [(), (4,), (4, 15)])
+def test_a_gap_or_two_among_the_first_scans_are_no_bunches(gaps: tuple[int, ...]) -> None:
+    stamps = [START_NS + k * PERIOD_NS + sum(k > gap for gap in gaps) * 3_000_000_000 for k in range(25)]
+    clock = ScanClock()
+    clock.expect(stamps)
+    assert [clock.step(stamp) for stamp in stamps][1:] == pytest.approx(np.diff(stamps) * 1e-9)
+    assert not clock.bunched
+
+
 def processed_m(speed_mps: float, rate_hz: float) -> float:
     """Return the mean distance between processed scans at constant speed."""
     rate = AdaptiveRate(OdometrySettings())

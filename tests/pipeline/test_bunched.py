@@ -9,6 +9,7 @@ import pytest
 from lhdmap.config import Settings
 from lhdmap.messages import LaserScan, WheelPose
 from lhdmap.pipeline.mapping import MappingOptions, MappingPipeline
+from lhdmap.simulation.planar import PlanarScanner, simulate_scans, world_from_polylines
 
 PERIOD_S, SCANS, WAY_M = 0.2, 400, 0.05
 LEARNING_SCANS = 60  # until the stamps are known for what they are
@@ -46,3 +47,24 @@ def test_bunches_and_gaps_lose_nothing_of_the_wheels_way(turn_rad: float) -> Non
     assert steps > 300
     assert np.hypot(*np.diff(poses[:, :2], axis=0).T).sum() == pytest.approx(WAY_M * steps, rel=0.01)
     assert poses[-1, 5] - poses[0, 5] == pytest.approx(turn_rad * steps, rel=0.02, abs=0.01)
+
+
+def test_a_log_that_begins_in_bunches_while_the_robot_turns() -> None:
+    """A cut of a log: its first scans come three at once, 0.6 s apart, and the robot turns by 40 degrees a second all the time."""
+    room = world_from_polylines(
+        [np.array([[-4.0, -3.0], [5.0, -3.0], [5.0, 2.0], [1.0, 2.5], [-4.0, 4.0], [-4.0, -3.0]])],
+        np.zeros((2, 3)),
+    )
+    turn_rad = 40.0 / 180.0 * math.pi * PERIOD_S
+    poses = np.column_stack([np.zeros((40, 2)), turn_rad * np.arange(40)])
+    scans = simulate_scans(room, poses, PlanarScanner(), 1.0 / PERIOD_S, 1)
+    pipeline = MappingPipeline(Settings(), None, MappingOptions(cloud=False))
+    for k, scan in enumerate(scans):
+        stamp_ns = round(1e9 * (100.0 + 3 * PERIOD_S * (k // 3 + 1) + 0.001 * (k % 3)))
+        pipeline.update("front", scan._replace(stamp_ns=stamp_ns))
+        pipeline.update("wheel_odometry", WheelPose(stamp_ns, *poses[k].tolist()))
+    pipeline.finish()
+    told = pipeline.track.rows().poses
+    assert len(told) == len(poses)
+    assert np.hypot(*(told[:, :2] - told[0, :2]).T).max() < 0.1
+    assert np.unwrap(told[:, 5])[-1] - told[0, 5] == pytest.approx(poses[-1, 2], abs=0.05)
