@@ -11,6 +11,7 @@ from lhdmap.driving.model import DriveModel
 from lhdmap.geometry import se2
 from lhdmap.guidance.directive import HEADING
 from lhdmap.loading.moment import Moment, Step, Target, pose_of
+from lhdmap.loading.positioning_path import approach_path, is_free
 from lhdmap.loading.seen_again import face_behind_m, moved
 from lhdmap.loading.states import Event
 from lhdmap.loading.task_settings import LoadingSettings
@@ -42,7 +43,7 @@ class Identification:
         """Return what navigation drives until the pile is known."""
         estimate, stamp_ns, why = self._estimate(moment)
         target = target_of(estimate, stamp_ns) if estimate is not None else None
-        if target is not None and (why := self._gone(target, moment)) == "":
+        if target is not None and (why := self._gone(target, moment) or self._behind_walls(target, moment)) == "":
             return Step(self.phase, Event.PILE_FOUND, "loadable", moment.approach, target=target)
         again = self._again(moment)
         if again is not None:
@@ -60,6 +61,14 @@ class Identification:
             event = Event.PILE_UNFIT if unfit else Event.PILE_UNKNOWN
             return Step(self.phase, event, why, values=(("distance_m", far_m),))
         return Step(self.phase, directive=None if self._near else moment.approach)
+
+    def _behind_walls(self, target: Target, moment: Moment) -> str:
+        """Return why a pile far ahead is not driven to yet; empty: it is. Seen from a bend the straight way leads through rock."""
+        if self._near or self._distance_m(moment) < self._settings.identify_m or moment.approach is None:
+            return ""
+        before_m = self._settings.reach_m - self._model.front_m
+        path = approach_path(moment.motion, target, before_m, self._settings.approach_kmh / 3.6)
+        return "" if is_free(path, moment, target) else "the straight way to it leads through a wall"
 
     def _count(self, moment: Moment) -> None:
         """Count the way on which the machine has faced where it goes: round a bend there is nothing to be seen of a pile.

@@ -11,6 +11,7 @@ import numpy as np
 from lhdmap.driving.bodies import Bodies
 from lhdmap.driving.model import DriveModel
 from lhdmap.geometry import se2
+from lhdmap.loading.drift_walls import WallLines, axis_rad, wall_lines, walls_beyond
 from lhdmap.loading.identification import at_pile
 from lhdmap.loading.positioning import Landing, curvature_pm, landing
 from lhdmap.loading.positioning_boxes import Posture, charging, touches, turned, turning
@@ -30,6 +31,14 @@ class Aim(NamedTuple):
     walled: bool = False
 
 
+class _Off(NamedTuple):
+    """Wall points (N, 2) to keep off by a margin, until the lip is so deep behind the toe."""
+
+    walls_m: FloatArray
+    margin_m: float
+    deep_m: float
+
+
 class Aligner:
     """Finds the joint angle nearest to that of now from which both sides land inside the limits, without touching a wall."""
 
@@ -44,9 +53,9 @@ class Aligner:
 
     def free(self, bend_rad: float, limits_m: FloatArray, walls_m: FloatArray) -> bool:
         """Return whether a charge from now on keeps both boxes free of wall points until the lip is at the pile."""
-        landed = self.lands(bend_rad, limits_m)
         start = Posture(np.zeros(3), bend_rad)
-        return self._sweeps_free(iter(()), start, landed, self._walls(limits_m, walls_m), self._settings.wall_m)
+        off = _Off(self._walls(limits_m, walls_m), self._settings.wall_m, 0.0)
+        return self._sweeps_free(iter(()), start, self.lands(bend_rad, limits_m), off)
 
     def boxes_free(self, bend_rad: float, limits_m: FloatArray, walls_m: FloatArray) -> bool:
         """Return whether no wall point is inside a box now: Eq. (6)."""
@@ -57,12 +66,13 @@ class Aligner:
         """Return the angle to turn the joint to; limits (2, 2) and wall points (N, 2) in `base_link`.
 
         Of those that land well inside the nearest one, where there are none of those that land inside at all; among them those
-        first that keep well off the walls, which are rough and not seen at each height.
+        first that keep well off the walls, which are rough and not seen at each height, and go on beside the pile.
         """
-        aim = Aim(None)
+        aim, lines = Aim(None), wall_lines(walls_m, limits_m)
+        axis = axis_rad(lines)
         for margin_m in self._margins_m(limits_m):
-            for wall_m in (_WELL_OFF * self._settings.wall_m, self._settings.wall_m):
-                found = self._aim(bend_rad, limits_m, walls_m, margin_m, wall_m)
+            for off in self._offs(limits_m, walls_m, lines):
+                found = self._aim(bend_rad, limits_m, axis, margin_m, off)
                 if found.bend_rad is not None:
                     return found
                 aim = Aim(None, aim.walled or found.walled)
@@ -76,27 +86,41 @@ class Aligner:
             dict.fromkeys((max(_INSIDE * 0.5 * room_m, least), max(0.5 * _INSIDE * 0.5 * room_m, least), least))
         )
 
-    def _aim(self, bend_rad: float, limits_m: FloatArray, walls_m: FloatArray, margin_m: float, wall_m: float) -> Aim:
-        walls, walled = self._walls(limits_m, walls_m), False
+    def _offs(self, limits_m: FloatArray, walls_m: FloatArray, lines: WallLines) -> Iterator[_Off]:
+        """Yield what to keep off, the most first: at last the walls that are seen, up to the pile."""
+        seen, settings = self._walls(limits_m, walls_m), self._settings
+        beyond = walls_beyond(lines, limits_m, settings.dig_m)
+        if len(beyond):
+            both = np.concatenate([seen, beyond])
+            yield _Off(both, _WELL_OFF * settings.wall_m, settings.dig_m)
+            yield _Off(both, settings.wall_m, settings.dig_m)
+        yield _Off(seen, _WELL_OFF * settings.wall_m, 0.0)
+        yield _Off(seen, settings.wall_m, 0.0)
+
+    def _aim(self, bend_rad: float, limits_m: FloatArray, axis: float | None, margin_m: float, off: _Off) -> Aim:
+        walled = False
         for bend in self._candidates(bend_rad):
             turn = turned(bend_rad, bend, self._model)
             limits = se2.transform(se2.inverse(np.array([0.0, 0.0, turn])), limits_m)
-            if not self._stays(bend, limits, margin_m):
+            if not self._stays(bend, limits, None if axis is None else axis - turn, margin_m):
                 continue
             landed = self.lands(bend, limits)
             start = Posture(np.array([0.0, 0.0, turn]), bend)
-            if self._sweeps_free(turning(bend_rad, bend, self._model), start, landed, walls, wall_m):
+            if self._sweeps_free(turning(bend_rad, bend, self._model), start, landed, off):
                 return Aim(bend)
             walled = True
         return Aim(None, walled)
 
-    def _stays(self, bend_rad: float, limits_m: FloatArray, margin_m: float) -> bool:
+    def _stays(self, bend_rad: float, limits_m: FloatArray, axis: float | None, margin_m: float) -> bool:
         """Return whether both sides land so far inside, and are still between the limits when the bucket is as deep as it digs.
 
-        The walls go on beside the pile: with the joint bent the bucket runs into them while it digs.
+        The walls go on beside the pile: with the joint bent the bucket runs into them while it digs. `axis` (rad): that of the
+        drift; None: across the face.
         """
         E = limits_m[1] - limits_m[0]
-        deep = limits_m + self._settings.dig_m * np.array([E[1], -E[0]]) / max(float(np.hypot(*E)), 1e-9)
+        across = np.array([E[1], -E[0]]) / max(float(np.hypot(*E)), 1e-9)
+        into = across if axis is None else np.array([math.cos(axis), math.sin(axis)])
+        deep = limits_m + self._settings.dig_m * into
         return (
             self.lands(bend_rad, limits_m, margin_m=margin_m).good
             and self.lands(bend_rad, deep, margin_m=margin_m).good
@@ -110,14 +134,12 @@ class Aligner:
                 if abs(bend) <= most:
                     yield bend
 
-    def _sweeps_free(
-        self, turn: Iterator[Posture], start: Posture, landed: Landing, walls_m: FloatArray, margin_m: float
-    ) -> bool:
+    def _sweeps_free(self, turn: Iterator[Posture], start: Posture, landed: Landing, off: _Off) -> bool:
         """Return whether the boxes stay free while the joint turns, and then along the charge."""
-        way_m = landed.way_m if math.isfinite(landed.way_m) else 0.0
+        way_m = landed.way_m + off.deep_m if math.isfinite(landed.way_m) else 0.0
         curvature = curvature_pm(start.bend_rad, self._model)
         for postures in (turn, charging(start, curvature, way_m)):
-            if any(touches(one, walls_m, self._bodies, self._model, margin_m) for one in postures):
+            if any(touches(one, off.walls_m, self._bodies, self._model, off.margin_m) for one in postures):
                 return False
         return True
 

@@ -8,12 +8,15 @@ import numpy as np
 
 from lhdmap.driving.lead import Lead
 from lhdmap.driving.motion import Motion
-from lhdmap.guidance.directive import path_of
-from lhdmap.loading.moment import Target, pose_of
+from lhdmap.geometry import se2
+from lhdmap.guidance.directive import WAY, path_of
+from lhdmap.loading.moment import Moment, Target, pose_of
 from lhdmap.messages import FloatArray
 
 _BEHIND_M, _BEYOND_M, _JOIN_M = 4.0, 12.0, 3.0
 _STEP_M = 0.1
+_AT_PILE_M = 2.0  # before the line through the limits: hits there are the pile's
+_FREE_M = 1.0  # of walls beside the axle's way: less than half a machine, for guidance keeps off them by itself
 
 
 def approach_path(motion: Motion, target: Target, before_m: float, speed_mps: float) -> FloatArray:
@@ -41,6 +44,18 @@ def approach_path(motion: Motion, target: Target, before_m: float, speed_mps: fl
     end = middle + _BEYOND_M * axis
     straight = np.linspace(join, end, max(round(float(np.hypot(*(end - join))) / _STEP_M), 2))
     return path_of(np.vstack([back, curve, straight]), speed_mps)
+
+
+def is_free(path: FloatArray, moment: Moment, target: Target) -> bool:
+    """Return whether no wall that is seen now is in the way of a path (N, 6) in `odom`, from the machine up to the pile."""
+    pose = pose_of(moment.motion)
+    axis = np.array([math.cos(target.heading_rad), math.sin(target.heading_rad)])
+    before = (path[:, :2] - target.limits_m.mean(axis=0)) @ axis < -_AT_PILE_M
+    ahead = path[before & (path[:, WAY] > _BEHIND_M), :2]
+    if not len(ahead) or not len(moment.walls_m):
+        return True
+    apart = ahead[:, None] - se2.transform(pose, moment.walls_m)[None]
+    return float((apart**2).sum(axis=2).min()) > _FREE_M**2
 
 
 def back_path(motion: Motion, trail: list[Motion], rear: Lead, way_m: float, speed_mps: float) -> FloatArray:

@@ -12,6 +12,7 @@ import numpy as np
 from lhdmap.driving.bodies import Bodies
 from lhdmap.driving.model import DriveModel
 from lhdmap.guidance.directive import WAY, Directive
+from lhdmap.loading.drift_walls import axis_rad, wall_lines
 from lhdmap.loading.identification import joint_of, target_of
 from lhdmap.loading.lowering import Lowering
 from lhdmap.loading.moment import Moment, Step, Target, pose_of
@@ -24,6 +25,7 @@ from lhdmap.messages import FloatArray
 
 APPROACH, ALIGN, LOWER = "approach", "align", "lower"
 _REPLAN_M, _BACKSTOP_M = 0.3, 0.5
+_REPLAN_RAD, _ASKEW_RAD = math.radians(3.0), math.radians(25.0)
 _LOOK_NS = 200_000_000
 _REACHED_RAD = math.radians(0.4)
 _GAIN_PS = 1.0  # rate per angle: the joint answers after dead time and lag, 0.45 s
@@ -63,12 +65,13 @@ class Positioning:
     def _refreshed(self, moment: Moment) -> Target | None:
         """Return the pile, newer where perception goes on to see the same one; near it the first look is the best."""
         known, pile = moment.target, moment.pile
-        if known is None or pile is None or self.phase != APPROACH or pile.stamp_ns <= known.stamp_ns:
+        if known is None or pile is None or self.phase != APPROACH:
             return known
-        newer = target_of(pile.estimate, pile.stamp_ns)
-        if newer is None or float(np.hypot(*(newer.center_m - known.center_m))) > self._settings.pile_moved_m:
-            return known
-        return newer
+        if pile.stamp_ns > known.stamp_ns:
+            newer = target_of(pile.estimate, pile.stamp_ns)
+            if newer is not None and math.dist(newer.center_m, known.center_m) <= self._settings.pile_moved_m:
+                known = newer
+        return _along_drift(known, moment)
 
     def _approach(self, moment: Moment, target: Target) -> Step:
         """Drive on by guidance until the joint is at the set distance from the centre, nearer where it is not square yet."""
@@ -84,8 +87,7 @@ class Positioning:
         if moment.now_ns - self._rolled_ns > round(settings.stuck_s * 1e9):
             return Step(APPROACH, Event.BLOCKED, f"guidance does not drive on, {far_m:.1f} m before the pile")
         before_m = settings.reach_m - self._model.front_m
-        moved = self._planned is None or float(np.abs(target.limits_m - self._planned.limits_m).max()) > _REPLAN_M
-        if self._path is None or moved:
+        if self._path is None or self._planned is None or _is_moved(target, self._planned):
             self._path = approach_path(moment.motion, target, before_m, settings.approach_kmh / 3.6)
             self._planned = target
         left = np.hypot(*(self._path[:, :2] - target.limits_m.mean(axis=0)).T)
@@ -157,3 +159,20 @@ class Positioning:
             return Step(ALIGN, pedals=Pedals(brake=True))
         values = (*turn.values, ("bend_rad", bend), ("way_m", landed.way_m), ("middle", landed.middle))
         return Step(LOWER, Event.PLACED, turn.ended, pedals=Pedals(brake=True), values=values)
+
+
+def _is_moved(target: Target, planned: Target) -> bool:
+    """Return whether a pile is so far from where the path leads that another one is due."""
+    turned = math.remainder(target.heading_rad - planned.heading_rad, math.tau)
+    return float(np.abs(target.limits_m - planned.limits_m).max()) > _REPLAN_M or abs(turned) > _REPLAN_RAD
+
+
+def _along_drift(target: Target, moment: Moment) -> Target:
+    """Return a pile with the drift's direction, where both walls are seen: one that has been dug looks askew."""
+    axis = axis_rad(wall_lines(moment.walls_m, target.limits_in(moment.motion)))
+    if (
+        axis is None
+        or abs(math.remainder(moment.motion.heading_rad + axis - target.heading_rad, math.tau)) > _ASKEW_RAD
+    ):
+        return target
+    return target._replace(heading_rad=moment.motion.heading_rad + axis)
