@@ -80,9 +80,12 @@ class LegProgress:
         return self.leg == len(self.legs)
 
     def paused(self, now_ns: int) -> bool:
-        """Take a turn; return whether nobody has asked for a while."""
+        """Take a turn; return whether nobody has asked for a while: what others have driven since is no way towards a target."""
         before_ns, self._asked_ns = self._asked_ns, now_ns
-        return now_ns - before_ns > _PAUSE_NS
+        paused = now_ns - before_ns > _PAUSE_NS
+        if paused:
+            self.driven_m, self._before = 0.0, None
+        return paused
 
     def count(self, motion: Motion, *, backs: bool) -> None:
         """Count the way since the motion before; what is backed up is driven again."""

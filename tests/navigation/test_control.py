@@ -166,3 +166,17 @@ def test_time_in_which_somebody_else_had_the_machine_is_no_sign_of_being_stuck()
     rod.now_ns += 30_000_000_000
     assert rod.run(0.5 * rod.settings.stuck_s, until=BACKING) == DRIVING
     assert rod.run(rod.settings.stuck_s, until=BACKING) == BACKING
+
+
+def test_what_somebody_else_has_driven_is_no_overrun() -> None:
+    """A machine that had gone to and fro before its pile asked for help as navigation had it again."""
+    rod = Rod(at(6.0, 0.0, 0.0), ladder())
+    rod.go("t1.end", "t1.start")
+    rod.run(2.0)
+    for _ in range(30):  # charges of 5 m, each by somebody else; navigation has it for a turn between them
+        rod.now_ns += 5_000_000_000
+        motion = rod.motion()
+        rod.control.step(
+            rod.now_ns, motion._replace(x_m=motion.x_m + 5.0 * (rod.now_ns // 5_000_000_000 % 2)), rod.located()
+        )
+    assert rod.control.state == DRIVING
