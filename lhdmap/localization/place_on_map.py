@@ -40,6 +40,7 @@ class Placer:
 
     def __init__(self, topology: TopologicalMap) -> None:
         self._topology, self._lookup = topology, Lookup(topology)
+        self._asked, self._node = (math.nan, math.nan, math.nan), ""
         self._along = {tunnel.id: arc_m(tunnel.line_m) for tunnel in topology.tunnels}
         self._points = {node: topology.points_of(node) for node in topology.nodes}
         self._rho_m = {
@@ -60,7 +61,10 @@ class Placer:
 
     def node_at(self, pose: FloatArray, height_m: float) -> str:
         """Return the id of the node that a pose (3,) at a height is in; empty where it is in none."""
-        return self._lookup.nodes_at(np.array([[pose[0], pose[1], height_m]]))[0]
+        place = float(pose[0]), float(pose[1]), height_m
+        if place != self._asked:  # a scan asks for the same place several times
+            self._asked, self._node = place, self._lookup.nodes_at(np.array([place]))[0]
+        return self._node
 
     def at(self, pose: FloatArray, height_m: float, speed_mps: float) -> PlaceOnMap:
         """Return the place of a pose (3,) at a height, moving at a signed speed along its heading."""
