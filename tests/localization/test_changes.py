@@ -154,3 +154,17 @@ def test_what_came_is_forgotten_after_some_way() -> None:
         changes.update(0, travelled, (np.array([70.0, 0.0, 0.0]), 0.0), far, known=True, holds=True)
     assert not changes.stands_in(pose, 0.0, hits).any()
     assert len(changes.changes()) == 1
+
+
+def test_only_hits_in_room_that_the_map_never_saw_say_nothing() -> None:
+    """Through an opening of the map's end is unknown room; behind a wall, or in free room, hits do say something."""
+    changes, pose = world(), np.array([70.0, 0.0, 0.0])
+    on_walls = np.array([[x, side * HALF_M] for x in (-5.0, 0.0, 5.0) for side in (1.0, -1.0)])
+    behind = np.array([[x, side * (HALF_M + 1.5)] for x in (-5.0, 0.0, 5.0) for side in (1.0, -1.0)])
+    in_the_way = np.array([[x, 0.5] for x in (-6.0, -3.0, 4.0)])
+    beyond = np.array([[13.0 + x, y] for x in (1.0, 2.0, 3.0) for y in (-1.0, 1.0)])
+    for told in (on_walls, behind, in_the_way):
+        assert changes.unknown_share(pose, 0.0, told) == 0.0
+    assert changes.unknown_share(pose, 0.0, beyond) == 1.0
+    assert changes.unknown_share(pose, 0.0, np.concatenate([on_walls, beyond])) == 0.5
+    assert changes.unknown_share(pose, 0.0, np.zeros((0, 2))) == 0.0

@@ -152,3 +152,25 @@ def test_nothing_known_before_the_first_scan() -> None:
 def test_the_same_messages_give_the_same_rows() -> None:
     one, other = ran(10.0), ran(10.0)
     assert [row._replace(latency_ms=0.0) for row in one.rows] == [row._replace(latency_ms=0.0) for row in other.rows]
+
+
+def test_a_place_that_was_given_up_for_nothing_is_taken_up_again() -> None:
+    """As after dust, or a room that the map does not have: the odometry has led to where the machine is."""
+    stream, poses = known.drive(5.0, 30.0)
+    scans = [k for k, (role, _) in enumerate(stream) if role == "front"]
+    with Localizer(known.known_map(), Settings(), None, np.array([*poses[0], 0.0])) as localizer:
+        for k, (role, message) in enumerate(stream):
+            localizer.update(role, message)
+            if k == scans[len(scans) // 2]:
+                localizer.keeper._drop("for nothing")  # what a crowd before the scanners does
+        localizer.finish()
+    rows = localizer.rows
+    lost = [k for k, row in enumerate(rows) if row.status == LOST]
+    assert lost
+    driven = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(poses[:, :2], axis=0).T))])
+    assert driven[lost[-1] + 1] - driven[lost[0]] < 5.0
+    assert {row.status for row in rows[lost[-1] + 1 :]} == {TRACKING}
+    off = np.array(
+        [se2.between(pose, np.array([row.x_m, row.y_m, row.yaw_rad])) for pose, row in zip(poses, rows, strict=True)]
+    )
+    assert np.abs(off[lost[-1] + 1 :, :2]).max() < 0.1
