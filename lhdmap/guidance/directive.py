@@ -14,12 +14,16 @@ X, Y, HEADING, SPEED, ROUTE, WAY = range(6)
 
 
 class Directive(NamedTuple):
-    """`path` (N, 6) in `odom`, each 0.25 m, along which the leading axle moves in `gear`; `stop_m`: along it, inf: it goes on."""
+    """`path` (N, 6) in `odom`, each 0.25 m, along which the leading axle moves in `gear`; `stop_m`: along it, inf: it goes on.
+
+    `leaves`: it goes out of a pile by the way it came: where what slid down touches it, it creeps on while that gets no worse.
+    """
 
     stamp_ns: int
     gear: int
     path: FloatArray
     stop_m: float
+    leaves: bool = False
 
 
 def path_of(line_m: FloatArray, speed_mps: FloatArray | float, route: FloatArray | float = 1.0) -> FloatArray:

@@ -23,6 +23,7 @@ _NEW_SHARE = 0.3
 _TURN_S = 1.0  # from speeding up to slowing down: lag of the drive, jerk
 _ASIDE_M, _ASIDE_LESS_M = 0.5, 0.15  # of the leading edge: there a wall may be nearer
 _SIGHT_STEP_M, _SIGHT_CLEAR_M = 0.5, 0.10
+_LEAVES_MPS, _NO_WORSE_M = 0.3, 0.02  # of a machine that leaves a pile, and how much less clearance is none
 
 
 class Speeds(NamedTuple):
@@ -113,6 +114,8 @@ def _caps(
     beside = np.interp(
         clear, [_STOP_M, _NARROW_M, _BESIDE_M, _FREE_M], [0.0, settings.narrow_mps, settings.beside_mps, top]
     )
+    if directive.leaves:
+        beside = np.where(clear >= clear[0] - _NO_WORSE_M, np.maximum(beside, _LEAVES_MPS), beside)
     bend, rate = (
         solution.states[:, 3],
         np.convolve(np.pad(solution.rates, (1, 2), mode="edge"), np.ones(3) / 3.0, "valid"),

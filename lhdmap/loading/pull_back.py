@@ -116,7 +116,7 @@ class PullBack:
             self._trail.cut(motion)
             self._shake.begin(moment.signals)
             return self._shaken(moment)
-        return Step(BACK, directive=Directive(moment.now_ns, -1, self._path, self._stop_m))
+        return Step(BACK, directive=Directive(moment.now_ns, -1, self._path, self._stop_m, leaves=True))
 
     def _along_m(self, motion: Motion) -> float:
         assert self._path is not None  # noqa: S101  # in this phase

@@ -40,6 +40,7 @@ from lhdmap.pipeline.way_driven import WayDriven
 
 _HITS_ABOVE_M = 1.0  # hits are flat: where they are shown over the floor
 _FEWEST_HITS = 10  # three unknowns, and walls to two sides at least: fewer hits are dust
+_BESIDE_M = 2.0  # of `base_link`: hits farther ahead of a machine that digs are its pile's, which the map has as it was
 _LEAST_LEFT = 0.25  # of the hits must be of walls that the map has, or nothing corrects the place
 
 
@@ -163,7 +164,7 @@ class Localizer:
         began, waited_s, place = time.perf_counter(), self._finder.waited_s, self._place
         moved, since_ns = self._way.go_on(stamp_ns, step)
         if moved is not None and place.tracker is not None:
-            place.tracker.predict(moved, *self._odometry.motion(step, since_ns))
+            place.tracker.predict(*self._odometry.motion(moved, step, since_ns))
         predicted = place.belief
         source, points = "", np.zeros((0, 2))
         if step.processed:
@@ -201,11 +202,13 @@ class Localizer:
             self.world.update(stamp_ns, self._way.travelled_m, place, points, known=known, holds=holds)
 
     def _of_the_map(self, points: FloatArray, front: int) -> tuple[FloatArray, int]:
-        """Return the hits without those of what surely came since the map was made: they say nothing of the place."""
+        """Return the hits without those of what came since the map was made, or of a pile: they say nothing of the place."""
         tracker = self._place.tracked
         if tracker is None:
             return points, front
         kept = ~self.world.stands_in(tracker.pose, tracker.height_m, points)
+        if self.keeper.digs:
+            kept &= points[:, 0] < _BESIDE_M
         return points[kept], int(kept[:front].sum())
 
     def _correct(self, points: FloatArray, front: int) -> str:

@@ -22,22 +22,26 @@ class FromOdometry:
 
     def __init__(self, pipeline: MappingPipeline, settings: LocalizationSettings, floor_m: float) -> None:
         self._pipeline, self._settings, self._floor_m = pipeline, settings, floor_m
+        self._was_lost = False
 
-    def motion(self, step: OdometryStep, since_ns: int) -> tuple[FloatArray, Wheels]:
-        """Return the covariance (3, 3) of the odometry's step, and the wheels' motion over it, `since_ns` on.
+    def motion(self, moved: FloatArray, step: OdometryStep, since_ns: int) -> tuple[FloatArray, FloatArray, Wheels]:
+        """Return the motion (3,) over a step, its covariance (3, 3), and the wheels' motion over it, `since_ns` on.
 
-        Where a scan could not be placed the step is the wheels' own, or a guess, and as sure as these are.
+        `moved` (3,) by the odometry. Where a scan could not be placed it is the wheels' own, as sure as these are, or a guess:
+        scans that came late or stood still carry an odometry away, and back again with the first that fits.
         """
         covariance = step.error.covariance if step.processed else np.zeros((3, 3))
         dt_s = (step.time_ns - since_ns) * 1e-9
         motion = self._pipeline.front_end.wheels.motion_between(since_ns, step.time_ns)
-        if step.lost:
+        lost, self._was_lost = step.lost or self._was_lost, step.lost
+        if lost:
             covariance = covariance + (np.diag((_GUESSED * dt_s) ** 2) if motion is None else motion.covariance)
+            moved = moved if motion is None or motion.source == "tachometer" else motion.delta
         if motion is None:
-            return covariance, Wheels(dt_s, math.nan, math.nan)
+            return moved, covariance, Wheels(dt_s, math.nan, math.nan)
         forward_m = math.copysign(math.hypot(motion.delta[0], motion.delta[1]), motion.delta[0])
         turn_rad = math.nan if motion.source == "tachometer" else float(motion.delta[2])
-        return covariance, Wheels(dt_s, forward_m, turn_rad)
+        return moved, covariance, Wheels(dt_s, forward_m, turn_rad)
 
     def hits(self, step: OdometryStep, odometry: PlanarOdometry, *, well_held: bool) -> tuple[FloatArray, int]:
         """Return hits (N, 2) of both scanners near the machine, thinned, and how many are the front one's."""

@@ -14,8 +14,9 @@ from lhdmap.messages import FloatArray
 # Time between two looks; travel after the loss until which it looks; what two looks may differ; how much better than any other
 # place the found one must fit; hits that a look needs.
 _LOOK_NS, _NEAR_M, _SAME_M, _CLEARLY, _LEAST_HITS = 400_000_000, 5.0, 0.3, 0.05, 40
-# A place where the odometry leads to needs two looks; another one must be seen from so much way: one that stands sees the same.
-_AS_CARRIED_M, _FROM_M = 0.2, 1.5
+# A place where the odometry leads to needs two looks. Another one must fit much better than it has to, or be seen from so much
+# way: a machine that stands sees the same.
+_AS_CARRIED_M, _FITS_WELL, _FROM_M = 0.2, 0.15, 1.5
 
 
 class NearLook:
@@ -52,7 +53,8 @@ class NearLook:
         ):
             self._since_m = travelled_m
             return None
-        if _apart_m(tracker.pose, found.pose) > _AS_CARRIED_M and travelled_m - self._since_m < _FROM_M:
+        surely = _apart_m(tracker.pose, found.pose) <= _AS_CARRIED_M or found.support >= wanted() + _FITS_WELL
+        if not surely and travelled_m - self._since_m < _FROM_M:
             return None
         self._before = None
         return found.pose.copy()

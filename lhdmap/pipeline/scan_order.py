@@ -11,6 +11,7 @@ from lhdmap.scan_matching.scan_points import half_sweep_ns
 LONG_AGO_NS = -(2**62)
 _PATIENCE_SCANS = 3  # after a pause of the whole log, wheels may come within as many scans before they count as silent
 _MOMENT_NS = 5_000_000  # a scan without a hit so soon after another is none of its own
+_RUNS_ON_NS = 200_000_000  # a clock that others tell at most so long before the newest scan was not set back
 _WARM_SCANS, _FEWEST_WARM_SCANS, _WARM_NS = 50, 6, 1_500_000_000
 _QUEUE_SCANS = 2000  # a sensor that stops must not hold back scans without bound
 
@@ -51,6 +52,31 @@ class ScanOrder:
             stamp_ns = max(stamp_ns, self._clock_ns + 1)
         self._clock_ns = max(self._clock_ns, stamp_ns)
         return stamp_ns
+
+
+class LateScans:
+    """Tells scans that come behind newer ones while the other sensors' clock runs on: a slow link holds them up.
+
+    Where nothing else has a clock, or it was set back with the scans', the order of the log tells more (`ScanOrder`).
+    """
+
+    def __init__(self) -> None:
+        self.count = 0
+        self._heard_ns = LONG_AGO_NS
+
+    def hear(self, stamp_ns: int) -> None:
+        """Take the stamp of a message of inclinometer, tachometer or joints."""
+        self._heard_ns = stamp_ns
+
+    def is_late(self, scan: LaserScan | PointCloud, newest_ns: int) -> bool:
+        """Return whether a scan is late, the newest one before being of `newest_ns`; it is counted then."""
+        late = scan.stamp_ns < newest_ns <= self._heard_ns + _RUNS_ON_NS
+        self.count += late
+        return late
+
+    def warnings(self) -> list[str]:
+        """Return what to say of them."""
+        return [f"{self.count} scans of the front scanner came behind newer ones; left out"] if self.count else []
 
 
 class ScanQueue:

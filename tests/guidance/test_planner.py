@@ -68,3 +68,20 @@ def test_the_horizon_reaches_as_far_at_any_speed() -> None:
     plan = plan_of(1, BODIES, state, line, walls)
     way = np.hypot(*np.diff(plan.solution.states[:, :2], axis=0).T).sum()
     assert way > 0.9 * SETTINGS.reach_m
+
+
+@pytest.mark.parametrize("leaves", [False, True])
+def test_a_machine_that_leaves_a_pile_creeps_past_what_slid_down_beside_it(*, leaves: bool) -> None:
+    """Deep in a pile its banks touch the front body; going back by the way it came makes that no worse."""
+    x = np.arange(-30.0, 10.0, 0.1)
+    walls = np.concatenate([np.column_stack([x, np.full(len(x), side * 2.4)]) for side in (-1.0, 1.0)])
+    y0 = float(BODIES.front_box_m[1, 1])
+    banks = np.array([[at, side * (y0 - 0.08)] for at in np.arange(0.8, 2.6, 0.1) for side in (-1.0, 1.0)])
+    guidance = Guidance(MODEL, BODIES, {1: 0.8, -1: 0.8}, SETTINGS, method_of(SETTINGS))
+    line = np.column_stack([np.arange(2.0, -28.0, -0.1), np.zeros(300)])
+    directive = Directive(10**9, -1, path_of(line, 1.5), 20.0, leaves)
+    plan = guidance.plan(10**9, Motion(10**9, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0), (), np.vstack([walls, banks]), directive)
+    speeds = np.array([-one.speed_mps for one in plan.setpoints])
+    assert plan.clearance_m < 0.0
+    assert (speeds.max() > 0.2) == leaves
+    assert speeds.max() < 0.6

@@ -39,7 +39,7 @@ LOADS = "loading"
 _ASKS_NS = 100 * MILLISECOND_NS
 _SETTLED_NS = 1_000_000_000
 _AHEAD_M = 7.5  # of the pile's middle from the front axle of a machine that has been driven up to it
-_IN_THE_PILE = (State.CHARGING, State.EXCAVATION, State.PULL_BACK)
+_IN_THE_PILE = (State.CHARGING, State.EXCAVATION, State.PULL_BACK, State.HELD, State.LOADING_ASSISTANCE)
 _BEFORE_M, _BEHIND_M, _BESIDE_M = 1.2, 8.0, 0.1
 
 
