@@ -41,11 +41,11 @@ LOGS = (
 _SETTINGS = settings_from({"pile.method": "off", "recording.scan_interval_s": 20.0})
 _MOVED_NS = 1_000_000
 _INTRO = """\
-The first share of a log's scans teaches, the rest is localized on that map, from where the first part ended. The robots drive
-into places that the first part never saw: there nothing can be tracked. Within 1 m of the way that taught are 52 % of Intel's second part
-and 23 % of ACES' (by the map of the whole log); of these 91 and 64 % are tracked.
-"Relations": motions between a pose of the first part (in the map) and one of the second (tracked), as people have set them by hand
-(Freiburg benchmark); their error holds that of the map.
+The first share of a log's scans teaches, the rest is localized on that map, from where the first part ended. The robots
+drive into places that the first part never saw: there nothing can be tracked. Within 1 m of the way that taught are 52 % of
+Intel's second part and 23 % of ACES' (by the map of the whole log); of these 91 and 64 % are tracked.
+"Relations": motions between a pose of the first part (in the map) and one of the second (tracked), as people have set them by
+hand (Freiburg benchmark); their error holds that of the map.
 """
 _COLUMNS = (
     "log", "teaches", "scans after it", "tracked", "losses", "withheld", "support, 5th percentile / median",
