@@ -29,7 +29,7 @@ from lhdmap.pipeline.path import FinalPath
 from lhdmap.pipeline.pile import PileSink, PileWatch, PlacedScan
 from lhdmap.pipeline.pose_now import PoseNow, pose_now
 from lhdmap.pipeline.records import ScanRecords
-from lhdmap.pipeline.scan_order import LateScans, TimedScan, WaitingScans, says_nothing
+from lhdmap.pipeline.scan_order import TimedScan, WaitingScans, says_nothing
 from lhdmap.pipeline.step_recorder import StepRecorder
 from lhdmap.pipeline.sweeps import ScanSink, SweepIntegration
 from lhdmap.pipeline.track import Track
@@ -74,7 +74,7 @@ class MappingPipeline:
     def __init__(self, settings: Settings, machine: Machine | None = None, options: MappingOptions = _WHOLE) -> None:
         self.settings, self.machine, self._options = settings, machine, options
         self.front_end = front = FrontEnd(settings, machine)
-        self._waiting, self._late = WaitingScans(), LateScans()
+        self._waiting = WaitingScans()
         self.odometry: PlanarOdometry | None = None  # begins once the first scans have told the speed
         self.clouds = CloudOdometry(settings.cloud_odometry) if options.primary == "points" else None
         lever_m = settings.odometry.height_lever * front.machine.dimensions.wheelbase_m
@@ -99,7 +99,7 @@ class MappingPipeline:
         if isinstance(message, (LaserScan, PointCloud)):
             message = self.front_end.sweep_times.checked(role, message)
             if role == self._options.primary:
-                if self._late.is_late(message, self._waiting.order.newest_ns):
+                if self._waiting.is_late(message):
                     return
                 self._waiting.append(message)
                 self._process_ready()
@@ -114,7 +114,7 @@ class MappingPipeline:
                 self.evidence.say(self._waiting.order.newest_ns, message.text)  # a text has no stamp of its own
             return
         if role in _CLOCKS:
-            self._late.hear(message.stamp_ns)
+            self._waiting.overdue.hear(message.stamp_ns)
         self.front_end.update(role, message)
 
     def finish(self) -> None:
@@ -143,7 +143,7 @@ class MappingPipeline:
         gyro = self.odometry.gyro.warning()
         return [
             *self.front_end.warnings,
-            *self._late.warnings(),
+            *self._waiting.overdue.warnings(),
             *self.odometry.wheels.warnings(),
             *([] if gyro is None else [gyro]),
             *self.evidence.told,

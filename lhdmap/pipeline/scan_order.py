@@ -54,7 +54,7 @@ class ScanOrder:
         return stamp_ns
 
 
-class LateScans:
+class OverdueScans:
     """Tells scans that come behind newer ones while the other sensors' clock runs on: a slow link holds them up.
 
     Where nothing else has a clock, or it was set back with the scans', the order of the log tells more (`ScanOrder`).
@@ -116,12 +116,17 @@ class ScanQueue:
 class WaitingScans:
     """The scans of the primary scanner on their way to the odometry: in `order`, in the `queue`, and up to when they are used.
 
-    `used_ns`: time of the newest scan that the odometry has; `said_ns`: stamp of the newest one that said anything.
+    `overdue`: those that came too late; `used_ns`: time of the newest scan that the odometry has; `said_ns`: stamp of the newest
+    one that said anything.
     """
 
     def __init__(self) -> None:
-        self.order, self.queue = ScanOrder(), ScanQueue()
+        self.order, self.queue, self.overdue = ScanOrder(), ScanQueue(), OverdueScans()
         self.used_ns = self.said_ns = LONG_AGO_NS
+
+    def is_late(self, scan: LaserScan | PointCloud) -> bool:
+        """Return whether the next scan of the log came behind newer ones (`OverdueScans`)."""
+        return self.overdue.is_late(scan, self.order.newest_ns)
 
     def append(self, scan: LaserScan | PointCloud) -> None:
         """Take the next scan of the log."""

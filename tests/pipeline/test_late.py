@@ -7,7 +7,7 @@ from lhdmap.config import Settings
 from lhdmap.geometry import se2
 from lhdmap.messages import Message
 from lhdmap.pipeline.mapping import MappingOptions, MappingPipeline
-from lhdmap.pipeline.scan_order import LateScans
+from lhdmap.pipeline.scan_order import OverdueScans
 
 from tests.localization.known import drive
 
@@ -44,7 +44,7 @@ def test_without_another_clock_or_where_it_was_set_back_the_order_tells_more() -
     stream, _ = drive(5.0, 14.0)
     scan = next(message for role, message in stream if role == "front")
     newest_ns = scan.stamp_ns + SECOND_NS
-    late = LateScans()
+    late = OverdueScans()
     assert not late.is_late(scan, newest_ns)
     late.hear(scan.stamp_ns + SECOND_NS)
     assert late.is_late(scan, newest_ns)

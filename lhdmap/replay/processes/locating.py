@@ -97,7 +97,9 @@ class Locating(Process):
     def _feed(self, inbox: Sequence[Received]) -> None:
         for received in inbox:
             if received.topic == LOADING:
-                self.localizer.keeper.digs = received.message.state in _DIGS
+                now = received.message
+                looks_again = now.state == State.IDENTIFICATION and now.attempts > 0
+                self.localizer.keeper.digs = now.state in _DIGS or looks_again
             else:
                 self.localizer.update(_ROLE_OF[received.topic], received.message)
 
