@@ -17,7 +17,7 @@ class MissionTally:
     """A listener of the journal; each moment of the run counts for one phase."""
 
     def __init__(self) -> None:
-        self.cycles, self.tonnes = 0, 0.0
+        self.cycles, self.tonnes, self.assists = 0, 0.0, 0
         self._phase, self._since_ns = _BEFORE, START_NS
         self._ns_of: dict[str, int] = {}
         self._waits_ns, self.longest_wait_s = 0, 0.0
@@ -32,13 +32,15 @@ class MissionTally:
             self.tonnes += float(event.values.get("mass_t") or 0.0)
         elif event.event == "state":
             self._until(event.t_ns)
+            self.assists += event.after == Phase.ASSISTANCE != self._phase  # of navigation or of a loading task
             self._phase = event.after
 
     def verdict(self, now_ns: int) -> dict[str, Any]:
         """Return what `verdict.json` says of the mission."""
         self._until(now_ns)
         by_phase = {name: ns / SECOND_NS for name, ns in sorted(self._ns_of.items())}
-        return {"cycles": self.cycles, "tonnes": self.tonnes, "time_by_phase_s": by_phase}
+        helped = {"assists": self.assists, "assist_s": by_phase.get(Phase.ASSISTANCE, 0.0)}
+        return {"cycles": self.cycles, "tonnes": self.tonnes, "time_by_phase_s": by_phase, **helped}
 
     def _until(self, now_ns: int) -> None:
         self._waits_ns = self._waits_ns + now_ns - self._since_ns if self._phase in _WAITS else 0

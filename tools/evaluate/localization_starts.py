@@ -65,7 +65,9 @@ def driven(known: KnownMap, scans: Sequence[LiveScan], start: FloatArray | None 
                 stamp, stamp, scan.odom, covariance, np.array([3.6, 0.0, 0.0]), np.zeros(3), 0.0, 1.0, False, "",
                 True, False, error=SimpleNamespace(covariance=covariance),  # type: ignore[arg-type]
             )  # fmt: skip
-            odometry = SimpleNamespace(points=scan.points, points_behind=np.zeros((0, 2)), gyro=SimpleNamespace(turn_rad=None))
+            odometry = SimpleNamespace(
+                points=scan.points, points_behind=np.zeros((0, 2)), gyro=SimpleNamespace(turn_rad=None)
+            )
             localizer.take(stamp, step, odometry)  # type: ignore[arg-type]
             yield localizer
 

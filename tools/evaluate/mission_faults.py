@@ -95,7 +95,7 @@ def run(scenario: Scenario, folder: Path) -> Outcome:
     count = len(drives.told_at(events, "watchdog: armed", "disarmed"))
     clear_m = float(found.touched.clearance_m or 0.0)
     return Outcome(
-        found.reason, missed, clear_m, told["cycles"], count, found.mission.assists, round(duration_s, 1), phases
+        found.reason, missed, clear_m, told["cycles"], count, told["assists"], round(duration_s, 1), phases
     )
 
 
