@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from lhdmap.config import Settings
 from lhdmap.geometry import se2
-from lhdmap.messages import Message
+from lhdmap.messages import LaserScan, Message
 from lhdmap.pipeline.mapping import MappingOptions, MappingPipeline
 from lhdmap.pipeline.scan_order import OverdueScans
 
@@ -42,7 +42,7 @@ def test_a_drive_with_late_scans_is_as_without_them() -> None:
 
 def test_without_another_clock_or_where_it_was_set_back_the_order_tells_more() -> None:
     stream, _ = drive(5.0, 14.0)
-    scan = next(message for role, message in stream if role == "front")
+    scan = next(message for _, message in stream if isinstance(message, LaserScan))
     newest_ns = scan.stamp_ns + SECOND_NS
     late = OverdueScans()
     assert not late.is_late(scan, newest_ns)

@@ -88,7 +88,17 @@ def test_a_charge_at_an_askew_pile_keeps_off_the_walls_while_it_digs(skew_deg: f
 def moment(pose: FloatArray, walls: FloatArray) -> Moment:
     """Return what is known of a machine at a pose that sees walls (N, 2), in its frame."""
     signals = Signals(0, 0.0, 0.0, 0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
-    return Moment(0, signals, Motion(0, *pose.tolist(), 0.0, 0.0, 0.0), walls, None, None, None, None, 0)
+    return Moment(
+        0,
+        signals,
+        Motion(0, float(pose[0]), float(pose[1]), float(pose[2]), 0.0, 0.0, 0.0),
+        walls,
+        None,
+        None,
+        None,
+        None,
+        0,
+    )
 
 
 def test_a_pile_seen_from_a_bend_is_not_driven_to_through_the_rock() -> None:
