@@ -94,9 +94,7 @@ def run(scenario: Scenario, folder: Path) -> Outcome:
         missed.append(f"phases sum up to {sum(phases.values()):.1f} s of {duration_s:.1f} s")
     count = len(drives.told_at(events, "watchdog: armed", "disarmed"))
     clear_m = float(found.touched.clearance_m or 0.0)
-    return Outcome(
-        found.reason, missed, clear_m, told["cycles"], count, told["assists"], round(duration_s, 1), phases
-    )
+    return Outcome(found.reason, missed, clear_m, told["cycles"], count, told["assists"], round(duration_s, 1), phases)
 
 
 def _lost(events: Sequence[Event], loads: FloatArray) -> list[str]:
