@@ -6,6 +6,9 @@ import numpy as np
 from lhdmap.config import Settings
 from lhdmap.geometry import se2
 from lhdmap.messages import LaserScan, Message
+from lhdmap.odometry.planar import PlanarOdometry
+from lhdmap.odometry.steps import OdometryStep
+from lhdmap.pipeline.localizer_inputs import FromOdometry
 from lhdmap.pipeline.mapping import MappingOptions, MappingPipeline
 from lhdmap.pipeline.scan_order import OverdueScans
 
@@ -52,3 +55,24 @@ def test_without_another_clock_or_where_it_was_set_back_the_order_tells_more() -
     assert not late.is_late(scan, newest_ns)
     assert late.count == 1
     assert late.warnings()
+
+
+def test_a_step_that_the_scans_did_not_tell_is_the_wheels() -> None:
+    """Scans that fit nowhere carry an odometry away, and back with the first that fits: neither moves the place on a map."""
+    stream, poses = drive(5.0, 14.0)
+    steps: list[tuple[int, OdometryStep, PlanarOdometry]] = []
+    options = MappingOptions(cloud=False, on_step=lambda *one: steps.append(one))
+    pipeline = MappingPipeline(Settings(), None, options)
+    for role, message in stream:
+        pipeline.update(role, message)
+    pipeline.finish()
+    taken = FromOdometry(pipeline, Settings().localization, 0.0)
+    (_, before, _), (_, step, _), (_, after, _) = steps[100:103]
+    truth = se2.between(poses[100], poses[101])
+    away = np.array([3.0, 1.0, 0.5])
+    moved, _, _ = taken.motion(away, step._replace(lost=True), before.time_ns)
+    assert np.abs(moved - truth).max() < 0.02  # the wheels are 1 % too fast
+    back, _, _ = taken.motion(-away, after._replace(lost=False), step.time_ns)
+    assert np.abs(back - se2.between(poses[101], poses[102])).max() < 0.02
+    again, _, _ = taken.motion(truth, after._replace(lost=False), step.time_ns)
+    assert again is truth
