@@ -7,13 +7,18 @@ What is found: whether a mission can always still be finished, and what breaks a
 
 from __future__ import annotations
 
+from array import array
 from collections import deque
 from collections.abc import Iterator
 from typing import NamedTuple
 
+import numpy as np
+from scipy.sparse import csr_array
+from scipy.sparse.csgraph import breadth_first_order
+
 from lhdmap.haulage.layout import CLOSABLE, GOALS, Layout
 from lhdmap.haulage.machine import NOWHERE, HaulageMachine, Status
-from lhdmap.haulage.states import MOVING, OF_PERMISSION, PERMISSIONS, TABLE, Event, State
+from lhdmap.haulage.states import MOVING, OF_PERMISSION, PERMISSIONS, TABLE, Event, Permission, State
 
 _ON_EDGE = (Event.CLOSED, Event.OPENED)
 
@@ -42,28 +47,29 @@ def explore(machine: HaulageMachine, buckets: int = 2, without: frozenset[Event]
     """Go through all statuses that can come about, `without` some events."""
     begin = machine.idle()
     number: dict[Status, int] = {begin: 0}
-    before: list[list[int]] = [[]]
     queue = deque([begin])
     transitions, dead_ends = 0, []
-    events = _Events(machine, without)
+    froms, tos = array("l"), array("l")
+    events, step = _Events(machine, without), machine.step
     while queue:
         at = queue.popleft()
-        own, left = number[at], False
-        for event, edge in events.of(at):
-            after = machine.step(at, event, edge, buckets)
-            transitions += 1
+        own, changes = number[at], len(froms)
+        tried = events.of(at)
+        transitions += len(tried)
+        for event, edge in tried:
+            after = step(at, event, edge, buckets)
             if after == at:
                 continue
-            left = True
-            if after not in number:
-                number[after] = len(before)
-                before.append([])
+            reached = number.get(after)
+            if reached is None:
+                reached = number[after] = len(number)
                 queue.append(after)
-            before[number[after]].append(own)
-        if not left:
+            froms.append(own)
+            tos.append(reached)
+        if len(froms) == changes:
             dead_ends.append(_told(machine.layout, at))
     ends = [k for at, k in number.items() if finished(at)]
-    coming = _coming(before, ends)
+    coming = _coming(froms, tos, ends, len(number))
     stranded = [_told(machine.layout, at) for at, k in number.items() if k not in coming]
     broken = [f"{text}: {_told(machine.layout, at)}" for at in number for text in _broken(machine, at)]
     states = frozenset(at.state for at in number)
@@ -116,10 +122,18 @@ class _Events:
             for state in State
             for permission in {one for one, _ in PERMISSIONS}
         }
+        self._alike: dict[tuple[State, Permission, bool, int], list[tuple[Event, int]]] = {}
         self._closes, self._opens = Event.CLOSED not in without, Event.OPENED not in without
 
-    def of(self, at: Status) -> Iterator[tuple[Event, int]]:
-        """Yield the events that can happen in a status and are not ignored, each with the edge that it is about."""
+    def of(self, at: Status) -> list[tuple[Event, int]]:
+        """Return the events that can happen in a status and are not ignored, each with the edge that it is about."""
+        alike = at.state, at.permission, at.edge == NOWHERE, at.closed
+        found = self._alike.get(alike)
+        if found is None:
+            found = self._alike[alike] = list(self._tried(at))
+        return found
+
+    def _tried(self, at: Status) -> Iterator[tuple[Event, int]]:
         for event in self._of[at.state, at.permission]:
             if at.edge == NOWHERE and event in (Event.ASSISTED, Event.DISPATCH):
                 yield from ((event, edge) for edge in self._edges)
@@ -131,15 +145,12 @@ class _Events:
             yield from ((Event.CLOSED, edge) for edge in self._closing)
 
 
-def _coming(before: list[list[int]], ends: list[int]) -> set[int]:
-    """Return the statuses from which one of `ends` can be reached."""
-    found, stack = set(ends), list(ends)
-    while stack:
-        for k in before[stack.pop()]:
-            if k not in found:
-                found.add(k)
-                stack.append(k)
-    return found
+def _coming(froms: array[int], tos: array[int], ends: list[int], statuses: int) -> set[int]:
+    """Return the statuses from which one of `ends` can be reached; `froms`, `tos`: what each transition leads between."""
+    start = statuses  # leads to each end; transitions are gone through backwards
+    tails, heads = [*tos, *([start] * len(ends))], [*froms, *ends]
+    back = csr_array((np.ones(len(tails), dtype=np.int8), (tails, heads)), shape=(statuses + 1, statuses + 1))
+    return set(breadth_first_order(back, start, return_predecessors=False).tolist())
 
 
 def _broken(machine: HaulageMachine, at: Status) -> Iterator[str]:

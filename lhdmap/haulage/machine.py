@@ -9,7 +9,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from lhdmap.haulage.layout import Layout, checked
-from lhdmap.haulage.states import MOVING, PERMISSIONS, TABLE, TASKS, Event, Guard, On, Permission, Rule, State
+from lhdmap.haulage.states import MOVING, OF_PERMISSION, PERMISSIONS, TABLE, TASKS, Event, Guard, On, Permission, State
 
 NOWHERE = -1
 """Edge of a machine that others may move: after assistance, and with a new mission, its pose tells where it is."""
@@ -105,23 +105,23 @@ class HaulageMachine:
         `edge`: of CLOSED and OPENED that edge (those of its passage go with it), of ASSISTED and DISPATCH the one that the
         machine is on now; `buckets`: of DISPATCH.
         """
-        now = self._heard(at, event, edge)
-        for guard, target in TABLE.get((at.state, event), ()):
-            if guard == Guard.ALWAYS or self._holds(guard, now, edge):
-                return self._goes(now, Rule(guard, target), event, edge, buckets)
+        now = self._heard(at, event, edge) if event in _HEARD else at
+        for rule in TABLE.get((at.state, event), ()):
+            if rule.guard is Guard.ALWAYS or self._holds(rule.guard, now, edge):
+                return self._goes(now, rule.target, event, edge, buckets)
         return now
 
     def _heard(self, at: Status, event: Event, edge: int) -> Status:
         """Note what counts whatever the state: closed edges, the permission."""
-        if event == Event.CLOSED:
-            return at._replace(closed=at.closed | self.layout.passages[edge])
-        if event == Event.OPENED:
-            return at._replace(closed=at.closed & ~self.layout.passages[edge])
+        if event is Event.CLOSED:
+            return Status(*at[:8], at.closed | self.layout.passages[edge])
+        if event is Event.OPENED:
+            return Status(*at[:8], at.closed & ~self.layout.passages[edge])
         permission = PERMISSIONS.get((at.permission, event))
         if permission is None:
             return at
         waits = at.ended and permission == Permission.GO and at.state in MOVING and event != Event.GRANTED
-        return at._replace(permission=Permission.WAIT if waits else permission)
+        return Status(*at[:7], Permission.WAIT if waits else permission, at.closed)
 
     def _holds(self, guard: Guard, at: Status, edge: int) -> bool:
         if guard == Guard.ENDED:
@@ -134,19 +134,20 @@ class HaulageMachine:
             return self.working(at) and at.tries + 1 < self._most[at.state]
         return self.working(at) is (guard == Guard.WORKING)
 
-    def _goes(self, at: Status, rule: Rule, event: Event, edge: int, buckets: int) -> Status:
-        target = rule.target
+    def _goes(self, at: Status, target: State | On, event: Event, edge: int, buckets: int) -> Status:
         if event == Event.COMPLETED:  # the operator drove to the goal, and did there what was to be done
             at = at._replace(edge=self.layout.entering[self.goal(at)][0])
-        at = _done(at, event, edge, buckets)
+        if event in _COUNTS:
+            at = _done(at, event, edge, buckets)
         if target == On.NEXT:
             return self._on(at, granted=event == Event.POINT_FREE)
         if target == On.HERE:
             return at._replace(state=self._kinds[at.edge], ended=False, tries=0)
         if target == State.QUEUE:
             return self._queues(at, event)
-        if target in (State.ASSIST, State.ABORTED) and target != at.state:
-            return at._replace(state=State(target), edge=NOWHERE, ended=False, tries=0)
+        if isinstance(target, State) and target in _LEFT_TO_OTHERS and target is not at.state:
+            _, _, _, loaded, left, _, service, permission, closed = at
+            return Status(target, NOWHERE, False, loaded, left, 0, service, permission, closed)
         return at._replace(tries=at.tries + 1) if event in _AGAIN else at
 
     def _queues(self, at: Status, event: Event) -> Status:
@@ -167,9 +168,11 @@ class HaulageMachine:
         if following is not None and self._kinds[following] == State.DOCK and not granted:
             return at._replace(state=State.QUEUE, ended=True, tries=at.tries if at.state == State.QUEUE else 0)
         if following is None or at.permission != Permission.GO:
-            stays = at.state in _STAY
-            return at._replace(ended=True) if stays else at._replace(state=self._kinds[at.edge], ended=True)
-        return at._replace(state=self._kinds[following], edge=following, ended=False)
+            if at.ended and at.state in _STAY:
+                return at
+            state = at.state if at.state in _STAY else self._kinds[at.edge]
+            return Status(state, at.edge, True, *at[3:])
+        return Status(self._kinds[following], following, False, *at[3:])
 
     @staticmethod
     def _task(at: Status) -> State:
@@ -182,6 +185,11 @@ class HaulageMachine:
 
 _STAY = MOVING | TASKS | {State.QUEUE}
 _AGAIN = frozenset({Event.LOAD_FAILED, Event.DUMP_STUCK})
+_LEFT_TO_OTHERS = frozenset({State.ASSIST, State.ABORTED})
+_HEARD = OF_PERMISSION | {Event.CLOSED, Event.OPENED}
+_COUNTS = frozenset(
+    {Event.COMPLETED, Event.DISPATCH, Event.LOADED, Event.DUMPED, Event.SERVICE_DUE, Event.SERVICED, Event.ASSISTED}
+)
 
 
 def _done(at: Status, event: Event, edge: int, buckets: int) -> Status:
