@@ -21,6 +21,7 @@ from lhdmap.messages import FloatArray
 _STEP_RAD = math.radians(0.5)
 _NEAR_M = 14.0
 _WELL_OFF = 3.0  # times the least room beside the bodies
+_HARDLY_M = 0.04  # off the middle: for less the joint is not turned
 _INSIDE = 0.6  # share of the room beside the bucket that is kept on either side, where it can be
 
 
@@ -39,8 +40,15 @@ class _Off(NamedTuple):
     deep_m: float
 
 
+class _Charge(NamedTuple):
+    """How a charge lands, and how far off the middle of the pile the bucket is at its toe or where the dig ends."""
+
+    landing: Landing
+    off_middle_m: float
+
+
 class Aligner:
-    """Finds the joint angle nearest to that of now from which both sides land inside the limits, without touching a wall."""
+    """Finds the joint angle whose charge stays nearest to the pile's middle, both sides inside its limits and off the walls."""
 
     def __init__(self, model: DriveModel, bodies: Bodies, settings: LoadingSettings) -> None:
         self._model, self._bodies, self._settings = model, bodies, settings
@@ -65,8 +73,9 @@ class Aligner:
     def aim(self, bend_rad: float, limits_m: FloatArray, walls_m: FloatArray) -> Aim:
         """Return the angle to turn the joint to; limits (2, 2) and wall points (N, 2) in `base_link`.
 
-        Of those that land well inside the nearest one, where there are none of those that land inside at all; among them those
-        first that keep well off the walls, which are rough and not seen at each height, and go on beside the pile.
+        Of those that land well inside that which stays nearest to the middle, where there are none of those that land inside at
+        all; among them those first that keep well off the walls, which are rough and not seen at each height, and go on beside
+        the pile.
         """
         aim, lines = Aim(None), wall_lines(walls_m, limits_m)
         axis = axis_rad(lines)
@@ -98,33 +107,37 @@ class Aligner:
         yield _Off(seen, settings.wall_m, 0.0)
 
     def _aim(self, bend_rad: float, limits_m: FloatArray, axis: float | None, margin_m: float, off: _Off) -> Aim:
-        walled = False
+        """Return the angle whose charge stays nearest to the middle; that of now where it is hardly worse."""
+        found = []
         for bend in self._candidates(bend_rad):
             turn = turned(bend_rad, bend, self._model)
             limits = se2.transform(se2.inverse(np.array([0.0, 0.0, turn])), limits_m)
-            if not self._stays(bend, limits, None if axis is None else axis - turn, margin_m):
-                continue
-            landed = self.lands(bend, limits)
+            charge = self._charge(bend, limits, None if axis is None else axis - turn, margin_m)
+            if charge is not None:
+                worse_m = 0.0 if bend == bend_rad else _HARDLY_M
+                found.append((charge.off_middle_m + worse_m, bend, turn, charge.landing))
+        for _, bend, turn, landed in sorted(found, key=lambda one: one[0]):
             start = Posture(np.array([0.0, 0.0, turn]), bend)
             if self._sweeps_free(turning(bend_rad, bend, self._model), start, landed, off):
                 return Aim(bend)
-            walled = True
-        return Aim(None, walled)
+        return Aim(None, bool(found))
 
-    def _stays(self, bend_rad: float, limits_m: FloatArray, axis: float | None, margin_m: float) -> bool:
-        """Return whether both sides land so far inside, and are still between the limits when the bucket is as deep as it digs.
+    def _charge(self, bend_rad: float, limits_m: FloatArray, axis: float | None, margin_m: float) -> _Charge | None:
+        """Return a charge whose sides land so far inside, and are still between the limits when the bucket is as deep as it digs.
 
-        The walls go on beside the pile: with the joint bent the bucket runs into them while it digs. `axis` (rad): that of the
-        drift; None: across the face.
+        The walls go on beside the pile: with the joint bent, or askew, the bucket runs into them while it digs. `axis` (rad):
+        that of the drift; None: across the face.
         """
         E = limits_m[1] - limits_m[0]
-        across = np.array([E[1], -E[0]]) / max(float(np.hypot(*E)), 1e-9)
+        width_m = max(float(np.hypot(*E)), 1e-9)
+        across = np.array([E[1], -E[0]]) / width_m
         into = across if axis is None else np.array([math.cos(axis), math.sin(axis)])
-        deep = limits_m + self._settings.dig_m * into
-        return (
-            self.lands(bend_rad, limits_m, margin_m=margin_m).good
-            and self.lands(bend_rad, deep, margin_m=margin_m).good
-        )
+        deep_m = limits_m + self._settings.dig_m * into
+        toe, deep = (self.lands(bend_rad, line_m, margin_m=margin_m) for line_m in (limits_m, deep_m))
+        if not (toe.good and deep.good):
+            return None
+        width_m -= 2.0 * min(margin_m, width_m / 3.0)
+        return _Charge(toe, width_m * max(abs(toe.middle - 0.5), abs(deep.middle - 0.5)))
 
     def _candidates(self, bend_rad: float) -> Iterator[float]:
         """Yield joint angles, the nearest to that of now first."""

@@ -11,6 +11,7 @@ from lhdmap.mine.network import Network
 from lhdmap.mine.route import start_of
 from lhdmap.mine.topology import Directory
 from lhdmap.replay.mine_parts import BodyBumper
+from lhdmap.replay.parking import parks_of
 from lhdmap.replay.parts import Parts, Touch
 from lhdmap.replay.processes.told import ModeNow
 from lhdmap.replay.scenario import Errand, Scenario
@@ -54,23 +55,6 @@ def crew_of(first: Parts, scenario: Scenario, network: Network, world: MineWorld
             bumper=CrewBumper(BodyBumper(own.machine, world), company, name),
         )
     return crew
-
-
-def parks_of(scenario: Scenario, network: Network) -> list[str]:
-    """Return where each machine stands at first: the first one where the scenario says, the others at the other parks in order.
-
-    Raises:
-        UsageError: there are too few.
-    """
-    known = [place.name for place in network.plan.places if place.kind == "park"]
-    first = scenario.start if scenario.start in known or not known else known[0]
-    parks = [first, *(name for name in known if name != first)]
-    if len(parks) < scenario.machines or not known:
-        raise UsageError(
-            f"machines = {scenario.machines}: each needs a place to park, mine '{network.plan.name}' has {len(known)}"
-            f"{': ' + ', '.join(known) if known else ''}"
-        )
-    return parks[: scenario.machines]
 
 
 def errands_of(scenario: Scenario, names: Sequence[str]) -> Mapping[str, tuple[Errand, ...]]:

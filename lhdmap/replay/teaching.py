@@ -15,6 +15,7 @@ from lhdmap.messages import FloatArray
 from lhdmap.mine.network import Network
 from lhdmap.pipeline.build import BuildRequest, build_map
 from lhdmap.pipeline.known_map import KnownMap
+from lhdmap.replay.parking import parks_of
 from lhdmap.replay.parts import Autonomous
 from lhdmap.replay.processes.navigator import Errand
 from lhdmap.replay.processes.told import ModeNow
@@ -23,6 +24,7 @@ from lhdmap.settings import nearest
 from lhdmap.simulation.mine_drive import MineDriveSettings, simulate_mine
 from lhdmap.simulation.operator import OperatorSettings
 from lhdmap.topology.model import AccessPoint, TopologicalMap, Waypoint
+from lhdmap.topology.work_places import with_work
 
 _TEACH_KMH = 8.0
 _SEED_APART = 1000  # the teaching drive is another drive
@@ -40,12 +42,27 @@ def autonomous_of(
     if not path.is_dir():
         teach(scenario, network, machine, path, settings)
     known = KnownMap.read(path)
+    if scenario.mission:
+        known = known._replace(topology=_for_mission(known.topology, scenario, network))
     start, pose = _start(known.topology, scenario.start)
-    places = [place for one in scenario.mission for place in (one.source, one.to)]
-    for goal in (scenario.goal, *places, *(one.goal for one in scenario.modes)):
+    for goal in (scenario.goal, *(one.goal for one in scenario.modes)):
         if goal:
-            _known(known.topology, goal, "mission" if goal in places else "goal")
+            _known(known.topology, goal, "goal")
     return Autonomous(known, pose, Errand(start, scenario.goal, scenario.load > 0.0), ModeNow("idle"))
+
+
+def _for_mission(topology: TopologicalMap, scenario: Scenario, network: Network) -> TopologicalMap:
+    """Return the map with the mission's places as what they are for.
+
+    Raises:
+        UsageError: a place is no point of the map, or there is nowhere to park.
+    """
+    sources, dumps = zip(*((one.source, one.to) for one in scenario.mission), strict=True)
+    parks = parks_of(scenario, network) if scenario.machines > 1 else [scenario.start]
+    topology = with_work(topology, sources, dumps, parks)
+    if not any(one.purpose == "park" for one in topology.waypoints):
+        raise UsageError('mission: the map has no place to park: let it begin at one (start = "P1")')
+    return topology
 
 
 def teach(scenario: Scenario, network: Network, machine: Machine, path: Path, settings: Settings) -> None:
@@ -78,8 +95,6 @@ def start_on(topology: TopologicalMap, name: str) -> FloatArray:
     return _start(topology, name)[1]
 
 
-def _known(topology: TopologicalMap, name: str, key: str) -> object:
-    found = topology.called(name)
-    if found is None:
+def _known(topology: TopologicalMap, name: str, key: str) -> None:
+    if topology.called(name) is None:
         raise UsageError(f"{key} = '{name}': not on the map{nearest(name, topology.names())}")
-    return found

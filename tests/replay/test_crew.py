@@ -10,11 +10,12 @@ from lhdmap.errors import ConfigError, UsageError
 from lhdmap.mine.make_network import make_network
 from lhdmap.mine.plan import find_plan, load_plan
 from lhdmap.replay.bus import Bus
-from lhdmap.replay.crew_parts import errands_of, parks_of
+from lhdmap.replay.crew_parts import errands_of
 from lhdmap.replay.engine import Engine
 from lhdmap.replay.journal import Event, Journal
 from lhdmap.replay.judges import Judges
 from lhdmap.replay.namespace import InNamespace, JournalOf, only, topic_of
+from lhdmap.replay.parking import parks_of
 from lhdmap.replay.parts import Nearness, Touch
 from lhdmap.replay.process import STATE, Outgoing, Process, Received
 from lhdmap.replay.processes.monitor import Monitor

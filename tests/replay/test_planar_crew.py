@@ -15,9 +15,9 @@ from lhdmap.mine.network import Network
 from lhdmap.mine.plan import find_plan, load_plan
 from lhdmap.mine.route import start_of
 from lhdmap.replay.crew_mission import crew_mission, section_watch
-from lhdmap.replay.crew_parts import parks_of
 from lhdmap.replay.engine import Engine
 from lhdmap.replay.journal import Event, Journal
+from lhdmap.replay.parking import parks_of
 from lhdmap.replay.scenario import Scenario
 from lhdmap.settings_tree import tree_from
 from lhdmap.simulation.history import SECOND_NS, START_NS

@@ -12,7 +12,7 @@ from lhdmap.loading.drift_walls import axis_rad, wall_lines, walls_beyond
 from lhdmap.loading.moment import Moment, Target
 from lhdmap.loading.positioning import curvature_pm
 from lhdmap.loading.positioning_align import Aligner
-from lhdmap.loading.positioning_boxes import Posture, charging, touches
+from lhdmap.loading.positioning_boxes import Posture, charging, touches, turned
 from lhdmap.loading.positioning_path import approach_path, is_free
 from lhdmap.loading.signals import Signals
 from lhdmap.loading.task_settings import LoadingSettings
@@ -83,6 +83,25 @@ def test_a_charge_at_an_askew_pile_keeps_off_the_walls_while_it_digs(skew_deg: f
     start = Posture(np.zeros(3), aim.bend_rad)
     digs = charging(start, curvature_pm(aim.bend_rad, MODEL), way)
     assert not any(touches(one, rock, BODIES, MODEL, settings.wall_m) for one in digs)
+
+
+@pytest.mark.parametrize("heading_deg", [-1.6, 2.5])
+@pytest.mark.parametrize("bend_deg", [-0.9, 0.9])
+def test_a_charge_that_would_land_askew_is_put_in_the_middle(heading_deg: float, bend_deg: float) -> None:
+    """What was: any angle that landed was held; 7 m on the bucket was 0.6 m aside and 3.6 degrees askew, raised under the arch."""
+    heading, bend = math.radians(heading_deg), math.radians(bend_deg)
+    at, hits, aligner = limits(heading), drift(heading), Aligner(MODEL, BODIES, LoadingSettings())
+    assert aligner.lands(bend, at, margin_m=0.15).good
+    aim = aligner.aim(bend, at, hits)
+    assert aim.bend_rad is not None
+    start = Posture(np.array([0.0, 0.0, turned(bend, aim.bend_rad, MODEL)]), aim.bend_rad)
+    way_m = aligner.lands(bend, at).way_m
+    lip = np.array([[float(BODIES.front_box_m[1, 0]), 0.0]])
+    for m in (way_m, way_m + LoadingSettings().dig_m):
+        *_, last = charging(start, curvature_pm(aim.bend_rad, MODEL), m)
+        middle = se2.transform(np.array([0.0, 0.0, heading]), se2.transform(last.base, lip))[0]
+        assert abs(middle[1]) < 0.12
+        assert abs(last.base[2] + heading) < math.radians(2.5)
 
 
 def moment(pose: FloatArray, walls: FloatArray) -> Moment:
