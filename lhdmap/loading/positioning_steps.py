@@ -6,6 +6,7 @@ approach -> align -> lower: the bucket goes down only once the machine is aimed 
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
@@ -30,6 +31,22 @@ _LOOK_NS = 200_000_000
 _REACHED_RAD = math.radians(0.4)
 _GAIN_PS = 1.0  # rate per angle: the joint answers after dead time and lag, 0.45 s
 _STILL_RPS = math.radians(0.5)
+_CRAWL_MPS, _CRAWLS_NS = 0.3, 4_000_000_000
+_EARLY_M = 3.0  # before `reach_m`: so far off it may be aimed where guidance only crawls between a pile's banks
+
+
+class _Pace(NamedTuple):
+    """When the machine last rolled at all, and last was faster than a crawl."""
+
+    rolled_ns: int
+    brisk_ns: int
+
+    def at(self, now_ns: int, speed_mps: float, standing_mps: float) -> _Pace:
+        """Return it with a speed of now."""
+        speed_mps = abs(speed_mps)
+        return _Pace(
+            now_ns if speed_mps > standing_mps else self.rolled_ns, now_ns if speed_mps > _CRAWL_MPS else self.brisk_ns
+        )
 
 
 class Positioning:
@@ -41,13 +58,13 @@ class Positioning:
         self.phase = APPROACH
         self._path: FloatArray | None = None
         self._planned: Target | None = None
-        self._aim, self._aimed_ns, self._rolled_ns = Aim(None), 0, 0
+        self._aim, self._aimed_ns, self._pace = Aim(None), 0, _Pace(0, 0)
         self._hit_ns: int | None = None
 
     def begin(self, moment: Moment) -> None:
         """Begin with the approach."""
         self.phase, self._path, self._planned = APPROACH, None, None
-        self._rolled_ns, self._hit_ns = moment.now_ns, None
+        self._pace, self._hit_ns = _Pace(moment.now_ns, moment.now_ns), None
 
     def step(self, moment: Moment) -> Step:
         """Return what is to be done now."""
@@ -77,14 +94,11 @@ class Positioning:
         """Drive on by guidance until the joint is at the set distance from the centre, nearer where it is not square yet."""
         settings = self._settings
         far_m = float(np.hypot(*(target.center_m - joint_of(pose_of(moment.motion), self._model))))
-        if far_m <= settings.reach_m and (
-            self._square(moment, target) or self._room_m(moment, target) < settings.run_up_m
-        ):
+        self._pace = self._pace.at(moment.now_ns, moment.motion.speed_mps, settings.standing_mps)
+        if self._there(moment, target, far_m) or self._crawls(moment, target, far_m):
             self.phase, self._aimed_ns = ALIGN, -_LOOK_NS
             return self._align(moment, target)
-        if abs(moment.motion.speed_mps) > settings.standing_mps:
-            self._rolled_ns = moment.now_ns
-        if moment.now_ns - self._rolled_ns > round(settings.stuck_s * 1e9):
+        if moment.now_ns - self._pace.rolled_ns > round(settings.stuck_s * 1e9):
             return Step(APPROACH, Event.BLOCKED, f"guidance does not drive on, {far_m:.1f} m before the pile")
         before_m = settings.reach_m - self._model.front_m
         if self._path is None or self._planned is None or _is_moved(target, self._planned):
@@ -93,6 +107,20 @@ class Positioning:
         left = np.hypot(*(self._path[:, :2] - target.limits_m.mean(axis=0)).T)
         stop_m = float(self._path[int(left.argmin()), WAY]) - self._lip_m - settings.run_up_m + _BACKSTOP_M
         return Step(APPROACH, directive=Directive(moment.now_ns, 1, self._path, stop_m))
+
+    def _there(self, moment: Moment, target: Target, far_m: float) -> bool:
+        """Return whether it is near enough to be aimed, and stands straight, or has no room left for that."""
+        near = far_m <= self._settings.reach_m
+        return near and (self._square(moment, target) or self._room_m(moment, target) < self._settings.run_up_m)
+
+    def _crawls(self, moment: Moment, target: Target, far_m: float) -> bool:
+        """Return whether guidance hardly drives on, but a charge from here lands: banks of the pile are in its way."""
+        slow = moment.now_ns - self._pace.brisk_ns > _CRAWLS_NS and far_m <= self._settings.reach_m + _EARLY_M
+        if not slow or moment.now_ns - self._aimed_ns < _LOOK_NS:
+            return False
+        self._aimed_ns = moment.now_ns
+        limits = target.limits_in(moment.motion)
+        return self._aligner.aim(moment.motion.articulation_rad, limits, moment.walls_m).bend_rad is not None
 
     def _square(self, moment: Moment, target: Target) -> bool:
         """Return whether the machine stands straight before the pile: a bent one digs towards a wall."""

@@ -114,6 +114,16 @@ def test_while_it_digs_the_pile_is_no_obstacle() -> None:
     assert bench.turn(IDLE, orders(0)).keys() == {LOADING}
 
 
+def test_up_to_the_pile_guidance_takes_its_banks_for_no_walls_but_the_guard_does() -> None:
+    bench = Bench(None)
+    nears = LoadingOutput(State.POSITIONING, "approach", directive=way(), target=TARGET)
+    asked = bench.turn(nears, orders(1))[DIRECTIVE].message
+    np.testing.assert_allclose(asked.pile_m, mouth_of(TARGET))
+    assert asked.touched_m is None
+    looks = Bench(None).turn(LOOKS._replace(target=TARGET), orders(1))[DIRECTIVE].message
+    assert looks.pile_m is None
+
+
 def test_the_mouth_reaches_before_the_toe_and_behind_it() -> None:
     corners = mouth_of(TARGET)
     assert corners[:, 0].min() < 9.0

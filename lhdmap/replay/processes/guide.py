@@ -63,8 +63,9 @@ class Guide(Process):
             self._scribe.goes("waiting", "directive too old")
             return
         walls = self._walls.points()
-        if asked.touched_m is not None:
-            walls = walls[~inside(walls, asked.touched_m)]
+        for pile_m in (asked.touched_m, asked.pile_m):
+            if pile_m is not None:
+                walls = walls[~inside(walls, pile_m)]
         plan = self._guidance.plan(now_ns, motion, tuple(self._sent), walls, asked.directive)
         gear = "forward" if plan.gear > 0 else "reverse"
         self._scribe.goes(gear, "directive", clearance_m=round(plan.clearance_m, 3), by=plan.speeds.by)

@@ -114,7 +114,8 @@ class Loads(Process):
             cause = f"assistance: {out.request.why}" if out.request is not None else out.state.value
             directive = None if out.directive is None else out.directive._replace(stamp_ns=now_ns)
             touched = around if out.pedals is not None or out.state in _IN_THE_PILE else None
-            yield Outgoing(DIRECTIVE, Asked(now_ns, directive, cause, touched))
+            pile = around if out.state == State.POSITIONING else None
+            yield Outgoing(DIRECTIVE, Asked(now_ns, directive, cause, touched, pile))
         mission = self._told_of(out)
         yield Outgoing(LOADING, self._now(now_ns, out))
         if mission != self._mission and self._way is not None:

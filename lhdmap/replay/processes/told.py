@@ -26,13 +26,15 @@ class Seen(NamedTuple):
 class Asked(NamedTuple):
     """What navigation or the loading task asks for: a directive, or None: stand.
 
-    `touched_m`: corners (4, 2) in `odom`, counterclockwise, of where hits are no obstacle: the bucket is in them.
+    `touched_m`: corners (4, 2) in `odom`, counterclockwise, of where hits are no obstacle: the bucket is in them. `pile_m`: the
+    same of a pile that is driven up to: guidance takes its banks for no walls, but nothing is to be touched yet.
     """
 
     stamp_ns: int
     directive: Directive | None
     cause: str
     touched_m: FloatArray | None = None
+    pile_m: FloatArray | None = None
 
 
 class Digs(NamedTuple):

@@ -14,6 +14,7 @@ from lhdmap.loading.positioning import curvature_pm
 from lhdmap.loading.positioning_align import Aligner
 from lhdmap.loading.positioning_boxes import Posture, charging, touches, turned
 from lhdmap.loading.positioning_path import approach_path, is_free
+from lhdmap.loading.positioning_steps import APPROACH, Positioning
 from lhdmap.loading.signals import Signals
 from lhdmap.loading.task_settings import LoadingSettings
 from lhdmap.messages import FloatArray
@@ -118,6 +119,24 @@ def moment(pose: FloatArray, walls: FloatArray) -> Moment:
         None,
         0,
     )
+
+
+@pytest.mark.parametrize(("far_m", "speed_mps", "aims"), [(12.5, 0.1, True), (12.5, 1.0, False), (16.0, 0.1, False)])
+def test_where_guidance_only_crawls_before_the_pile_it_is_aimed_from_there(
+    far_m: float, speed_mps: float, aims: bool
+) -> None:
+    """What was: between the banks of its pile a machine crept until the time limit, 0.3 m before it would have been aimed."""
+    positioning = Positioning(MODEL, BODIES, LoadingSettings())
+    x = TOE_M - far_m + MODEL.front_m  # of base_link, whose joint is so far before the pile
+    ends = limits(0.0)
+    first = moment(np.array([x, 0.0, 0.0]), drift(0.0) - [x, 0.0])
+    now = first._replace(
+        target=Target(ends, ends.mean(axis=0), 0.0, 0), motion=first.motion._replace(speed_mps=speed_mps)
+    )
+    positioning.begin(now)
+    phases = [positioning.step(now._replace(now_ns=k * 100_000_000)).phase for k in range(60)]
+    assert phases[30] == APPROACH
+    assert (phases[-1] != APPROACH) == aims
 
 
 def test_a_pile_seen_from_a_bend_is_not_driven_to_through_the_rock() -> None:
