@@ -18,6 +18,7 @@ _FEWEST, _SPAN_M, _MOST_STD_M = 15, 4.0, 0.35
 _ROUNDS = 5
 _STEEPEST, _PARALLEL = math.tan(math.radians(20.0)), math.tan(math.radians(6.0))
 _ON_M, _STEP_M = 1.5, 0.1  # a line begins so far before the pile
+_MOST_SKEW = math.tan(math.radians(20.0))
 _ROUGH = 1.5  # standard deviations that rock may stand before the line
 
 
@@ -50,6 +51,28 @@ def axis_rad(lines: WallLines) -> float | None:
     if right is None or left is None or abs(right.slope - left.slope) > _PARALLEL:
         return None
     return math.atan(0.5 * (right.slope + left.slope))
+
+
+def from_wall_to_wall(limits_m: FloatArray, lines: WallLines) -> FloatArray:
+    """Return a pile's limits (2, 2) E_R, E_L in `base_link` drawn along their own line to both walls of its drift.
+
+    Of a pile that has been dug a bank is seen at times, and what lies deeper beside it is not: its middle is no place to dig at.
+    Limits that lie along the drift rather than across it are taken across.
+    """
+    axis = axis_rad(lines)
+    right, left = lines
+    if axis is None or right is None or left is None:
+        return limits_m
+    along, across = np.array([math.cos(axis), math.sin(axis)]), np.array([-math.sin(axis), math.cos(axis)])
+    middle, E = limits_m.mean(axis=0), limits_m[1] - limits_m[0]
+    skew = float(np.clip(float(E @ along) / max(float(E @ across), 1e-9), -_MOST_SKEW, _MOST_SKEW))
+    on = across + skew * along
+    ends = []
+    for line, inward in ((right, 1.0), (left, -1.0)):
+        at_m = line.at_m + inward * _ROUGH * line.std_m
+        far = (at_m + line.slope * middle[0] - middle[1]) / (on[1] - line.slope * on[0])
+        ends.append(middle + far * on)
+    return np.stack(ends)
 
 
 def walls_beyond(lines: WallLines, limits_m: FloatArray, way_m: float) -> FloatArray:

@@ -12,8 +12,9 @@ import numpy as np
 
 from lhdmap.driving.bodies import Bodies
 from lhdmap.driving.model import DriveModel
+from lhdmap.geometry import se2
 from lhdmap.guidance.directive import WAY, Directive
-from lhdmap.loading.drift_walls import axis_rad, wall_lines
+from lhdmap.loading.drift_walls import axis_rad, from_wall_to_wall, wall_lines
 from lhdmap.loading.identification import joint_of, target_of
 from lhdmap.loading.lowering import Lowering
 from lhdmap.loading.moment import Moment, Step, Target, pose_of
@@ -196,11 +197,12 @@ def _is_moved(target: Target, planned: Target) -> bool:
 
 
 def _along_drift(target: Target, moment: Moment) -> Target:
-    """Return a pile with the drift's direction, where both walls are seen: one that has been dug looks askew."""
-    axis = axis_rad(wall_lines(moment.walls_m, target.limits_in(moment.motion)))
-    if (
-        axis is None
-        or abs(math.remainder(moment.motion.heading_rad + axis - target.heading_rad, math.tau)) > _ASKEW_RAD
-    ):
+    """Return a pile with its drift's direction, from wall to wall, where both are seen: one that has been dug looks askew."""
+    limits_m, pose = target.limits_in(moment.motion), pose_of(moment.motion)
+    lines = wall_lines(moment.walls_m, limits_m)
+    axis = axis_rad(lines)
+    heading = moment.motion.heading_rad
+    if axis is None or abs(math.remainder(heading + axis - target.heading_rad, math.tau)) > _ASKEW_RAD:
         return target
-    return target._replace(heading_rad=moment.motion.heading_rad + axis)
+    drawn_m = se2.transform(pose, from_wall_to_wall(limits_m, lines))
+    return target._replace(heading_rad=heading + axis, limits_m=drawn_m)

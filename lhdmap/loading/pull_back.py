@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from lhdmap.driving.bodies import Bodies
@@ -50,6 +52,17 @@ class Trail:
         last = self.motions[-1] if self.motions else motion
         return float(np.hypot(motion.x_m - last.x_m, motion.y_m - last.y_m))
 
+    def straight_m(self, most_rad: float) -> float:
+        """Return how far back from its end the machine stood as straight as that all the while, joint and heading."""
+        way_m = 0.0
+        for one, before in zip(self.motions[::-1], self.motions[-2::-1], strict=False):
+            turned = math.remainder(before.heading_rad - self.motions[-1].heading_rad, math.tau)
+            step_m = float(np.hypot(one.x_m - before.x_m, one.y_m - before.y_m))
+            if max(abs(turned), abs(before.articulation_rad)) > most_rad or step_m > _GAP_M:
+                break
+            way_m += step_m
+        return way_m
+
     def cut(self, motion: Motion) -> None:
         """Forget what lies ahead of a motion, to which the machine has gone back."""
         self.motions = self.behind(motion)
@@ -78,7 +91,8 @@ class PullBack:
     def __init__(
         self, model: DriveModel, bodies: Bodies, settings: LoadingSettings, shake: Controller, trail: Trail
     ) -> None:
-        self._rear, self._settings, self._shake, self._trail = lead_of(-1, model, bodies), settings, shake, trail
+        self._rear, self._lip_m = lead_of(-1, model, bodies), float(bodies.front_box_m[1, 0])
+        self._settings, self._shake, self._trail = settings, shake, trail
         self.phase = RACK
         self._since_ns = 0
         self._path: FloatArray | None = None
@@ -109,7 +123,7 @@ class PullBack:
         if self._path is None:
             trail = self._trail.behind(motion)
             self._path = back_path(motion, trail, self._rear, settings.pull_back_m, settings.back_kmh / 3.6)
-            self._stop_m = self._along_m(motion) + max(settings.pull_back_m - self._trail.back_m(motion), 0.0)
+            self._stop_m = self._along_m(motion) + max(self._way_m(moment) - self._trail.back_m(motion), 0.0)
         left_m = self._stop_m - self._along_m(motion)
         if left_m < _ARRIVED_M and abs(motion.speed_mps) < settings.standing_mps:
             self.phase = SHAKE
@@ -117,6 +131,22 @@ class PullBack:
             self._shake.begin(moment.signals)
             return self._shaken(moment)
         return Step(BACK, directive=Directive(moment.now_ns, -1, self._path, self._stop_m, leaves=True))
+
+    def _way_m(self, moment: Moment) -> float:
+        """Return how far back of the trail's end: the set way, less where the machine came round a bend before its pile.
+
+        Who stops in the midst of the bend that leads into a draw point has no room to turn the other way out of it. So far that
+        the lip has its run-up again it goes in any case.
+        """
+        settings, target = self._settings, moment.target
+        end = self._trail.motions[-1] if self._trail.motions else moment.motion
+        if target is None:
+            return settings.pull_back_m
+        axis = np.array([math.cos(target.heading_rad), math.sin(target.heading_rad)])
+        deep_m = float((np.array([end.x_m, end.y_m]) - target.limits_m.mean(axis=0)) @ axis) + self._lip_m
+        least_m = deep_m + settings.run_up_m
+        straight_m = self._trail.straight_m(math.radians(settings.square_deg))
+        return min(settings.pull_back_m, max(straight_m, least_m))
 
     def _along_m(self, motion: Motion) -> float:
         assert self._path is not None  # noqa: S101  # in this phase

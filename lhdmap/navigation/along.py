@@ -9,11 +9,13 @@ import numpy as np
 
 from lhdmap.driving.motion import Motion
 from lhdmap.geometry import se2
-from lhdmap.guidance.directive import Directive
+from lhdmap.guidance.directive import HEADING, WAY, Directive
 from lhdmap.messages import FloatArray
 from lhdmap.topology.model import DEAD_END, TopologicalMap, Tunnel, Waypoint
 
 _BEHIND_M, _AHEAD_M = 12.0, 60.0
+_AROUND_M = 15.0  # of the path: a place does not jump farther from one moment to the next
+_OFF_M, _AS_NEAR_M = 3.0, 1.0
 
 
 class Located(NamedTuple):
@@ -44,12 +46,29 @@ def on_map(motion: Motion, located: Located) -> Motion:
     return motion._replace(x_m=x, y_m=y, heading_rad=heading)
 
 
-def along_m(path: FloatArray, x: float, y: float) -> float:
-    """Return how far along a path a place is."""
-    near = int(np.hypot(path[:, 0] - x, path[:, 1] - y).argmin())
-    heading = path[near, 2]
+def along_m(path: FloatArray, x: float, y: float, before_m: float | None = None) -> float:
+    """Return how far along a path (N, 6) a place is; `before_m`: where it was a moment ago, None: not known.
+
+    A path may cross itself, and in a decline lie above itself: what is near where the machine was counts first, and at the begin
+    the first of several places.
+    """
+    off_m = np.hypot(path[:, 0] - x, path[:, 1] - y)
+    near = _first_near(off_m)
+    if before_m is not None:
+        around = np.flatnonzero(np.abs(path[:, WAY] - before_m) < _AROUND_M)
+        if len(around) and float(off_m[around].min()) < max(_OFF_M, 2.0 * float(off_m[near])):
+            near = int(around[off_m[around].argmin()])
+    heading = path[near, HEADING]
     ahead = math.cos(heading) * (x - path[near, 0]) + math.sin(heading) * (y - path[near, 1])
-    return float(path[near, 5] + ahead)
+    return float(path[near, WAY] + ahead)
+
+
+def _first_near(off_m: FloatArray) -> int:
+    """Return the first place along a path that is about as near as any, where it is nearest."""
+    first = int(np.flatnonzero(off_m <= float(off_m.min()) + _AS_NEAR_M)[0])
+    leaves = np.flatnonzero(off_m[first:] > float(off_m.min()) + _AS_NEAR_M)
+    last = first + int(leaves[0]) if len(leaves) else len(off_m)
+    return first + int(off_m[first:last].argmin())
 
 
 def part_of(now_ns: int, gear: int, path: FloatArray, stop_m: float, at_m: float) -> Directive:

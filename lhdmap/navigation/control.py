@@ -148,8 +148,7 @@ class NavigationControl:
         leg = way.now
         path = moved(leg.path, located.pose_odom_map)
         lead = self._body.leads[leg.gear].state(motion)
-        way.at_m = along_m(path, lead[0], lead[1])
-        way.begun_m = way.at_m if way.begun_m is None else way.begun_m
+        way.place(path, lead[0], lead[1])
         left_m = leg.stop_m - way.at_m
         self._pass_targets(leg, motion, located)
         if overrun(way.driven_m, way.length_m, self._settings):  # much farther than the node of the target is long

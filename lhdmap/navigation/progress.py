@@ -13,6 +13,7 @@ from lhdmap.driving.model import DriveModel
 from lhdmap.driving.motion import Motion
 from lhdmap.guidance.directive import WAY
 from lhdmap.messages import FloatArray
+from lhdmap.navigation.along import along_m
 from lhdmap.navigation.hold import ROOM_M
 from lhdmap.navigation.leg import Leg
 
@@ -60,13 +61,20 @@ class LegProgress:
         self.leg = self.target = 0
         self.at_m = self.driven_m = self.speed_mps = 0.0
         self.begun_m: float | None = None
+        self._of_leg = False  # `at_m`: not that of the leg before
         self._before: FloatArray | None = None
         self._asked_ns = 0
 
     def begin(self, legs: list[Leg]) -> None:
         """Begin a route."""
         self.legs, self.leg, self.target = legs, 0, 0
-        self.driven_m, self.begun_m = 0.0, None
+        self.driven_m, self.begun_m, self._of_leg = 0.0, None, False
+
+    def place(self, path: FloatArray, x: float, y: float) -> None:
+        """Take where the leading axle is, on the path (N, 6) of the leg in the same frame."""
+        self.at_m = along_m(path, x, y, self.at_m if self._of_leg else None)
+        self._of_leg = True
+        self.begun_m = self.at_m if self.begun_m is None else self.begun_m
 
     @property
     def now(self) -> Leg:
@@ -76,7 +84,7 @@ class LegProgress:
     def stopped(self) -> bool:
         """Take the end of a leg; return whether it was the last one."""
         self.leg += 1
-        self.target, self.driven_m, self.begun_m = 0, 0.0, None
+        self.target, self.driven_m, self.begun_m, self._of_leg = 0, 0.0, None, False
         return self.leg == len(self.legs)
 
     def paused(self, now_ns: int) -> bool:

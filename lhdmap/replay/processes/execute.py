@@ -16,6 +16,7 @@ from lhdmap.executor.watchdog import GUIDANCE, LINK, MOTION, OPERATOR, SCAN_FRON
 from lhdmap.guidance.planner import Plan
 from lhdmap.integration.beams import scan_points
 from lhdmap.kinematics import T_base_rear
+from lhdmap.localization.floor import NO_FLOOR, over_floor
 from lhdmap.machine import Machine
 from lhdmap.messages import FloatArray, LaserScan
 from lhdmap.replay.journal import Scribe
@@ -44,6 +45,7 @@ _FRONT, _REAR = ROLES["front"].topic, ROLES["rear"].topic
 _COMMAND = ROLES["command"].topic
 _TELLS_NS = 200 * MILLISECOND_NS
 _GUARD_RANGE_M = 20.0
+_FLOOR_M = 0.3  # hits lower over the floor are its own, and no obstacle
 
 
 class _Guidance:
@@ -52,6 +54,22 @@ class _Guidance:
     def __init__(self) -> None:
         self.wanted = Stop.GO
         self.asks, self.gear = "", 1
+
+
+class _Ground:
+    """What is known of it: the pull of the grade, how the machine leans on it (3, 3), the floor about (K, 3) as the map has it."""
+
+    def __init__(self) -> None:
+        self.pull_mps2 = 0.0
+        self.R_level_base: FloatArray = np.eye(3)
+        self.floor_m: FloatArray = NO_FLOOR
+
+    def take(self, T_odom_base: FloatArray) -> None:
+        """Take a pose (4, 4)."""
+        R, yaw = T_odom_base[:3, :3], math.atan2(T_odom_base[1, 0], T_odom_base[0, 0])
+        c, s = math.cos(yaw), math.sin(yaw)
+        self.pull_mps2 = 9.81 * float(-R[2, 0])
+        self.R_level_base = np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]]) @ R
 
 
 class Execute(Process):
@@ -74,7 +92,7 @@ class Execute(Process):
         self._feed = MotionFeed()
         self._guidance = _Guidance()
         self._told_ns = 0
-        self._pull_mps2 = 0.0
+        self._ground = _Ground()
         self._takes: dict[str, Callable[[Any, int], None]] = {
             _FRONT: lambda scan, now_ns: self._scan(scan, now_ns, front=True),
             _REAR: lambda scan, now_ns: self._scan(scan, now_ns, front=False),
@@ -92,7 +110,7 @@ class Execute(Process):
             self._take(received, now_ns)
         follows = self.control.modes.mode.source == "guidance" and not self.control.digs(now_ns)
         wanted = self._guidance.wanted if follows else Stop.GO
-        command = self.control.step(now_ns, self._feed.motion, wanted, "navigation", self._pull_mps2)
+        command = self.control.step(now_ns, self._feed.motion, wanted, "navigation", self._ground.pull_mps2)
         for who, note in self.control.take_notes():
             self._scribe.event(
                 f"{who}: {note.event}", note.cause, before=note.before, after=note.after, **dict(note.values)
@@ -113,7 +131,7 @@ class Execute(Process):
         if self._feed.heard_ns is not None:
             self.control.watchdog.saw(MOTION, self._feed.heard_ns, now_ns)
         if received.topic == POSE:
-            self._pull_mps2 = 9.81 * float(-received.message.T_odom_base[2, 0])
+            self._ground.take(received.message.T_odom_base)
 
     def _plan(self, plan: Plan | Idle, now_ns: int) -> None:
         self.control.watchdog.saw(GUIDANCE, plan.stamp_ns, now_ns)
@@ -132,6 +150,7 @@ class Execute(Process):
 
     def _compare(self, seen: Seen, now_ns: int) -> None:
         """Tell the watchdog by how much pose and scan disagree; wheels that dig slip, and say nothing of the scan."""
+        self._ground.floor_m = seen.floor_m
         lost = math.isinf(seen.apart_m)
         apart = (seen.apart_m, seen.apart_rad) if lost or not self.control.digs(now_ns) else (0.0, 0.0)
         self.control.watchdog.disagreement(seen.stamp_ns, now_ns, *apart)
@@ -158,8 +177,11 @@ class Execute(Process):
         if mount.parent == "rear_link":
             T = T_base_rear(motion.articulation_rad, self._machine) @ T
         placed = points @ T[:3, :3].T + T[:3, 3]
-        near = (np.hypot(placed[:, 0], placed[:, 1]) < _GUARD_RANGE_M) & (placed[:, 2] > 0.3)
-        kept: FloatArray = placed[near, :2]
+        near = placed[(np.hypot(placed[:, 0], placed[:, 1]) < _GUARD_RANGE_M) & (placed[:, 2] > _FLOOR_M)]
+        pose = np.array([motion.x_m, motion.y_m, motion.heading_rad])
+        kept: FloatArray = near[
+            over_floor(near @ self._ground.R_level_base.T, pose, self._ground.floor_m, _FLOOR_M), :2
+        ]
         return kept
 
     def _obey(self, word: Word, now_ns: int) -> None:

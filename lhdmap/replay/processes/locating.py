@@ -10,6 +10,7 @@ import numpy as np
 from lhdmap.config import Settings
 from lhdmap.loading.states import ASSISTANCE, State
 from lhdmap.localization.agreement import Agreement
+from lhdmap.localization.floor import NO_FLOOR, FloorOnMap, over_floor
 from lhdmap.localization.rows import TRACKING
 from lhdmap.machine import Machine
 from lhdmap.messages import FloatArray
@@ -62,6 +63,7 @@ class Locating(Process):
         self.localizer = Localizer(
             known, live(settings), machine, start, LocalizerOptions(listener=self._listen, pile=pile, newest_only=True)
         )
+        self._floor, self._least_m = FloorOnMap(known.topology), settings.odometry.min_height_m
         self._agreement = Agreement(self.localizer.pipeline.front_end.wheels.motion_between)
         scribe.goes("waiting", "no scan yet")
 
@@ -106,8 +108,23 @@ class Locating(Process):
     def _listen(self, stamp_ns: int, step: OdometryStep, odometry: PlanarOdometry) -> None:
         if not step.processed:
             return
-        points = np.concatenate([part[:, :2] for part in (odometry.points, odometry.points_behind)])
-        self._seen.append(Seen(stamp_ns, step.pose_odom_base.copy(), points, *self._apart(step), len(odometry.points)))
+        floor_m = self._floor_about()
+        front, rear = (self._walls(part, step, floor_m) for part in (odometry.points, odometry.points_behind))
+        points, apart = np.concatenate([front, rear]), self._apart(step)
+        self._seen.append(Seen(stamp_ns, step.pose_odom_base.copy(), points, *apart, len(front), floor_m))
+
+    def _floor_about(self) -> FloatArray:
+        """Return the floor about the machine (K, 3), where its place is known."""
+        fix = self.localizer.fix
+        if fix is None or fix.status != TRACKING:
+            return NO_FLOOR
+        return self._floor.about(fix.pose_map, fix.height_m, fix.pose_odom)
+
+    def _walls(self, points: FloatArray, step: OdometryStep, floor_m: FloatArray) -> FloatArray:
+        """Return hits (N, 2) of points (N, 3) that are none of a floor that rises ahead."""
+        level = points - [0.0, 0.0, self.localizer.pipeline.track.height_m]
+        kept: FloatArray = points[over_floor(level, step.pose_odom_base, floor_m, self._least_m), :2]
+        return kept
 
     def _apart(self, step: OdometryStep) -> tuple[float, float]:
         """Return by how much pose and scan disagree; infinite where the scan does not fit at all."""

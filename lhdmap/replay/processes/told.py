@@ -6,13 +6,15 @@ from typing import NamedTuple
 
 from lhdmap.guidance.directive import Directive
 from lhdmap.loading.assistance import Answer, Request
+from lhdmap.localization.floor import NO_FLOOR
 from lhdmap.messages import Command, FloatArray
 
 
 class Seen(NamedTuple):
     """Hits (N, 2) of both scanners in `base_link` at a pose (3,) in `odom`, and how far pose and scan disagree (m, rad).
 
-    `front`: how many of the hits, the first ones, are of the front scanner.
+    `front`: how many of the hits, the first ones, are of the front scanner. `floor_m` (K, 3): the floor about it as the map has
+    it, x, y in `odom`; none where it is flat, or not known.
     """
 
     stamp_ns: int
@@ -21,6 +23,7 @@ class Seen(NamedTuple):
     apart_m: float
     apart_rad: float
     front: int
+    floor_m: FloatArray = NO_FLOOR
 
 
 class Asked(NamedTuple):

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from lhdmap.driving.motion import Motion
 from lhdmap.geometry import se2
-from lhdmap.loading.drift_walls import axis_rad, wall_lines, walls_beyond
+from lhdmap.loading.drift_walls import axis_rad, from_wall_to_wall, wall_lines, walls_beyond
 from lhdmap.loading.moment import Moment, Target
 from lhdmap.loading.positioning import curvature_pm
 from lhdmap.loading.positioning_align import Aligner
@@ -58,6 +58,35 @@ def test_a_hall_or_one_wall_has_no_direction() -> None:
     assert axis_rad(wall_lines(np.zeros((0, 2)), at)) is None
     apart = hits * np.array([1.0, 1.0]) + np.where(hits[:, 1:] > 0.0, hits[:, :1] * [0.0, 0.3], 0.0)  # a funnel
     assert axis_rad(wall_lines(apart, at)) is None
+
+
+@pytest.mark.parametrize("heading_deg", [-6.0, 0.0, 4.0])
+@pytest.mark.parametrize(
+    ("right_m", "left_m", "slope"), [(-0.6, 2.3, 0.0), (-2.9, 1.0, 0.2), (0.4, 2.8, -0.3), (-1.0, 1.2, 1.5)]
+)
+def test_a_bank_that_is_seen_alone_is_drawn_to_both_walls(
+    heading_deg: float, right_m: float, left_m: float, slope: float
+) -> None:
+    """What was: of a pile dug deep on the right its left bank was taken for all of it, and the bucket met the left wall."""
+    heading = math.radians(heading_deg)
+    seen = np.array([[TOE_M + slope * right_m, right_m], [TOE_M + slope * left_m, left_m]])
+    in_base = se2.transform(se2.inverse(np.array([0.0, 0.0, heading])), seen)
+    drawn = from_wall_to_wall(in_base, wall_lines(drift(heading, rough_m=0.05), in_base))
+    ends = se2.transform(np.array([0.0, 0.0, heading]), drawn)
+    assert ends[:, 1] == pytest.approx([-HALF_M, HALF_M], abs=0.2)
+    assert ends[:, 1].mean() == pytest.approx(0.0, abs=0.08)
+    assert abs(ends[1, 0] - ends[0, 0]) < 2.0 * HALF_M * math.tan(math.radians(21.0))
+    middle = seen.mean(axis=0)
+    share = (middle[1] - ends[0, 1]) / (ends[1, 1] - ends[0, 1])
+    assert ends[0, 0] + share * (ends[1, 0] - ends[0, 0]) == pytest.approx(
+        middle[0], abs=0.1
+    )  # it lies on the new line
+
+
+def test_without_both_walls_limits_stay_what_they_are() -> None:
+    at = limits(0.0)
+    hits = drift(0.0)
+    assert from_wall_to_wall(at, wall_lines(hits[hits[:, 1] > 0.0], at)) is at
 
 
 def test_walls_go_on_behind_the_toe() -> None:
