@@ -5,15 +5,19 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 
+import numpy as np
+
 from lhdmap.driving.model import DriveModel
 from lhdmap.driving.motion import Setpoint
+from lhdmap.executor.limits import speed_bound
 from lhdmap.geometry.polygon import inside
+from lhdmap.guidance.directive import SPEED, Directive
 from lhdmap.guidance.ghosts import Eye
 from lhdmap.guidance.local_walls import LocalWalls
 from lhdmap.guidance.planner import Guidance
 from lhdmap.messages import Command
 from lhdmap.replay.journal import Scribe
-from lhdmap.replay.process import DIRECTIVE, MILLISECOND_NS, ORDERS, PLAN, SEEN, Outgoing, Process, Received
+from lhdmap.replay.process import DIRECTIVE, MILLISECOND_NS, ORDERS, PLAN, POSE, SEEN, Outgoing, Process, Received
 from lhdmap.replay.processes.feed import MOTION_TOPICS, MotionFeed
 from lhdmap.replay.processes.told import Asked, Idle, Seen
 from lhdmap.roles import ROLES
@@ -21,6 +25,8 @@ from lhdmap.roles import ROLES
 GUIDANCE = "guidance"
 _COMMAND = ROLES["command"].topic
 _ASKED_NS = 500 * MILLISECOND_NS
+_LATE_S = 0.05  # so old a plan gets, and so long until the executor's next look
+_OF_BOUND = 0.8  # downhill the drive holds a machine at a speed that is somewhat above the one that it is asked for
 
 
 class Guide(Process):
@@ -47,6 +53,7 @@ class Guide(Process):
         self._sent: deque[Setpoint] = deque(maxlen=100)
         self._asked: Asked | None = None
         self._seen_ns: int | None = None
+        self._pull_mps2 = 0.0
         scribe.goes("waiting", "no directive")
 
     def step(self, now_ns: int, inbox: Sequence[Received]) -> Iterator[Outgoing]:
@@ -66,7 +73,8 @@ class Guide(Process):
         for pile_m in (asked.touched_m, asked.pile_m):
             if pile_m is not None:
                 walls = walls[~inside(walls, pile_m)]
-        plan = self._guidance.plan(now_ns, motion, tuple(self._sent), walls, asked.directive)
+        directive = within_brakes(asked.directive, self._guidance, self._pull_mps2)
+        plan = self._guidance.plan(now_ns, motion, tuple(self._sent), walls, directive)
         gear = "forward" if plan.gear > 0 else "reverse"
         self._scribe.goes(gear, "directive", clearance_m=round(plan.clearance_m, 3), by=plan.speeds.by)
         yield Outgoing(PLAN, plan)
@@ -88,6 +96,8 @@ class Guide(Process):
             self._sent.append(self._as_setpoint(message, received.sent_ns))
         else:
             self._feed.take(received)
+            if topic == POSE:
+                self._pull_mps2 = 9.81 * float(-message.T_odom_base[2, 0])
 
     def _eyes(self, seen: Seen) -> list[Eye]:
         """Return the scanners with their hits, in `base_link`."""
@@ -100,3 +110,17 @@ class Guide(Process):
     def _as_setpoint(self, command: Command, sent_ns: int) -> Setpoint:
         speed = 0.0 if command.brake else command.propel * self._guidance.model.top_speed_mps
         return Setpoint(sent_ns, speed, command.steering_rate_rps)
+
+
+def within_brakes(directive: Directive, guidance: Guidance, pull_mps2: float) -> Directive:
+    """Return a directive that is slow enough downhill: the executor's full brake has to end within a plan, Eq. (20).
+
+    `pull_mps2`: gravity along x of the machine. Planned faster, the machine brakes fully each few seconds down a ramp.
+    """
+    plan_s = guidance.settings.stages * guidance.settings.stage_s - _LATE_S
+    bound_mps = _OF_BOUND * speed_bound(guidance.model, plan_s, _LATE_S, directive.gear * pull_mps2)
+    if float(directive.path[:, SPEED].max(initial=0.0)) <= bound_mps:
+        return directive
+    path = directive.path.copy()
+    path[:, SPEED] = np.minimum(path[:, SPEED], bound_mps)
+    return directive._replace(path=path)
