@@ -81,11 +81,11 @@ class Positioning:
         return step._replace(target=target)
 
     def _refreshed(self, moment: Moment) -> Target | None:
-        """Return the pile, newer where perception goes on to see the same one; near it the first look is the best."""
+        """Return the pile; newer while perception goes on to see it from afar, near it as at first, but between the walls of now."""
         known, pile = moment.target, moment.pile
-        if known is None or pile is None or self.phase != APPROACH:
-            return known
-        if pile.stamp_ns > known.stamp_ns:
+        if known is None:
+            return None
+        if self.phase == APPROACH and pile is not None and pile.stamp_ns > known.stamp_ns:
             newer = target_of(pile.estimate, pile.stamp_ns)
             if newer is not None and math.dist(newer.center_m, known.center_m) <= self._settings.pile_moved_m:
                 known = newer
