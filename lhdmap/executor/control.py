@@ -163,7 +163,8 @@ class Control:
         """Return whether the guard holds the machine."""
         if self.watch.is_due(now_ns):
             commanded_mps, standing = self._commanded_mps(now_ns), self.executor.standing
-            self.watch.look(now_ns, motion, commanded_mps, self._plan_ahead(), pull_mps2, standing=standing)
+            plan, digs = self._plan_ahead(), self._pedals is not None and self.digs(now_ns)
+            self.watch.look(now_ns, motion, commanded_mps, plan, pull_mps2, standing=standing, digs=digs)
         return self.watch.holds
 
     def _commanded_mps(self, now_ns: int) -> float | None:

@@ -17,7 +17,40 @@ from lhdmap.geometry.polygon import inside
 from lhdmap.messages import FloatArray
 
 _GUARD_NS = 50_000_000
+_SAME_M, _HELD_NS = 0.5, 12_000_000_000
 _LOOKS = 2  # in a row, before a point within the margin is believed: a single one is noise
+
+
+class _Again:
+    """Stops of the guard at one place: who creeps from one into the next comes to touch what the scanners do not see.
+
+    After the second one the gear is held, until the machine has gone elsewhere, the other gear is asked for, or after a while:
+    who drives takes the machine for stuck by then, backs up, and tries again or asks.
+    """
+
+    def __init__(self) -> None:
+        self._stop: tuple[Motion, float] | None = None
+        self._until_ns = 0
+
+    def stopped(self, now_ns: int, motion: Motion, way: float) -> None:
+        """Take a stop; `way`: sign of the speed that was asked for or driven."""
+        if self._stop is not None and self._stop[1] == way and _apart_m(self._stop[0], motion) < _SAME_M:
+            self._until_ns = now_ns + _HELD_NS
+        self._stop = motion, way
+
+    def holds(self, now_ns: int, motion: Motion, way: float) -> bool:
+        """Return whether this way is still held."""
+        if self._stop is None or now_ns >= self._until_ns:
+            return False
+        before, held = self._stop
+        if way == -held or _apart_m(before, motion) >= _SAME_M:
+            self._until_ns = 0
+            return False
+        return True
+
+    def forget(self) -> None:
+        """Begin anew."""
+        self._stop, self._until_ns = None, 0
 
 
 class GuardWatch:
@@ -31,6 +64,7 @@ class GuardWatch:
         self._points: dict[str, tuple[Motion, FloatArray]] = {}
         self._looked_ns: int | None = None
         self._blocked, self._near = False, 0
+        self._again = _Again()
 
     def points(self, name: str, points_m: FloatArray, motion: Motion) -> None:
         """Take the points (N, 2) of a scanner in `base_link`, and the motion at their stamp; what is not finite goes."""
@@ -54,15 +88,22 @@ class GuardWatch:
         pull_mps2: float,
         *,
         standing: bool,
+        digs: bool = False,
     ) -> None:
-        """Look along the braking path; a machine that was stopped goes on from standstill alone."""
+        """Look along the braking path; a machine that was stopped goes on from standstill alone, and not again and again."""
         self._looked_ns = now_ns
         points = self._beside(self._seen_from(motion), motion)
         found = self.guard.sweep(motion, points, commanded_mps=commanded_mps, plan=plan, pull_mps2=pull_mps2)
         self.swept = found
         self._near = self._near + 1 if found.contact else 0
         seen = found.hit or self._near >= _LOOKS
-        blocked = seen or (self._blocked and not standing)
+        way = math.copysign(1.0, commanded_mps) if commanded_mps else math.copysign(1.0, motion.speed_mps)
+        if digs:
+            self._again.forget()
+        elif seen and not self._blocked:
+            self._again.stopped(now_ns, motion, way)
+        held = self._blocked and self._again.holds(now_ns, motion, way)
+        blocked = seen or (self._blocked and not standing) or held
         if blocked != self._blocked:
             before, self._blocked = ("blocked" if self._blocked else "free"), blocked
             self.notes.add(
@@ -88,6 +129,10 @@ class GuardWatch:
         T_base_odom = se2.inverse(np.array([motion.x_m, motion.y_m, motion.heading_rad]))
         beside: FloatArray = points[~inside(points, se2.transform(T_base_odom, self.touched_m))]
         return beside
+
+
+def _apart_m(one: Motion, other: Motion) -> float:
+    return math.hypot(one.x_m - other.x_m, one.y_m - other.y_m)
 
 
 def _moved(points: FloatArray, before: Motion, after: Motion) -> FloatArray:

@@ -14,7 +14,7 @@ from lhdmap.messages import FloatArray
 
 _BACK_M, _AHEAD_M, _BEFORE_M = 4.0, 14.0, 0.5  # of base_link, and before the pile: hits between are a wall's
 _NEAREST_M, _FARTHEST_M = 0.8, 4.0  # to a side
-_FEWEST, _SPAN_M, _MOST_STD_M = 15, 4.0, 0.35
+_FEWEST, _SPAN_M, _MOST_STD_M = 15, 2.5, 0.35
 _ROUNDS = 5
 _STEEPEST, _PARALLEL = math.tan(math.radians(20.0)), math.tan(math.radians(6.0))
 _ON_M, _STEP_M = 1.5, 0.1  # a line begins so far before the pile

@@ -70,15 +70,17 @@ class Aligner:
         walls = self._walls(limits_m, walls_m)
         return not touches(Posture(np.zeros(3), bend_rad), walls, self._bodies, self._model, 0.0)
 
-    def aim(self, bend_rad: float, limits_m: FloatArray, walls_m: FloatArray) -> Aim:
+    def aim(self, bend_rad: float, limits_m: FloatArray, walls_m: FloatArray, into_rad: float | None = None) -> Aim:
         """Return the angle to turn the joint to; limits (2, 2) and wall points (N, 2) in `base_link`.
 
+        `into_rad`: the way into the pile where its drift is not seen now; None: across its face.
         Of those that land well inside that which stays nearest to the middle, where there are none of those that land inside at
         all; among them those first that keep well off the walls, which are rough and not seen at each height, and go on beside
         the pile.
         """
         aim, lines = Aim(None), wall_lines(walls_m, limits_m)
-        axis = axis_rad(lines)
+        seen = axis_rad(lines)
+        axis = into_rad if seen is None else seen
         for margin_m in self._margins_m(limits_m):
             for off in self._offs(limits_m, walls_m, lines):
                 found = self._aim(bend_rad, limits_m, axis, margin_m, off)

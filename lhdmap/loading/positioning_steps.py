@@ -81,7 +81,7 @@ class Positioning:
         return step._replace(target=target)
 
     def _refreshed(self, moment: Moment) -> Target | None:
-        """Return the pile; newer while perception goes on to see it from afar, near it as at first, but between the walls of now."""
+        """Return the pile; newer while perception sees it from afar, near it as it was at first, but between the walls of now."""
         known, pile = moment.target, moment.pile
         if known is None:
             return None
@@ -121,7 +121,11 @@ class Positioning:
             return False
         self._aimed_ns = moment.now_ns
         limits = target.limits_in(moment.motion)
-        return self._aligner.aim(moment.motion.articulation_rad, limits, moment.walls_m).bend_rad is not None
+        return self._aimed(moment, target, limits).bend_rad is not None
+
+    def _aimed(self, moment: Moment, target: Target, limits_m: FloatArray) -> Aim:
+        into = math.remainder(target.heading_rad - moment.motion.heading_rad, math.tau)
+        return self._aligner.aim(moment.motion.articulation_rad, limits_m, moment.walls_m, into)
 
     def _square(self, moment: Moment, target: Target) -> bool:
         """Return whether the machine stands straight before the pile: a bent one digs towards a wall."""
@@ -142,7 +146,7 @@ class Positioning:
             return self._hit(moment)
         self._hit_ns = None
         if moment.now_ns - self._aimed_ns >= _LOOK_NS:
-            self._aim, self._aimed_ns = self._aligner.aim(bend, limits, moment.walls_m), moment.now_ns
+            self._aim, self._aimed_ns = self._aimed(moment, target, limits), moment.now_ns
         if self._aim.bend_rad is None:
             return self._cannot(moment)
         off = self._aim.bend_rad - bend

@@ -20,6 +20,7 @@ from lhdmap.messages import FloatArray
 
 RACK, BACK, SHAKE = "rack", "back", "shake"
 _ARRIVED_M = 0.5
+_CLEAR_M = 0.5  # from the way that a charge needs at least
 _TRAIL_M, _STEP_M, _GAP_M = 60.0, 0.25, 1.0
 
 
@@ -136,7 +137,7 @@ class PullBack:
         """Return how far back of the trail's end: the set way, less where the machine came round a bend before its pile.
 
         Who stops in the midst of the bend that leads into a draw point has no room to turn the other way out of it. So far that
-        the lip has its run-up again it goes in any case.
+        another charge may begin from there it goes in any case.
         """
         settings, target = self._settings, moment.target
         end = self._trail.motions[-1] if self._trail.motions else moment.motion
@@ -144,7 +145,7 @@ class PullBack:
             return settings.pull_back_m
         axis = np.array([math.cos(target.heading_rad), math.sin(target.heading_rad)])
         deep_m = float((np.array([end.x_m, end.y_m]) - target.limits_m.mean(axis=0)) @ axis) + self._lip_m
-        least_m = deep_m + settings.run_up_m
+        least_m = deep_m + settings.charge_from_m + _CLEAR_M
         straight_m = self._trail.straight_m(math.radians(settings.square_deg))
         return min(settings.pull_back_m, max(straight_m, least_m))
 

@@ -96,9 +96,13 @@ def _stood_at(tunnel: Tunnel, place: Place, path: FloatArray, path_ns: npt.NDArr
 
 def along_m(tunnel: Tunnel, points_m: FloatArray) -> FloatArray:
     """Return where along a tunnel's line points (N, 2 or more) are, shape (N,), metres."""
-    along = arc_m(tunnel.line_m)
-    apart = np.linalg.norm(points_m[:, None, :2] - tunnel.line_m[None, :, :2], axis=2)
-    found: FloatArray = along[apart.argmin(axis=1)]
+    along, line = arc_m(tunnel.line_m), tunnel.line_m[:, :2]
+    near = np.linalg.norm(points_m[:, None, :2] - line[None], axis=2).argmin(axis=1)
+    tangent = np.gradient(line, axis=0) if len(line) > 1 else np.zeros_like(line)
+    length = np.maximum(np.hypot(*tangent.T), 1e-9)
+    beyond = ((points_m[:, :2] - line[near]) * tangent[near]).sum(axis=1) / length[near]
+    half = 0.5 * length[near]  # no farther than half-way to the next point of the line
+    found: FloatArray = np.clip(along[near] + np.clip(beyond, -half, half), 0.0, along[-1])
     return found
 
 

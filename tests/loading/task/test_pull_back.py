@@ -65,7 +65,7 @@ def stop_of(straight_m: float, deep_m: float) -> float:
     [
         (15.0, 2.5, SETTINGS.pull_back_m),  # a straight way in: as set
         (6.5, 2.5, 6.5),  # no farther than it came straight
-        (3.0, 2.5, 2.5 + SETTINGS.run_up_m),  # but so far that the lip has its run-up again
+        (3.0, 2.5, 2.5 + SETTINGS.charge_from_m + 0.5),  # but so far that another charge may begin
         (3.0, 9.0, SETTINGS.pull_back_m),  # and never farther than set
     ],
 )
