@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 
@@ -17,7 +18,9 @@ from lhdmap.geometry.polygon import inside
 from lhdmap.messages import FloatArray
 
 _GUARD_NS = 50_000_000
-_SAME_M, _HELD_NS = 0.5, 12_000_000_000
+_SAME_M, _HELD_NS = 1.5, 12_000_000_000
+_ROLLS_MPS = 0.05
+_MORE_M = 0.06  # of margin near a place where the guard has stopped it: rock stands out where no scanner sees it
 _LOOKS = 2  # in a row, before a point within the margin is believed: a single one is noise
 
 
@@ -34,7 +37,7 @@ class _Again:
 
     def stopped(self, now_ns: int, motion: Motion, way: float) -> None:
         """Take a stop; `way`: sign of the speed that was asked for or driven."""
-        if self._stop is not None and self._stop[1] == way and _apart_m(self._stop[0], motion) < _SAME_M:
+        if self.near(motion, way):
             self._until_ns = now_ns + _HELD_NS
         self._stop = motion, way
 
@@ -43,10 +46,14 @@ class _Again:
         if self._stop is None or now_ns >= self._until_ns:
             return False
         before, held = self._stop
-        if way == -held or _apart_m(before, motion) >= _SAME_M:
+        if (way and way == -held) or _apart_m(before, motion) >= _SAME_M:
             self._until_ns = 0
             return False
         return True
+
+    def near(self, motion: Motion, way: float) -> bool:
+        """Return whether it has been stopped on this way near here."""
+        return self._stop is not None and self._stop[1] == way and _apart_m(self._stop[0], motion) < _SAME_M
 
     def forget(self) -> None:
         """Begin anew."""
@@ -65,6 +72,8 @@ class GuardWatch:
         self._looked_ns: int | None = None
         self._blocked, self._near = False, 0
         self._again = _Again()
+        wary = replace(settings, margin_m=settings.margin_m + _MORE_M)
+        self._wary = Guard(model, bodies, wary, period_s=_LOOKS * _GUARD_NS * 1e-9)
 
     def points(self, name: str, points_m: FloatArray, motion: Motion) -> None:
         """Take the points (N, 2) of a scanner in `base_link`, and the motion at their stamp; what is not finite goes."""
@@ -93,11 +102,12 @@ class GuardWatch:
         """Look along the braking path; a machine that was stopped goes on from standstill alone, and not again and again."""
         self._looked_ns = now_ns
         points = self._beside(self._seen_from(motion), motion)
-        found = self.guard.sweep(motion, points, commanded_mps=commanded_mps, plan=plan, pull_mps2=pull_mps2)
+        way = _way(commanded_mps, motion)
+        guard = self._wary if self._again.near(motion, way) else self.guard
+        found = guard.sweep(motion, points, commanded_mps=commanded_mps, plan=plan, pull_mps2=pull_mps2)
         self.swept = found
         self._near = self._near + 1 if found.contact else 0
         seen = found.hit or self._near >= _LOOKS
-        way = math.copysign(1.0, commanded_mps) if commanded_mps else math.copysign(1.0, motion.speed_mps)
         if digs:
             self._again.forget()
         elif seen and not self._blocked:
@@ -129,6 +139,12 @@ class GuardWatch:
         T_base_odom = se2.inverse(np.array([motion.x_m, motion.y_m, motion.heading_rad]))
         beside: FloatArray = points[~inside(points, se2.transform(T_base_odom, self.touched_m))]
         return beside
+
+
+def _way(commanded_mps: float | None, motion: Motion) -> float:
+    """Return the sign of the speed that is asked for, else of that which is driven; 0: neither is."""
+    speed_mps = commanded_mps or (motion.speed_mps if abs(motion.speed_mps) > _ROLLS_MPS else 0.0)
+    return math.copysign(1.0, speed_mps) if speed_mps else 0.0
 
 
 def _apart_m(one: Motion, other: Motion) -> float:

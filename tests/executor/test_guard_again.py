@@ -58,7 +58,7 @@ def test_after_another_one_at_the_same_place_the_gear_is_held() -> None:
     assert bench.held_s(0.05) == pytest.approx(12.0, abs=0.3)  # longer than who drives takes it for stuck (8 s)
 
 
-@pytest.mark.parametrize(("x_m", "asked_mps"), [(0.8, 0.3), (0.05, -0.3)])
+@pytest.mark.parametrize(("x_m", "asked_mps"), [(2.0, 0.3), (0.05, -0.3)])
 def test_elsewhere_and_in_the_other_gear_it_is_free(x_m: float, asked_mps: float) -> None:
     bench = Bench()
     bench.stop(0.0)
@@ -66,6 +66,38 @@ def test_elsewhere_and_in_the_other_gear_it_is_free(x_m: float, asked_mps: float
     bench.stop(0.05)
     bench.look(0.05, False)
     assert bench.held_s(x_m, asked_mps) <= 0.1
+
+
+def test_near_a_stop_it_keeps_farther_off() -> None:
+    """Rock stands out at another height than the scanner's: what was near enough to pass is too near there."""
+
+    def free_at(bench: Bench, off_m: float) -> bool:
+        bench.now_ns += LOOK_NS
+        motion = Motion(bench.now_ns, 0.0, 0.0, 0.0, 0.0, 0.0, 0.3)
+        bench.watch.points("front", np.array([[NOSE_M + off_m, 0.2]]), motion)
+        bench.watch.look(bench.now_ns, motion, 0.3, None, 0.0, standing=False)
+        return not bench.watch.holds
+
+    near_m = next(
+        off for off in np.arange(0.02, 1.0, 0.01) if all(free_at(one, off) for one in [Bench()] for _ in range(4))
+    )
+    bench = Bench()
+    bench.stop(0.0)
+    bench.held_s(0.0)
+    assert not all(free_at(bench, near_m + 0.01) for _ in range(4))
+
+
+def test_where_nobody_asks_and_the_speed_is_noise_it_stays_held() -> None:
+    bench = Bench()
+    bench.stop(0.0)
+    bench.held_s(0.0)
+    bench.stop(0.05)
+    for k in range(100):
+        bench.now_ns += LOOK_NS
+        motion = Motion(bench.now_ns, 0.05, 0.0, 0.0, 0.0, 0.0, 0.003 * (-1) ** k)
+        bench.watch.points("front", NOTHING, motion)
+        bench.watch.look(bench.now_ns, motion, None, None, 0.0, standing=True)
+        assert bench.watch.holds
 
 
 def test_who_digs_is_not_held() -> None:

@@ -41,6 +41,9 @@ _DIGS = (
 )
 
 
+_PILE_M = 10.0  # so near to where it weighed its bucket, the pile is most of what is ahead
+
+
 class Locating(Process):
     """Gives the pose of now in `odom`, the hits of each processed scan, and the place on the map."""
 
@@ -65,6 +68,7 @@ class Locating(Process):
         )
         self._floor, self._least_m = FloorOnMap(known.topology), settings.odometry.min_height_m
         self._agreement = Agreement(self.localizer.pipeline.front_end.wheels.motion_between)
+        self._dug_at: FloatArray | None = None
         scribe.goes("waiting", "no scan yet")
 
     def step(self, now_ns: int, inbox: Sequence[Received]) -> Iterator[Outgoing]:
@@ -101,9 +105,20 @@ class Locating(Process):
             if received.topic == LOADING:
                 now = received.message
                 looks_again = now.state == State.IDENTIFICATION and now.attempts > 0
-                self.localizer.keeper.digs = now.state in _DIGS or looks_again
+                self.localizer.keeper.digs = self._beside_its_pile(digs=now.state in _DIGS or looks_again)
             else:
                 self.localizer.update(_ROLE_OF[received.topic], received.message)
+
+    def _beside_its_pile(self, *, digs: bool) -> bool:
+        """Return whether the machine is before a pile that it has dug, and what it sees ahead is not what the map has."""
+        here = np.array(self.localizer.pipeline.track.newest[:2])
+        if len(here) < 2:
+            return digs
+        if digs:
+            self._dug_at = here
+        elif self._dug_at is not None and not float(np.hypot(*(here - self._dug_at))) < _PILE_M:
+            self._dug_at = None
+        return self._dug_at is not None
 
     def _listen(self, stamp_ns: int, step: OdometryStep, odometry: PlanarOdometry) -> None:
         if not step.processed:
