@@ -330,6 +330,8 @@ def driven(settings: Settings) -> Told:
     control.mode("idle", rig.now_ns)
     yield go(3.0)
     yield go(5.0, "teleoperated")
+    rig.beside = []  # the guard has held the machine there
+    yield go(14.0, "teleoperated")
     rig.failed.add("operator")
     yield go(0.7)
     rig.failed.clear()
