@@ -18,8 +18,9 @@ from lhdmap.geometry.polygon import inside
 from lhdmap.messages import FloatArray
 
 _GUARD_NS = 50_000_000
-_SAME_M, _HELD_NS = 1.5, 12_000_000_000
-_ROLLS_MPS = 0.05
+_SAME_M = 1.5  # two stops nearer to each other are at one place
+_HELD_NS = 12_000_000_000  # longer than navigation waits before it takes a machine for stuck (8 s)
+_ROLLS_MPS = 0.05  # slower, the sign of a speed is noise
 _MORE_M = 0.06  # of margin near a place where the guard has stopped it: rock stands out where no scanner sees it
 _LOOKS = 2  # in a row, before a point within the margin is believed: a single one is noise
 

@@ -5,10 +5,16 @@ from __future__ import annotations
 import math
 
 from lhdmap.driving.model import DriveModel
+from lhdmap.messages import FloatArray
 
 _CATCH_S = 0.5  # time in which a miss is made up for
 LEAST_BRAKE_MPS2 = 0.2
 """A full brake is not taken for less, however steep it is."""
+
+
+def pull_mps2(T_odom_base: FloatArray) -> float:
+    """Return gravity along x of a machine at a pose (4, 4), m/s²: positive where its nose is lower."""
+    return 9.81 * float(-T_odom_base[2, 0])
 
 
 def speed_bound(model: DriveModel, left_s: float, period_s: float, pull_mps2: float = 0.0) -> float:

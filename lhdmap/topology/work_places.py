@@ -49,8 +49,9 @@ def point_called(topology: TopologicalMap, name: str) -> Waypoint | None:
 def _as(topology: TopologicalMap, name: str, purpose: Purpose) -> TopologicalMap:
     found = point_called(topology, name)
     if found is None:
-        known = [one.name for one in topology.waypoints]
+        ends = [one.name for one in topology.tunnels if point_called(topology, one.name) is not None]
+        known = list(dict.fromkeys([*ends, *(one.name for one in topology.waypoints)]))
         said = "is no point" if topology.called(name) is not None else "is not on the map"
-        raise UsageError(f"mission: '{name}' {said}{nearest(name, known)}; points: {', '.join(known) or 'none'}")
+        raise UsageError(f"mission: '{name}' {said}{nearest(name, known)}")
     changed = replace(found, name=found.name if name == found.id else name, purpose=purpose)
     return replace(topology, waypoints=tuple(changed if one is found else one for one in topology.waypoints))

@@ -46,10 +46,14 @@ def test_a_start_that_is_no_point_or_one_of_work_stays_what_it_is() -> None:
 
 @pytest.mark.parametrize(
     ("name", "said"),
-    [("I1", "'I1' is no point"), ("T1", "'T1' is no point"), ("DP2", "'DP2' is not on the map.*did you mean 'DP1'")],
+    [
+        ("I1", "'I1' is no point.*DP1"),
+        ("T1", "'T1' is no point.*DP1"),
+        ("DP2", "'DP2' is not on the map.*did you mean 'DP1'"),
+    ],
 )
 def test_what_is_no_point_is_refused_with_the_points_there_are(name: str, said: str) -> None:
-    with pytest.raises(UsageError, match=f"mission: {said}.*points: DP1"):
+    with pytest.raises(UsageError, match=f"mission: {said}"):
         with_work(ladder(), [name], [])
     with pytest.raises(UsageError, match=f"mission: {said}"):
         with_work(ladder(), [], [name])

@@ -11,6 +11,7 @@ import numpy as np
 from lhdmap.driving.model import DriveModel
 from lhdmap.driving.motion import Motion
 from lhdmap.executor.control import Control
+from lhdmap.executor.limits import pull_mps2
 from lhdmap.executor.notes import Stop
 from lhdmap.executor.watchdog import GUIDANCE, LINK, MOTION, OPERATOR, SCAN_FRONT, SCAN_REAR
 from lhdmap.guidance.planner import Plan
@@ -68,7 +69,7 @@ class _Ground:
         """Take a pose (4, 4)."""
         R, yaw = T_odom_base[:3, :3], math.atan2(T_odom_base[1, 0], T_odom_base[0, 0])
         c, s = math.cos(yaw), math.sin(yaw)
-        self.pull_mps2 = 9.81 * float(-R[2, 0])
+        self.pull_mps2 = pull_mps2(T_odom_base)
         self.R_level_base = np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]]) @ R
 
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from lhdmap.driving.model import DriveModel
 from lhdmap.driving.motion import Setpoint
-from lhdmap.executor.limits import speed_bound
+from lhdmap.executor.limits import pull_mps2, speed_bound
 from lhdmap.geometry.polygon import inside
 from lhdmap.guidance.directive import SPEED, Directive
 from lhdmap.guidance.ghosts import Eye
@@ -97,7 +97,7 @@ class Guide(Process):
         else:
             self._feed.take(received)
             if topic == POSE:
-                self._pull_mps2 = 9.81 * float(-message.T_odom_base[2, 0])
+                self._pull_mps2 = pull_mps2(message.T_odom_base)
 
     def _eyes(self, seen: Seen) -> list[Eye]:
         """Return the scanners with their hits, in `base_link`."""
@@ -112,13 +112,13 @@ class Guide(Process):
         return Setpoint(sent_ns, speed, command.steering_rate_rps)
 
 
-def within_brakes(directive: Directive, guidance: Guidance, pull_mps2: float) -> Directive:
+def within_brakes(directive: Directive, guidance: Guidance, along_mps2: float) -> Directive:
     """Return a directive that is slow enough downhill: the executor's full brake has to end within a plan, Eq. (20).
 
-    `pull_mps2`: gravity along x of the machine. Planned faster, the machine brakes fully each few seconds down a ramp.
+    `along_mps2`: gravity along x of the machine (`pull_mps2`). Planned faster, it brakes fully each few seconds down a ramp.
     """
     plan_s = guidance.settings.stages * guidance.settings.stage_s - _LATE_S
-    bound_mps = _OF_BOUND * speed_bound(guidance.model, plan_s, _LATE_S, directive.gear * pull_mps2)
+    bound_mps = _OF_BOUND * speed_bound(guidance.model, plan_s, _LATE_S, directive.gear * along_mps2)
     if float(directive.path[:, SPEED].max(initial=0.0)) <= bound_mps:
         return directive
     path = directive.path.copy()
